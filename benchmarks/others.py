@@ -4,7 +4,7 @@ import importlib.util
 
 from benchmarks.pyelastica_cantilever import by_pyelastica, by_rodshell, rodshell_tips, true_tips
 from benchmarks.rows import Row, Section
-from rodshell.formfinding.progress import silent
+from rodshell.progress import silent
 
 FALLS = {True: 0.2, False: 2.0}  # seconds that are simulated, by whether it must be quick
 

@@ -350,7 +350,7 @@ def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_what_the_time_limit_cut_short_is_run_again(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter(np.arange(0.0, 1e6))
-    monkeypatch.setattr("rodshell.formfinding.progress.monotonic", lambda: next(clock))
+    monkeypatch.setattr("rodshell.progress.monotonic", lambda: next(clock))
     job, whole = dome(), dome().run()
     limit, seen = 0.5, set[tuple[str, ...]]()
     while True:

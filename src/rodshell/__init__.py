@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     )
     from rodshell.formfinding.dynamic_pop_up import DynamicPopUp, DynamicPopUpSettings, dynamic_pop_up
     from rodshell.formfinding.patches import PatchLayout
-    from rodshell.formfinding.progress import bar
     from rodshell.formfinding.search import search
     from rodshell.job import Job, find_form, pop_up_table, refine
     from rodshell.joints import (
@@ -70,6 +69,7 @@ if TYPE_CHECKING:
     from rodshell.nets import ChebyshevNet, chebyshev_net
     from rodshell.output import export, save
     from rodshell.output.options import DrawingStyle, OutputOptions
+    from rodshell.progress import bar
     from rodshell.results import Archive, Results, Verdict, read
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
@@ -107,7 +107,7 @@ _HOMES = {
     ),
     "rodshell.formfinding.dynamic_pop_up": ("DynamicPopUp", "DynamicPopUpSettings", "dynamic_pop_up"),
     "rodshell.formfinding.patches": ("PatchLayout",),
-    "rodshell.formfinding.progress": ("bar",),
+    "rodshell.progress": ("bar",),
     "rodshell.formfinding.search": ("search",),
     "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),

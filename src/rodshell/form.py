@@ -19,7 +19,6 @@ from rodshell.fabrication import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
 from rodshell.formfinding.patches import MergedPopUp, PatchedForm
 from rodshell.formfinding.popup import Ends
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
@@ -27,6 +26,7 @@ from rodshell.layout import GridLayout
 from rodshell.layout.cells import Pattern
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
+from rodshell.progress import Progress, silent
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces

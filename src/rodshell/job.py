@@ -24,11 +24,11 @@ from rodshell.formfinding import Bound, Method
 from rodshell.formfinding.methods import require_method
 from rodshell.formfinding.patches import PatchLayout
 from rodshell.formfinding.popup import ENDS, Ends
-from rodshell.formfinding.progress import Progress, limited, silent
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output.options import OutputOptions
+from rodshell.progress import Progress, limited, silent
 from rodshell.results.folder import reading
 from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run, inputs_of

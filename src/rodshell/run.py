@@ -12,8 +12,8 @@ from rodshell.case.rod_ends import RodEnds
 from rodshell.form import Form, Stages
 from rodshell.formfinding import Fall, PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
-from rodshell.formfinding.progress import Progress
 from rodshell.formfinding.search import Search, search
+from rodshell.progress import Progress
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
 from rodshell.results.summary import chosen, rod_text

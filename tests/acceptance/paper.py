@@ -16,9 +16,9 @@ import rodshell as rs
 from rodshell.errors import StabilityError
 from rodshell.formfinding.dynamic_pop_up import DynamicPopUpSettings, dynamic_pop_up
 from rodshell.formfinding.methods import Draped, Fall
-from rodshell.formfinding.progress import silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.paper import genetic
+from rodshell.progress import silent
 from tests.acceptance.rows import Row, print_table
 from tests.formfinding.falls import TARGETS, Particles
 from tests.nets.sphere_net import sphere_net_end

@@ -19,7 +19,7 @@ FEW = ("--rods", "5x5", "--spacing", "80mm", "--edge", "40mm", "--length", "900m
 JOB = Job("few", ("form", "hemisphere", *FEW))
 HELD = """
 import sys, time
-from rodshell.formfinding import progress
+from rodshell import progress
 from rodshell.cli import reporting as shown, entry
 {patch}
 entry()

@@ -7,8 +7,8 @@ import pytest
 
 import rodshell as rs
 from rodshell import OutOfTimeError
-from rodshell.formfinding import progress as module
-from rodshell.formfinding.progress import TimeLimit, silent
+from rodshell import progress as module
+from rodshell.progress import TimeLimit, silent
 from rodshell.solve.equilibrium import Status
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))

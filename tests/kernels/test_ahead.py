@@ -23,7 +23,7 @@ INLINED = {"spread", "subtract_product"}  # never compiled on their own
 PARENT = """
 import time
 from rodshell.kernels import ahead
-with ahead._helper(2, True) as helper:
+with ahead._helper(True) as helper:
     print(helper.pid, flush=True)
     time.sleep(60)
 """

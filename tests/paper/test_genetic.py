@@ -16,11 +16,11 @@ import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import InputError
 from rodshell.formfinding import Footprint, PatchForm, find_stages
-from rodshell.formfinding.progress import silent
 from rodshell.paper import genetic, genetic_search
 from rodshell.paper.figure import CASES, Case
 from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
 from rodshell.paper.genetic_search import Design
+from rodshell.progress import silent
 from tests.formfinding.falls import HEMISPHERE, PAPER_ROD
 
 SMALL = Case("a", HEMISPHERE, (5, 5), spacing=0.06, edge=0.03)

@@ -8,10 +8,10 @@ import pytest
 
 import rodshell as rs
 from rodshell.formfinding.pipeline import PatchForm, agreement, popped_again
-from rodshell.formfinding.progress import silent
 from rodshell.formfinding.trim import Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import Crossings
+from rodshell.progress import silent
 from rodshell.refining import acceptance, refine
 from rodshell.refining import gates as gates_module
 from rodshell.refining.gates import GATES, SPAN_ERROR, Gates, _from_flat, gates, misfit, with_errors

@@ -9,7 +9,17 @@ import pytest
 from numba import config, njit
 
 from rodshell.kernels import COMPILED
-from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
+from rodshell.solve.dense import (
+    OVERWRITTEN,
+    add_rows,
+    backward,
+    eliminate,
+    forward,
+    padded,
+    room,
+    subtract_product,
+    workspace,
+)
 from rodshell.solve.simd_kernels import LANES, adding, multiplying
 
 pytestmark = pytest.mark.skipif(
@@ -50,7 +60,7 @@ def test_elimination_and_update_give_the_front_again(own, more):
     left = whole - upper.T @ np.diag(pivots) @ upper
     assert np.abs(left[:own]).max() < 1e-13 * np.abs(whole).max() * size
     update = room(more * padded(more))[: more * padded(more)].reshape(more, padded(more))
-    subtract_product(panel, rows, 0, own, own, 0, update, work)
+    subtract_product(panel, rows, own, OVERWRITTEN, update, work)
     update[:, :more] += np.triu(whole[own:, own:])
     np.testing.assert_allclose(np.triu(update[:, :more]), np.triu(left[own:, own:]), atol=1e-13 * size**2)
 
@@ -99,8 +109,8 @@ def test_a_childs_rows_go_where_they_belong(seed):
     expected = np.zeros((size, size))
     expected[np.ix_(places, places)] = np.triu(update[:, :count])
     rows, rest = np.zeros((own, padded(size))), np.zeros((more, padded(more)))
-    add_rows(rows, update, runs, 0, own)
-    add_rows(rest, update, runs, own, size)
+    add_rows(rows, update, runs, own)
+    add_rows(rest, update, runs, size)
     np.testing.assert_array_equal(rows[:, :size], expected[:own])
     np.testing.assert_array_equal(rest[:, :more], expected[own:, own:])
     assert not rows[:, size:].any()

@@ -17,8 +17,8 @@ from rodshell.checks.self_weight import SelfWeightCheck, self_weight, unknown_we
 from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import Ends
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.model.shell import UP
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.load_path import MOST_FACTORIZATIONS

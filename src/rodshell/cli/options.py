@@ -189,9 +189,11 @@ def wanted_kinds(only: str | None) -> list[str] | None:
     ------
     InputError : there is no such kind.
     """
+    if only is None:
+        return None
     from rodshell.output.files import read_kinds
 
-    return None if only is None else read_kinds(only)
+    return read_kinds(only)
 
 
 def seconds_of(given: str | None) -> float | None:

@@ -126,10 +126,9 @@ def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
     progress = Progress(quiet=quiet)
 
     def tell(done: int, count: int, seconds: float | None) -> None:
-        if count:
-            bar = "#" * (BAR * done // count)
-            left = f", about {seconds:.0f} s left" if seconds is not None else ""
-            progress("compiling kernels, once", f"[{bar:{BAR}}] {done} of {count}{left}", 0.0)
+        bar = "#" * (BAR * done // count)
+        left = f", about {seconds:.0f} s left" if seconds is not None else ""
+        progress("compiling kernels, once", f"[{bar:{BAR}}] {done} of {count}{left}", 0.0)
 
     with progress:
         return compile_kernels(tell, every=every)

@@ -16,7 +16,6 @@ from rodshell.arrays import Floats, Ints
 from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.geometry.frames import dot, unit
 from rodshell.joints import Joint
 from rodshell.kernels import njit
@@ -26,6 +25,7 @@ from rodshell.layout.mesh import entries_along
 from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.apron import with_apron
+from rodshell.progress import Progress, silent
 from rodshell.rods.elements import Stretch
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, SolveReport, find_equilibrium

@@ -7,9 +7,9 @@ from rodshell.errors import InputError
 from rodshell.formfinding.bound_drape import bound_drape
 from rodshell.formfinding.gravity_drape import gravity_drape
 from rodshell.formfinding.methods import Bound, Draped, Gravity, Method, require_method
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Joint, require_joint
 from rodshell.layout import GridLayout
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.validation import instance, point

@@ -12,12 +12,12 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.methods import require_coupling
 from rodshell.formfinding.popup import FIRST_RISE, arched, laid_below
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.frames import dot
 from rodshell.joints import Coupling, Joint, SharedDofs
 from rodshell.model import Shell
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion
 from rodshell.solve.linear_stability import step_limit

@@ -16,12 +16,12 @@ from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
 from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.formfinding.gravity_drape import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
 from rodshell.formfinding.methods import Draped, DrapeFigures, Fall, smallest_joint_angle
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force
 from rodshell.geometry.frames import dot
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.solve.implicit_euler import ContactEuler, Motion

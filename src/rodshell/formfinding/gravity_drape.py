@@ -18,11 +18,11 @@ from rodshell.contact.static import UnilateralContact
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import middle_surface, node_normals, place_in_layers
 from rodshell.formfinding.methods import Draped, DrapeFigures, Gravity, smallest_joint_angle
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Joint
 from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from rodshell.model import Freedom, Shell
 from rodshell.nets import chebyshev_net
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports

@@ -15,13 +15,13 @@ from rodshell.formfinding.finite_sections import flat_warnings
 from rodshell.formfinding.methods import Draped
 from rodshell.formfinding.pipeline import Agreement, PatchForm, find_stages
 from rodshell.formfinding.popup import ENDS, Ends, Start
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.seams import FEWEST, Meeting, PatchNet, lay_patches, patches_of, transported_heading
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridLayout
 from rodshell.layout.mesh import SideBySide, side_by_side
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target

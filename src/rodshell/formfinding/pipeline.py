@@ -15,7 +15,6 @@ from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
 from rodshell.formfinding.methods import Bound, Draped, Method
 from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
     NEAREST_JOINT,
@@ -30,6 +29,7 @@ from rodshell.geometry.curves import lagrange
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target

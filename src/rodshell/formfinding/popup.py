@@ -16,7 +16,6 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import cross, dot, unit
@@ -24,6 +23,7 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.shell import UP
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.path import MOST_STEPS, follow, relax

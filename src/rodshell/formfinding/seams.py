@@ -12,11 +12,11 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.end_matching import EndGoals, Point, match_net, rod_ends
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import NEAREST_JOINT
 from rodshell.geometry.frames import cross, unit
 from rodshell.layout import FlatGrid, FlatRod, GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net, geodesics
+from rodshell.progress import Progress, silent
 from rodshell.targets import Patch, Target
 from rodshell.targets.patch import Seam
 

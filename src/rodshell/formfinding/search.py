@@ -9,10 +9,10 @@ import numpy as np
 
 from rodshell.errors import InputError, OutOfTimeError, RodshellError
 from rodshell.formfinding.pipeline import find_stages
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.net_ends import inside_nodes
+from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.validation import choice

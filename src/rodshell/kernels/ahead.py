@@ -5,6 +5,7 @@ with the last, and both leave out what is kept already; so they meet. The helper
 this process, however that ends: its input is closed then.
 """
 
+import gc
 import os
 import signal
 import subprocess
@@ -13,6 +14,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from time import monotonic
 from typing import Any
 
@@ -21,6 +23,7 @@ from rodshell.kernels.jit import arguments_of
 from rodshell.kernels.table import KERNELS, OF_SOME_JOBS
 
 LONG_ENOUGH = 0.1  # share of the work after which the time that is left is estimated
+EACH = 300  # bytes of code that compile about as long as what Numba does for each kernel, however short
 
 
 def compile_kernels(progress: Callable[[int, int, float | None], None], *, every: bool) -> int:
@@ -32,31 +35,44 @@ def compile_kernels(progress: Callable[[int, int, float | None], None], *, every
         None while that is not known.
     every : those of some jobs as well, which Numba otherwise compiles at their first call.
     """
-    missing = [row for row in _rows(every) if not _is_kept(*row)]
-    work = [_size(kernel) for kernel, _ in missing]
-    waiting, begun = set(range(len(missing))), monotonic()
-    progress(0, len(missing), None)
-    with _helper(len(missing), every):
+    rows = _rows(every)
+    first = next((row for row in rows if not _is_kept(*row)), None)
+    if first is None:
+        return 0
+    begun = monotonic()
+    with _helper(every) as helper:  # which begins while this process still imports the other modules
+        missing = [first, *(row for row in rows if not _is_kept(*row))]
+        work = [EACH + _size(kernel) for kernel, _ in missing]
+        waiting, made = set(range(len(missing))), 0
+        progress(0, len(missing), None)
         for k, (kernel, arguments) in enumerate(missing):
             if k in waiting and not _is_kept(kernel, arguments):
                 kernel.compile(arguments)
+                made += work[k]
             waiting -= {other for other in waiting if other <= k or _is_kept(*missing[other])}
-            left = sum(work[other] for other in waiting) / sum(work)
-            seconds = (monotonic() - begun) * left / (1.0 - left)
-            progress(len(missing) - len(waiting), len(missing), seconds if left < 1.0 - LONG_ENOUGH else None)
+            left = sum(work[other] for other in waiting)
+            if helper is not None and helper.poll() is None:  # as far as this one, maybe within a long kernel
+                left = max(min(left, sum(work) - 2 * made), left // 2)
+            done = sum(work) - left
+            known = done > LONG_ENOUGH * sum(work)
+            seconds = (monotonic() - begun) * left / done if known else None
+            progress(len(missing) - len(waiting), len(missing), seconds)
             if not waiting:
                 break
     return len(missing)
 
 
-def _rows(every: bool) -> list[tuple[Any, tuple[Any, ...]]]:
-    """Each kernel of the table, with the types of its arguments."""
-    return [
-        (getattr(import_module(f"{PACKAGE}{module}"), name), arguments_of(row))
-        for module, rows in KERNELS.items()
-        for name, row in rows.items()
-        if every or OF_SOME_JOBS.isdisjoint((module, f"{module}.{name}"))
-    ]
+def _rows(every: bool) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+    """Each kernel of the table, with the types of its arguments: module by module, the largest sources at both ends, so
+    that little is compiled twice where two processes meet."""
+    package = Path(__file__).parent.parent
+    by_size = sorted(
+        KERNELS, key=lambda module: -package.joinpath(*module.split(".")).with_suffix(".py").stat().st_size
+    )
+    for module in by_size[::2] + by_size[1::2][::-1]:
+        for name, row in KERNELS[module].items():
+            if every or OF_SOME_JOBS.isdisjoint((module, f"{module}.{name}")):
+                yield getattr(import_module(f"{PACKAGE}{module}"), name), arguments_of(row)
 
 
 def _is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
@@ -75,10 +91,10 @@ def _size(kernel: Any, known: frozenset[Kernel] = frozenset()) -> int:
 
 
 @contextmanager
-def _helper(kernels: int, every: bool) -> "Iterator[subprocess.Popen[bytes] | None]":
+def _helper(every: bool) -> "Iterator[subprocess.Popen[bytes] | None]":
     """A process that compiles from the end of the list, while the block runs; none where it would not help."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if processors < 2 or kernels < 2 or not sys.executable:
+    if processors < 2 or not sys.executable:
         yield None
         return
     nothing = subprocess.DEVNULL
@@ -102,8 +118,9 @@ def _help() -> None:
         os._exit(0)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.disable()  # a sixth of the work, to free memory that this process soon gives back
     threading.Thread(target=end_with_the_other, daemon=True).start()
-    for kernel, arguments in reversed(_rows("every" in sys.argv)):
+    for kernel, arguments in reversed([*_rows("every" in sys.argv)]):
         if not _is_kept(kernel, arguments):
             kernel.compile(arguments)
 

@@ -20,7 +20,6 @@ from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding import PatchForm, PopUp, pop_up
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.loads.bracing import Cables
 from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, LoadedNodes, Settlement, Temperature
@@ -28,6 +27,7 @@ from rodshell.loads.laths import Laths
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
 from rodshell.loads.structure import Structure
 from rodshell.loads.tributary import Tributary, tributary_areas
+from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import Duration
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.imperfection import imperfect

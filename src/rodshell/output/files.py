@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rodshell.errors import InputError
-from rodshell.formfinding.progress import Progress, silent
+from rodshell.progress import Progress, silent
 from rodshell.results.archive import SHELLS, Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
 from rodshell.validation import described

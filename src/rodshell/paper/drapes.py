@@ -10,7 +10,6 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
 from rodshell.formfinding.methods import MethodName
-from rodshell.formfinding.progress import Progress
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets import chebyshev_net
 from rodshell.paper.figure import (
@@ -32,6 +31,7 @@ from rodshell.paper.figure import (
     standing,
 )
 from rodshell.paper.genetic_records import stored_footprint
+from rodshell.progress import Progress
 
 FALL = Fall(height=HEIGHT, drag=3.0)  # shared DOFs: the paper's *mapping*
 METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")

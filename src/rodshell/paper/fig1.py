@@ -12,7 +12,6 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.formfinding import PatchForm, find_stages
-from rodshell.formfinding.progress import Progress
 from rodshell.output.svg import tag
 from rodshell.paper.figure import (
     CASES,
@@ -30,6 +29,7 @@ from rodshell.paper.figure import (
     rows_of_panels,
     standing,
 )
+from rodshell.progress import Progress
 
 EDGE = 0.005  # [m], the paper's
 TITLE = "Fig 1 [HQK]: three shells popped up, their ends moved from G0 to G"

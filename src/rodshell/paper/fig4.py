@@ -21,7 +21,6 @@ from typing import Any, Literal
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.formfinding.progress import Progress
 from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, Pin, SharedDofs
 from rodshell.layout import mesh_grid, straight_rods
@@ -29,6 +28,7 @@ from rodshell.model import Shell
 from rodshell.output.pictures import RIGHT, UP
 from rodshell.output.svg import document, label, number, tag
 from rodshell.paper.figure import INK, PAPER, ROD, SOFT, Figure
+from rodshell.progress import Progress
 from rodshell.results.wording import nice_ticks
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.linear_stability import step_limit

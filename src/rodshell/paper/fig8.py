@@ -16,11 +16,11 @@ from scipy.linalg import solveh_banded
 from threadpoolctl import threadpool_limits
 
 from rodshell.formfinding import Draped, Fall, drape, map_back, trim
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import mesh_grid
 from rodshell.model import Shell
 from rodshell.paper.figure import CASES, INK, LENGTH, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
+from rodshell.progress import Progress, silent
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.newton_matrix import Banded
 from rodshell.solve.problem import NO_CURVATURE

@@ -16,10 +16,10 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
 from rodshell.paper.genetic_records import WINDOW, History, stored
 from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
+from rodshell.progress import Progress, silent
 
 SEED = 1
 SEARCHES = Path("out") / "genetic-searches"

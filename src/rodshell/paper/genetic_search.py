@@ -19,13 +19,13 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.formfinding import PatchForm, agreement, pop_up
 from rodshell.formfinding.popup import PopUp
-from rodshell.formfinding.progress import Progress
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.mesh import CROWDED
 from rodshell.paper.figure import ROD
 from rodshell.paper.genetic_records import GAIN, Evaluate, Generation, Judged, StoredValues, gain
+from rodshell.progress import Progress
 from rodshell.sweeps.asktell import AskTell
 from rodshell.targets import Target
 

@@ -17,11 +17,11 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Draped, Fall, Gravity, drape, trim
-from rodshell.formfinding.progress import Progress
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
 from rodshell.nets import chebyshev_net
 from rodshell.paper.figure import EDGE, HEIGHT, LENGTH, ROD, Chart, Figure, Series, charts_svg
+from rodshell.progress import Progress
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, GivenSection, Rod
 from rodshell.targets import Hemisphere

@@ -16,7 +16,7 @@ from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
 from rodshell.formfinding.popup import Ends
-from rodshell.formfinding.progress import Progress, silent
+from rodshell.progress import Progress, silent
 from rodshell.refining.gates import GATES, SPAN_ERROR, Gates, gates, worst_with_errors
 from rodshell.refining.gauss_newton import Step
 from rodshell.refining.refine import LEAST_EIGENVALUE, Candidate, Refinement, between, loaded_gap, popped_up, refine

@@ -19,10 +19,10 @@ from scipy.sparse.linalg import spsolve
 from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.pipeline import PatchForm, agreement, meshed_again
 from rodshell.formfinding.popup import PopUp, pop_up
-from rodshell.formfinding.progress import Progress, silent
 from rodshell.layout import GridMesh
 from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES, EdgeProperties
 from rodshell.model.rod_sections import RodSections
+from rodshell.progress import Progress, silent
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
 from rodshell.solve.problem import Problem
 from rodshell.solve.sensitivity import Parameters, Sensitivity

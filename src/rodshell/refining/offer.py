@@ -10,7 +10,7 @@ from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import PatchForm
 from rodshell.formfinding.popup import Ends
-from rodshell.formfinding.progress import Progress, silent
+from rodshell.progress import Progress, silent
 from rodshell.refining.gauss_newton import Step
 from rodshell.refining.refine import refine
 from rodshell.refining.stiffness_families import DoubleLaths

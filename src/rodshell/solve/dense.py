@@ -14,6 +14,8 @@ PAD = 8  # numbers in the largest register
 BLOCK = 32  # pivots after which all rows below are updated
 DEPTH = 128  # pivots whose rows are multiplied at a time: so many stay in the nearest cache
 TALL = 48  # rows of a product from which on they are packed first
+# What becomes of what a product is subtracted from; of this type, since Numba compiles a kernel again for plain numbers
+KEPT, OVERWRITTEN = np.int64(1), np.int64(0)
 
 _WIDE = LANES * REGISTERS
 _FACTORS = ROWS * PAD  # where they lie in the workspace, behind the rows they are found from
@@ -74,7 +76,7 @@ def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
             _eliminate_rows(rows, panel, begin, k, count, work)
             k += count
         if end < width:
-            subtract_product(panel, rows, begin, end, end, 1, rows[end:, end:], work)
+            subtract_product(panel[begin:end], rows[begin:end], end, KEPT, rows[end:, end:], work)
     return True
 
 
@@ -129,19 +131,19 @@ def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-unty
 
 
 @njit(error_model="numpy")
-def subtract_product(panel, rows, begin, end, first, keep, target, work):  # type: ignore[no-untyped-def]
-    """target = keep target - panel[begin:end, first:]^T rows[begin:end, first:], except below the diagonal.
+def subtract_product(panel, rows, first, kept, target, work):  # type: ignore[no-untyped-def]
+    """target = kept target - panel[:, first:]^T rows[:, first:], except below the diagonal.
 
     Parameters
     ----------
     panel, rows : (width, stride).
-    keep : 0 or 1.
-    target : (n, m), for as many columns from `first` on.
+    kept : `KEPT` or `OVERWRITTEN`.
+    target : (n, m), part of a matrix, for as many columns from `first` on.
     work : `workspace`.
     """
     n, m = target.shape
-    for start in range(begin, end, DEPTH):
-        depth, a, step, apart = min(DEPTH, end - start), _place(panel, start, first), panel.shape[1], 1
+    for start in range(0, len(panel), DEPTH):
+        depth, a, step, apart = min(DEPTH, len(panel) - start), _place(panel, start, first), panel.shape[1], 1
         if n >= TALL:
             _pack(panel, start, depth, first, n, work)
             a, step, apart = work.ctypes.data + _PACKED * BYTES, ROWS, depth
@@ -150,9 +152,9 @@ def subtract_product(panel, rows, begin, end, first, keep, target, work):  # typ
             for i in range(0, min(n, j + _WIDE), ROWS):
                 _subtract(
                     min(ROWS, n - i), registers, _place(target, i, j), target.strides[0] // BYTES,
-                    a + i * apart * BYTES, step, b, rows.shape[1], depth, keep,
+                    a + i * apart * BYTES, step, b, rows.shape[1], depth, kept,
                 )  # fmt: skip
-        keep = 1
+        kept = KEPT
 
 
 @njit()
@@ -188,22 +190,22 @@ def _subtract(rows, registers, c, stride_c, a, stride_a, b, stride_b, depth, kee
 
 
 @njit()
-def add_rows(target, update, runs, begin, end):  # type: ignore[no-untyped-def]
-    """Add to the rows from `begin` to `end` of a front, whose columns from `begin` on are `target`, what a child's
-    update matrix has for them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to.
+def add_rows(target, update, runs, end):  # type: ignore[no-untyped-def]
+    """Add to the rows of a front up to `end`, the last of which are `target`, what a child's update matrix has for
+    them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to.
 
     Parameters
     ----------
-    target : the rows of the front from `begin` to `end`, its columns from `begin` on.
+    target : the rows of the front from some row `begin` to `end`, its columns from `begin` on.
     update : the child's update matrix, of which the upper triangle is read.
     runs : (k, 2) rows of the update matrix that stay contiguous: the first, and its row in the front.
-    begin, end : first row of the front that is added to, and the row after the last.
+    end : the row of the front after the last that is added to.
     """
-    count = len(runs)
+    count, begin = len(runs), end - len(target)
     for low in range(count):
         past = runs[low + 1, 0] if low + 1 < count else len(update)
         shift = runs[low, 1] - runs[low, 0] - begin
-        for i in range(max(runs[low, 0], -shift), min(past, end - begin - shift)):
+        for i in range(max(runs[low, 0], -shift), min(past, len(target) - shift)):
             _add(_place(target, i + shift, i + shift), _place(update, i, i), past - i)
             for high in range(low + 1, count):
                 first, stop = runs[high, 0], runs[high + 1, 0] if high + 1 < count else len(update)
@@ -247,7 +249,7 @@ def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
     ----------
     panel : (width, stride) L^T, its padding 0.
     pivots : (width,) D.
-    values : (stride,) y, overwritten with x; behind the pivots, the x that is already known.
+    values : (stride,) y, overwritten with x; behind the pivots, the x that is already known; in the padding 0.
     aside : (2 width,) scratch.
     """
     width, stride = panel.shape

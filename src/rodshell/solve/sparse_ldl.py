@@ -20,7 +20,17 @@ from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
-from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
+from rodshell.solve.dense import (
+    OVERWRITTEN,
+    add_rows,
+    backward,
+    eliminate,
+    forward,
+    padded,
+    room,
+    subtract_product,
+    workspace,
+)
 from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
 from rodshell.threads import in_threads, threads
 
@@ -300,15 +310,15 @@ def _numeric(  # type: ignore[no-untyped-def]
             unscaled[entry_place[e]] += data[entry_source[e]]
         for e in range(child_start[s], child_start[s + 1]):
             child = _update(children[e], first, row_start, update_start, stacks)
-            add_rows(rows, child, runs[run_start[e] : run_start[e + 1]], 0, width)
+            add_rows(rows, child, runs[run_start[e] : run_start[e + 1]], width)
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, stride)
         if not eliminate(rows, panel, pivots[first[s] : first[s + 1]], work):
             return False
         update = _update(s, first, row_start, update_start, stacks)
-        subtract_product(panel, rows, 0, width, width, 0, update, work)
+        subtract_product(panel, rows, width, OVERWRITTEN, update[:, :], work)  # of the type that `eliminate` gives
         for e in range(child_start[s], child_start[s + 1]):
             child = _update(children[e], first, row_start, update_start, stacks)
-            add_rows(update, child, runs[run_start[e] : run_start[e + 1]], width, size)
+            add_rows(update, child, runs[run_start[e] : run_start[e + 1]], size)
     return True
 
 

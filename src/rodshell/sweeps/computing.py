@@ -9,8 +9,8 @@ from time import monotonic
 from typing import Any
 
 from rodshell.errors import OutputError, RodshellError
-from rodshell.formfinding.progress import Progress
 from rodshell.job import Job
+from rodshell.progress import Progress
 from rodshell.sweeps.engines import Engine, opened_engine
 from rodshell.sweeps.identity import job_identity, program_version
 from rodshell.sweeps.plan import Plan

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.errors import InputError
-from rodshell.formfinding.progress import Progress, silent
+from rodshell.progress import Progress, silent
 from rodshell.sweeps.asktell import AskTell
 from rodshell.sweeps.axes import drawn_shares
 from rodshell.sweeps.columns import CONVERGED, JOB, STANDARD, read_column
