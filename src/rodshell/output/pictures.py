@@ -437,12 +437,15 @@ def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
     corner = np.array([low[0], high[1]])
     image = Image.new("RGB", (width, round(scale * float(high[1] - low[1]))), "white")
     canvas = Draw(image)
+    last, stroke = None, None
     for path, points in zip(drawing.paths, _lines(drawing.paths, corner, scale), strict=True):
         pen = drawing.pen(path)
         if path.closed and pen.fill:
             canvas.polygon(points, None, Brush(pen.fill))
         if pen.width:
-            canvas.line(points + points[:2] if path.closed else points, Stroke(pen.colour, scale * pen.width))
+            if pen is not last:
+                last, stroke = pen, Stroke(pen.colour, scale * pen.width)
+            canvas.line(points + points[:2] if path.closed else points, stroke)
     canvas.flush()
     letters = ImageDraw.Draw(image)
     for text in drawing.texts:

@@ -9,11 +9,12 @@ import csv
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from math import pi
+from math import isnan, pi
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.geometry.frames import unit
 from rodshell.output.grid import GridRod, joints_of, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
@@ -33,6 +34,7 @@ UNITS = {
     "N": "N",
     "Nm": "N m",
 }
+UNKNOWN = np.full(3, np.nan)  # tangent
 Show = Callable[[float | None], str]
 
 
@@ -153,14 +155,17 @@ def _all_of_joints(archive: Archive) -> Table:
     """All columns. Each entry of `columns` is a name and what it says of a joint: more may be added there."""
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
     placed = [_joints_in_space(archive, rod, final) for rod in rods]
+    joints, along = joints_of(rods), np.array([rod.flat[1] - rod.flat[0] for rod in rods]).reshape(-1, 2)
+    in_space = [(placed[i].get(rods[j].id), placed[j].get(rods[i].id)) for i, j in (joint.rods for joint in joints)]
+    first, second = np.array([joint.rods for joint in joints], dtype=np.intp).reshape(-1, 2).T
+    flats = _degrees(along[first], along[second])
+    tangents = np.array([[UNKNOWN if on is None else on[1] for on in pair] for pair in in_space]).reshape(-1, 2, 3)
+    angles = _degrees(tangents[:, 0], tangents[:, 1])
     loads = _joint_loads(archive, final)
     rows, columns = list[list[str]](), dict[str, str]()
-    for joint in joints_of(rods):
-        (i, j), (a, b) = joint.rods, (rods[k] for k in joint.rods)
-        on_a, on_b = placed[i].get(b.id), placed[j].get(a.id)
+    for joint, (on_a, _), flat, angle in zip(joints, in_space, flats.tolist(), angles.tolist(), strict=True):
+        a, b = (rods[k] for k in joint.rods)
         x, y = a.point(joint.at[0])
-        flat = _degrees(a.flat[1] - a.flat[0], b.flat[1] - b.flat[0])
-        angle = _degrees(on_a[1], on_b[1]) if on_a and on_b else None
         space = map(mm, on_a[0]) if on_a else ("", "", "")
         columns = {
             "id": joint.id,
@@ -174,8 +179,8 @@ def _all_of_joints(archive: Archive) -> Table:
             "final_state": (final or "") if on_a else "",
             **dict(zip(("final_x_mm", "final_y_mm", "final_z_mm"), space, strict=True)),
             "flat_deg": f"{flat:.2f}",
-            "final_deg": "" if angle is None else f"{angle:.2f}",
-            "scissor_deg": "" if angle is None else f"{round(angle - flat, 2) + 0.0:.2f}",
+            "final_deg": "" if isnan(angle) else f"{angle:.2f}",
+            "scissor_deg": "" if isnan(angle) else f"{round(angle - flat, 2) + 0.0:.2f}",
             **loads.get((a.id, b.id), dict.fromkeys(_LOADS, "") if loads else {}),
         }  # fmt: skip
         rows.append(list(columns.values()))
@@ -375,10 +380,11 @@ def _joints_in_space(archive: Archive, rod: GridRod, state: str | None) -> dict[
     return {other: (position[k], after[k] - before[k]) for k, (other, _) in enumerate(rod.joints)}
 
 
-def _degrees(a: Floats, b: Floats) -> float:
-    """Angle between two vectors, exact also near 0 and 180 [degrees]."""
-    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
-    return float(np.degrees(2.0 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b))))
+def _degrees(a: Floats, b: Floats) -> Floats:
+    """(n,) angles between vectors (n, d), exact also near 0 and 180 [degrees]."""
+    a, b = unit(a), unit(b)
+    apart, together = np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)
+    return np.asarray(np.degrees(2.0 * np.arctan2(apart, together)))
 
 
 def _mpa(value: float | None) -> str:

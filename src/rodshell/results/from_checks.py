@@ -299,17 +299,25 @@ def _reactions(held: SupportReactions) -> Reactions:
 def _joint_loads(mesh: GridMesh, loads: JointLoads) -> tuple[JointLoad, ...]:
     """Of each joint, on its second rod."""
     names = [rod.name for rod in mesh.grid.rods]
-    forces, scissor = loads.forces[:, 1].tolist(), np.degrees(loads.scissor).tolist()
+    rows = zip(
+        mesh.grid.crossings.rods.tolist(),
+        loads.forces[:, 1].tolist(),
+        loads.normal_forces.tolist(),
+        loads.shear_moments.tolist(),
+        loads.out_of_plane_moments.tolist(),
+        np.degrees(loads.scissor).tolist(),
+        strict=True,
+    )
     return tuple(
         JointLoad(
             rods=(names[a], names[b]),
-            force=forces[k],
-            normal_force=float(loads.normal_forces[k]),
-            shear_moment=float(loads.shear_moments[k]),
-            out_of_plane_moment=float(loads.out_of_plane_moments[k]),
-            scissor_deg=scissor[k],
+            force=force,
+            normal_force=normal,
+            shear_moment=shear,
+            out_of_plane_moment=out_of_plane,
+            scissor_deg=scissor,
         )
-        for k, (a, b) in enumerate(mesh.grid.crossings.rods.tolist())
+        for (a, b), force, normal, shear, out_of_plane, scissor in rows
     )
 
 

@@ -29,7 +29,7 @@ from rodshell.solve.tangent import Tangent, by_projections, subspace_iteration
 MODES = 4  # lowest ones that are looked at
 MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative change of the lowest eigenvalue: modes only say how far to go
 RAMPS = 1, 4, 16  # equal parts of a displacement, until one of them succeeds
-SMALL = 24  # unknowns up to which LAPACK finds a mode
+LOSING_CLOSE = 1e-5  # relative change of the eigenvalue of the mode that gives way
 MOST_STEPS = 12  # of Newton's method for a point
 STRAYED = 0.3  # of a step: a point so far off its prediction may be on another path. Half of it is aimed at
 NEGLIGIBLE = 1e-6  # of the length: a path no farther off than this is the same
@@ -300,14 +300,16 @@ class ArcLength:
         def inverse(row: Floats) -> Floats:
             return tangent.factors.solve(row / scale) / scale
 
-        if size <= SMALL:
-            row = np.linalg.eigh(np.array([inverse(unit) for unit in np.eye(size)]))[1][:, 0]
-        else:
-            from scipy.sparse.linalg import LinearOperator, eigsh  # here, as forms without checks do not need it
+        start = self._generic(size, MODES) if point.modes is None else point.modes / scale
+        values, (row, *_), settled = subspace_iteration(
+            lambda row: -inverse(row), start, settled=1, tolerance=LOSING_CLOSE, most_sweeps=MOST_SWEEPS,
+            orthonormalise=by_projections,
+        )  # fmt: skip
+        if not settled or values[0] <= 0:  # not among the softest: the stiffness has jumped
+            from scipy.sparse.linalg import LinearOperator, eigsh  # here, as this is rare
 
-            start = np.sin(1.0 + np.arange(size) ** 2)
             operator = LinearOperator((size, size), matvec=inverse, dtype=float)
-            row = eigsh(operator, k=1, which="SA", v0=start, tol=MODES_CLOSE)[1][:, 0]
+            row = eigsh(operator, k=1, which="SA", v0=start[0], tol=MODES_CLOSE)[1][:, 0]
         mode = tangent.freedom.expand(row * scale)
         return np.asarray(mode / self.reach(mode))
 
@@ -374,13 +376,17 @@ class ArcLength:
         start : (k, dofs) modes of a state nearby, or None.
         """
         scale, size = self._scale, tangent.freedom.size
-        if start is None:  # no symmetry of the shell is one of this start
-            start = np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(MODES, size))[:, None]) * scale
         inverse, rows, _ = subspace_iteration(
             lambda row: tangent.factors.solve(row / scale) / scale,
-            start / scale, settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS, orthonormalise=by_projections,
+            self._generic(size, MODES) if start is None else start / scale,
+            settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS, orthonormalise=by_projections,
         )  # fmt: skip
         return 1.0 / inverse, by_projections(rows) * scale
+
+    @staticmethod
+    def _generic(size: int, count: int) -> Floats:
+        """(count, size) rows, or fewer, to begin an iteration with: no symmetry of the shell is one of them."""
+        return np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None])
 
 
 def _between(modes: Floats, upper: csc_matrix) -> Floats:

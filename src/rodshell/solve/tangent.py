@@ -110,7 +110,7 @@ class Tangent:
         ----------
         mass : (N, 3) lumped mass of each component [kg, of a twist angle kg m2], some of which may be 0; None: the
             modes of K itself.
-        tolerance : relative change of the eigenvalues in the last sweep.
+        tolerance : relative error of the eigenvalues, as their residuals estimate it.
         most_sweeps : the iteration ends after so many in any case: a few give directions that are good enough to
             search in.
         guards : further vectors that are iterated: the more, the faster the modes asked for converge.
@@ -300,7 +300,8 @@ def subspace_iteration(
     apply : the operator, on vectors (n,).
     start : (m, n) vectors to begin with.
     settled : so many of the largest eigenvalues must have settled.
-    tolerance : relative change of these in the last sweep.
+    tolerance : of the square of these ones' residuals over the eigenvalue, which is about the relative error of the
+        eigenvalue [Parlett 1998, section 11.7].
     most_sweeps : it ends after so many in any case.
     orthonormalise : of the rows of a matrix: `by_reflections` or, of few vectors, `by_projections`.
 
@@ -308,17 +309,17 @@ def subspace_iteration(
     -------
     Values (m,) descending, directions (m, n), orthogonal but not of unit length, and whether the values settled.
     """
-    rows, before, done = start, np.full(len(start), np.inf), False
-    values = before
+    rows, done = start, False
     for _ in range(most_sweeps):
         rows = orthonormalise(rows)
         images = np.array([apply(row) for row in rows])
         values, turn = np.linalg.eigh(np.einsum("ik,jk->ij", rows, images))
-        values, rows = values[::-1], np.einsum("ji,jk->ik", turn[:, ::-1], images)
-        done = bool((np.abs(before - values)[:settled] <= tolerance * values[:settled]).all())
+        values, turn = values[::-1], turn[:, ::-1]
+        before, rows = np.einsum("ji,jk->ik", turn, rows), np.einsum("ji,jk->ik", turn, images)
+        left = rows - values[:, None] * before
+        done = bool((np.einsum("ik,ik->i", left, left) <= tolerance * values**2)[:settled].all())
         if done:
             break
-        before = values
     return values, rows, done
 
 

@@ -241,14 +241,13 @@ def _offset(rod: GridRod) -> float:
 def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
     """The rods u and v of each joint of two families, grid by grid."""
     pairs = [joint.rods for joint in plan.joints if [plan.rods[k].family for k in joint.rods] == ["u", "v"]]
-    if not pairs:
-        return []
-    from scipy.sparse import coo_array  # here, as forms without drawings do not need it
-    from scipy.sparse.csgraph import connected_components
-
-    first, second = np.array(pairs).T
-    graph = coo_array((np.ones(len(pairs)), (first, second)), shape=(len(plan.rods),) * 2)
-    patch = connected_components(graph, directed=False)[1][first]
+    first, second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+    patch, before = np.arange(len(plan.rods)), None
+    while not np.array_equal(patch, before):  # each rod is of the patch of the first one that it leads to
+        before, low = patch.copy(), np.minimum(patch[first], patch[second])
+        np.minimum.at(patch, first, low)
+        np.minimum.at(patch, second, low)
+    patch = patch[first]
     return [[pair for pair, k in zip(pairs, patch, strict=True) if k == name] for name in dict.fromkeys(patch)]
 
 
