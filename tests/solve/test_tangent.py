@@ -15,7 +15,14 @@ from rodshell.rods.isotropic import IsotropicBend
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, TangentAssembly
+from rodshell.solve.tangent import (
+    Tangent,
+    TangentAssembly,
+    by_projections,
+    by_reflections,
+    negative_mode,
+    subspace_iteration,
+)
 from tests.formfinding.elastic_twins import ElasticTwin
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
@@ -226,3 +233,43 @@ def test_a_bound_shells_tangent_counts_the_surfaces_curvature() -> None:
     state = np.array([[0.0, 0.0, 1.0]])
     tangent = TangentAssembly(problem, state).tangent((), state, np.empty(0))
     np.testing.assert_allclose(dense(tangent), 3.0 * np.eye(2), atol=1e-15)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-6])
+def test_subspace_iteration_ends_where_its_eigenvalues_are_as_accurate_as_asked(tolerance: float) -> None:
+    """And not long after: a hundred times more accurate ones cost another sweep or more."""
+    random = np.random.default_rng(3)
+    values, directions = 1.5 ** -np.arange(60.0), np.linalg.qr(random.standard_normal((60, 60)))[0]
+    applied = list[int]()
+
+    def apply(vector: np.ndarray) -> np.ndarray:
+        applied.append(1)
+        return np.asarray(directions @ (values * (directions.T @ vector)))
+
+    for orthonormalise in (by_projections, by_reflections):
+        applied.clear()
+        found, rows, settled = subspace_iteration(
+            apply, random.standard_normal((6, 60)),
+            settled=3, tolerance=tolerance, most_sweeps=50, orthonormalise=orthonormalise,
+        )  # fmt: skip
+        assert settled
+        errors = 1 - found[:3] / values[:3]
+        assert (errors > -1e-12).all()
+        assert tolerance / 1e4 < errors.max() < 2 * tolerance
+        assert len(applied) <= 6 * 12
+        across = rows[:3] @ directions[:, 6:]
+        assert np.linalg.norm(across, axis=1).max() < np.sqrt(tolerance) * np.linalg.norm(rows[:3], axis=1).min()
+
+
+@pytest.mark.parametrize("lowest", [1e-3, 0.5, 3.0, 40.0])
+def test_the_negative_mode_nearest_to_zero_is_found_wherever_it_lies(lowest: float) -> None:
+    """Among the softest modes or between stiff ones; another negative one, farther from zero, is not it."""
+    random = np.random.default_rng(5)
+    values = np.concatenate([[-lowest, -70.0], np.linspace(0.1, 90.0, 98)])
+    directions = np.linalg.qr(random.standard_normal((100, 100)))[0]
+
+    def inverse(vector: np.ndarray) -> np.ndarray:
+        return np.asarray(directions @ ((directions.T @ vector) / values))
+
+    found = negative_mode(inverse, random.standard_normal((4, 100)), tolerance=1e-5)
+    assert abs(found @ directions[:, 0]) > 0.999 * np.linalg.norm(found)

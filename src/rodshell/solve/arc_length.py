@@ -24,12 +24,12 @@ from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
 from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, by_projections, subspace_iteration
+from rodshell.solve.tangent import Tangent, by_projections, negative_mode, subspace_iteration
 
 MODES = 4  # lowest ones that are looked at
-MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative change of the lowest eigenvalue: modes only say how far to go
+MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative error of the lowest eigenvalue: modes only say how far to go
 RAMPS = 1, 4, 16  # equal parts of a displacement, until one of them succeeds
-LOSING_CLOSE = 1e-5  # relative change of the eigenvalue of the mode that gives way
+LOSING_CLOSE = 1e-5  # relative error of the eigenvalue of the mode that gives way
 MOST_STEPS = 12  # of Newton's method for a point
 STRAYED = 0.3  # of a step: a point so far off its prediction may be on another path. Half of it is aimed at
 NEGLIGIBLE = 1e-6  # of the length: a path no farther off than this is the same
@@ -301,16 +301,7 @@ class ArcLength:
             return tangent.factors.solve(row / scale) / scale
 
         start = self._generic(size, MODES) if point.modes is None else point.modes / scale
-        values, (row, *_), settled = subspace_iteration(
-            lambda row: -inverse(row), start, settled=1, tolerance=LOSING_CLOSE, most_sweeps=MOST_SWEEPS,
-            orthonormalise=by_projections,
-        )  # fmt: skip
-        if not settled or values[0] <= 0:  # not among the softest: the stiffness has jumped
-            from scipy.sparse.linalg import LinearOperator, eigsh  # here, as this is rare
-
-            operator = LinearOperator((size, size), matvec=inverse, dtype=float)
-            row = eigsh(operator, k=1, which="SA", v0=start[0], tol=MODES_CLOSE)[1][:, 0]
-        mode = tangent.freedom.expand(row * scale)
+        mode = tangent.freedom.expand(negative_mode(inverse, start, tolerance=LOSING_CLOSE) * scale)
         return np.asarray(mode / self.reach(mode))
 
     def alignment(self, a: Floats, b: Floats) -> float:
@@ -386,7 +377,7 @@ class ArcLength:
     @staticmethod
     def _generic(size: int, count: int) -> Floats:
         """(count, size) rows, or fewer, to begin an iteration with: no symmetry of the shell is one of them."""
-        return np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None])
+        return np.asarray(np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None]))
 
 
 def _between(modes: Floats, upper: csc_matrix) -> Floats:

@@ -19,7 +19,7 @@ from rodshell.solve.problem import Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
 GUARDS = 4  # vectors of the subspace iteration beyond the modes that are asked for
-MOST_SWEEPS = 200
+MOST_SWEEPS, FEW_SWEEPS = 200, 12
 FIRST_SHIFT = 1e-9  # of the mean diagonal: the first shift of a stiffness that is not positive definite
 SHIFT_GROWTH, MOST_SHIFTS = 8.0, 40
 BELOW = 1.5  # times the lowest eigenvalue: the shift that serves in the end
@@ -321,6 +321,28 @@ def subspace_iteration(
         if done:
             break
     return values, rows, done
+
+
+def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, tolerance: float) -> Floats:
+    """(n,) direction of the negative eigenvalue of a symmetric matrix that is nearest to zero.
+
+    Parameters
+    ----------
+    inverse : of the matrix, on vectors (n,).
+    start : (m, n) directions near which it is looked for: it is found at once if it is one of the m softest.
+    tolerance : as of `subspace_iteration`.
+    """
+    values, (row, *_), settled = subspace_iteration(
+        lambda row: -inverse(row), start,
+        settled=1, tolerance=tolerance, most_sweeps=FEW_SWEEPS, orthonormalise=by_projections,
+    )  # fmt: skip
+    if settled and values[0] > 0:
+        return np.asarray(row)
+    from scipy.sparse.linalg import LinearOperator, eigsh  # here, as it is rare: a stiffness that has jumped
+
+    size = start.shape[1]
+    operator = LinearOperator((size, size), matvec=inverse, dtype=float)
+    return np.asarray(eigsh(operator, k=1, which="SA", v0=start[0], tol=tolerance)[1][:, 0])
 
 
 def by_reflections(rows: Floats) -> Floats:

@@ -242,9 +242,9 @@ def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
     """The rods u and v of each joint of two families, grid by grid."""
     pairs = [joint.rods for joint in plan.joints if [plan.rods[k].family for k in joint.rods] == ["u", "v"]]
     first, second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-    patch, before = np.arange(len(plan.rods)), None
-    while not np.array_equal(patch, before):  # each rod is of the patch of the first one that it leads to
-        before, low = patch.copy(), np.minimum(patch[first], patch[second])
+    patch = np.arange(len(plan.rods))  # each rod is of the patch of the first one that it leads to
+    while (patch[first] != patch[second]).any():
+        low = np.minimum(patch[first], patch[second])
         np.minimum.at(patch, first, low)
         np.minimum.at(patch, second, low)
     patch = patch[first]
