@@ -4,6 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 import rodshell as rs
 from rodshell.loads.check import tributary_of
@@ -72,3 +73,18 @@ def test_the_middle_of_a_regular_grid_takes_one_cell_shared_among_its_edges() ->
     points = plane.lift(np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2))
     found = tributary_areas(plane, points, anchor=(0.0, 0.0), rotate=0.0, spacing=1.0)
     np.testing.assert_allclose(found.plan, 1.0, rtol=1e-6)
+
+
+def test_areas_of_a_surface_in_triangles_of_many_sizes_are_those_of_its_formula() -> None:
+    """A paraboloid given by a mesh, finer on one side: whole, and what each of some nodes takes."""
+    target = rs.Paraboloid(8.0, 4.0)
+    radii, turns = 8.0 * np.linspace(0, 1, 25) ** 0.7, 2 * pi * np.linspace(0, 1, 49)[:-1] ** 1.2
+    xy = np.vstack([[0, 0], *(r * np.column_stack([np.cos(turns), np.sin(turns)]) for r in radii[1:])])
+    mesh = rs.Freeform.of(target.lift(xy), Delaunay(xy).simplices)
+    points = target.lift(np.random.default_rng(2).uniform(-4, 4, (12, 2)))
+    plain, given = (
+        tributary_areas(surface, points, anchor=(0.0, 0.0), rotate=0.0, spacing=1.0) for surface in (target, mesh)
+    )
+    assert given.area.sum() == pytest.approx(plain.area.sum(), rel=4e-3)  # the mesh ends in chords
+    np.testing.assert_allclose(given.area, plain.area, rtol=1e-2)
+    np.testing.assert_allclose(given.plan_positions, plain.plan_positions, atol=0.03)

@@ -132,8 +132,7 @@ def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
     target : the surface.
     step : longest side [m].
     """
-    faces = target.surface.faces
-    points, faces = _halved(target, target.surface.vertices, faces, longest=step)
+    points, faces = _divided(target, target.surface.vertices, target.surface.faces, longest=step)
     inside = target.margin(points) >= -ON_THE_EDGE * target.size
     single, double, sides = _across(inside, faces)
     low, high = points[sides[:, 0]], points[sides[:, 1]]
@@ -193,8 +192,39 @@ def _stitched(
     faces = np.concatenate(
         [whole, np.column_stack([single[:, 0], a, b]), *(np.column_stack([p, q, middle]) for p, q in around)]
     )
-    used, again = np.unique(faces, return_inverse=True)
-    return points[used], again.reshape(-1, 3)
+    used = np.zeros(len(points), dtype=bool)
+    used[faces] = True
+    return points[used], (np.cumsum(used) - 1)[faces]
+
+
+def _divided(target: Target, points: Floats, faces: Ints, *, longest: float) -> tuple[Floats, Ints]:
+    """The triangles, the sides of each divided into as many parts as leave none longer than `longest` [m], and lifted
+    onto the surface; each with corners of its own."""
+    corners = points[faces]
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
+    parts = np.maximum(np.ceil(sides / longest), 1).astype(np.intp)
+    placed, divided, count = list[Floats](), list[Ints](), 0
+    for n in np.unique(parts).tolist():
+        shares, small = _lattice(n)
+        inside = np.einsum("pk,mkd->mpd", shares, corners[parts == n])
+        begin = count + len(shares) * np.arange(len(inside))
+        placed.append(inside.reshape(-1, 3))
+        divided.append((begin[:, None, None] + small).reshape(-1, 3))
+        count += len(placed[-1])
+    return target.retract(np.concatenate(placed)), np.concatenate(divided)
+
+
+def _lattice(parts: int) -> tuple[Floats, Ints]:
+    """A triangle with sides in `parts`: barycentric coordinates (p, 3) of the points, and triangles (f, 3) of them."""
+    row, column = (side.ravel() for side in np.indices((parts + 1, parts + 1)))
+    kept = row + column <= parts
+    index = np.full((parts + 1, parts + 1), -1)
+    index[row[kept], column[kept]] = np.arange(kept.sum())
+    shares = np.column_stack([parts - row - column, row, column])[kept] / parts
+    upright = np.column_stack([index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[:-1, 1:].ravel()])
+    turned = np.column_stack([index[1:, 1:].ravel(), index[:-1, 1:].ravel(), index[1:, :-1].ravel()])
+    triangles = np.concatenate([upright, turned])
+    return shares, triangles[(triangles >= 0).all(axis=1)]
 
 
 def _halved(target: Target, points: Floats, faces: Ints, *, longest: float) -> tuple[Floats, Ints]:

@@ -24,6 +24,7 @@ OFF = 0.005  # of the size: where a vertex is further off its smooth field, the 
 ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
+AT_ONCE = 500_000  # pairs of a point and a facet that are looked at together
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -211,27 +212,38 @@ class Freeform(Target):
 
     def height_at(self, xy: Floats) -> Floats:
         """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
-        return np.array([self._height(*point) for point in np.asarray(xy, dtype=float).tolist()])
-
-    def _height(self, x: float, y: float) -> float:
-        a, b, c = (self.surface.vertices[k] - [x, y, 0.0] for k in self.surface.faces.T)
-        wedge = np.stack([p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((b, c), (c, a), (a, b))])
-        total = wedge.sum(axis=0)
-        hit = (np.abs(total) > 0) & (np.all(wedge >= 0, axis=0) | np.all(wedge <= 0, axis=0))
-        if hit.any():
-            z = float(((wedge * np.stack([a[:, 2], b[:, 2], c[:, 2]]))[:, hit].sum(axis=0) / total[hit]).max())
-        else:
-            z = self._height_of_filling(x, y)
-        point = np.array([[x, y, z]])
-        for _ in range(20):  # from the facet to the smooth surface, straight up or down
-            value, gradient, _ = self.implicit(point)
-            step = -value[0] / gradient[0, 2]
-            if not abs(step) < 0.1 * self._extent:
-                return np.nan
-            point[0, 2] += step
-            if abs(step) <= 1e-14 * self._extent:
+        xy = np.asarray(xy, dtype=float).reshape(-1, 2)
+        z = self._heights_of_facets(xy)
+        for k in np.flatnonzero(np.isnan(z)):
+            z[k] = self._height_of_filling(*xy[k].tolist())
+        left = np.flatnonzero(np.isfinite(z))
+        for _ in range(20):  # from the facets to the smooth surface, straight up or down
+            value, gradient = self.level(np.column_stack([xy[left], z[left]]))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = -value / gradient[:, 2]
+            near = np.abs(step) < 0.1 * self._extent
+            z[left] = np.where(near, z[left] + step, np.nan)
+            left = left[near & (np.abs(step) > 1e-14 * self._extent)]
+            if not len(left):
                 break
-        return float(point[0, 2])
+        return z
+
+    def _heights_of_facets(self, xy: Floats) -> Floats:
+        """z (n,) of the uppermost facet over points of the plan, or NaN."""
+        a, b, c = (self.surface.vertices[k] for k in self.surface.faces.T)
+        z, at_once = np.full(len(xy), np.nan), max(1, AT_ONCE // len(a))
+        for begin in range(0, len(xy), at_once):
+            x, y = (side[:, None] for side in xy[begin : begin + at_once].T)
+            wedge = np.stack(
+                [(p[:, 0] - x) * (q[:, 1] - y) - (p[:, 1] - y) * (q[:, 0] - x) for p, q in ((b, c), (c, a), (a, b))]
+            )
+            point, facet = np.nonzero((wedge >= 0).all(axis=0) | (wedge <= 0).all(axis=0))
+            weight = wedge[:, point, facet]
+            total = weight.sum(axis=0)
+            point, facet, weight, total = (part[..., total != 0] for part in (point, facet, weight, total))
+            height = (weight * [a[facet, 2], b[facet, 2], c[facet, 2]]).sum(axis=0) / total
+            np.fmax.at(z, begin + point, height)
+        return z
 
     def _height_of_filling(self, x: float, y: float) -> float:
         """z of the uppermost cubic that fills an opening over a point of the plan, or NaN."""
@@ -252,7 +264,7 @@ class Freeform(Target):
         high = (margin > 2 * self.field.spacing) & (x[:, 2] >= inner[:, 2].max() - TIE * self._extent)
         if high.any():
             return self._climbed(x[high][np.argmin(np.linalg.norm(x[high, :2] - middle[:2], axis=1))])
-        if np.isfinite(self._height(*middle[:2].tolist())):
+        if np.isfinite(self.height_at(middle[None, :2])[0]):
             return float(middle[0]), float(middle[1])
         x, y, _ = x[np.argmax(margin)].tolist()
         return x, y
