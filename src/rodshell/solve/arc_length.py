@@ -24,7 +24,7 @@ from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
 from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, by_projections, negative_mode, subspace_iteration
+from rodshell.solve.tangent import Tangent, negative_mode, orthonormal, subspace_iteration
 
 MODES = 4  # lowest ones that are looked at
 MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative error of the lowest eigenvalue: modes only say how far to go
@@ -308,7 +308,8 @@ class ArcLength:
         """Cosine of the angle between motions (n, 3), in the metric of the modes."""
         free = self._unloaded.problem.constraint.freedom(self._unloaded.state)
         x, y = (free.reduce(motion) / self._scale for motion in (a, b))
-        return abs(float(x @ y)) / sqrt(max(float(x @ x) * float(y @ y), TINY))
+        (xx, xy), (_, yy) = _products([x, y], np.array([x, y])).tolist()
+        return float(abs(xy) / sqrt(max(xx * yy, TINY)))
 
     def reach(self, motion: Floats) -> float:
         """Largest displacement of a node, or of a twist times an edge [m]; motion (n, 3) [m, rad]."""
@@ -370,9 +371,11 @@ class ArcLength:
         inverse, rows, _ = subspace_iteration(
             lambda row: tangent.factors.solve(row / scale) / scale,
             self._generic(size, MODES) if start is None else start / scale,
-            settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS, orthonormalise=by_projections,
-        )  # fmt: skip
-        return 1.0 / inverse, by_projections(rows) * scale
+            settled=1,
+            tolerance=MODES_CLOSE,
+            most_sweeps=MOST_SWEEPS,
+        )
+        return 1.0 / inverse, orthonormal(rows) * scale
 
     @staticmethod
     def _generic(size: int, count: int) -> Floats:

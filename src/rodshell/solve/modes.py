@@ -27,7 +27,7 @@ from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.problem import Pattern
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, TangentAssembly
+from rodshell.solve.tangent import Tangent, TangentAssembly, orthonormal, subspace_iteration
 
 DENSE = 24  # unknowns up to which LAPACK solves the whole problem
 SPARE = 2  # modes that are computed beyond those asked for, so that the count has a gap to stand in
@@ -152,14 +152,11 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
         shifted = values.copy()
         shifted[assembly.pattern.assembly.diagonal] += ROUND_OFF * scale**2
         factors = assembly.pattern.solver.factor(shifted)
-    row = np.sin(1.0 + np.arange(len(scale)) ** 2)
-    row /= np.linalg.norm(row)
-    stiffness = 1.0
-    for _ in range(SOFTEST):
-        after = scale * factors.solve(scale * row)
-        stiffness = 1.0 / float(row @ after)
-        row = after / np.linalg.norm(after)
-    return stiffness, freedom.expand(row)
+    start = np.sin(1.0 + np.arange(len(scale)) ** 2)[None]
+    values, rows, _ = subspace_iteration(
+        lambda row: scale * factors.solve(scale * row), start, settled=1, tolerance=0.0, most_sweeps=SOFTEST
+    )
+    return 1.0 / float(values[0]), freedom.expand(orthonormal(rows)[0])
 
 
 def _diagonal(pattern: Pattern, values: Floats) -> Floats:

@@ -17,6 +17,7 @@ from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all
 from rodshell.solve.problem import NO_CURVATURE, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
+from rodshell.solve.tangent import subspace_iteration
 
 TOLERANCE = 1e-13  # of the length: estimate of the error that is left
 FORCE_TOLERANCE = 1e-10  # of the largest axial force: the same for the forces
@@ -303,13 +304,9 @@ class NewtonStep:
 
     def _inverse_iteration(self, steps: int) -> tuple[Floats, float]:
         """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue."""
-        v = np.sin(1.0 + np.arange(self._free.size) ** 2)  # no symmetry of the shell is one of this start
-        for _ in range(steps):
-            v /= np.linalg.norm(v)
-            image = self._solve(v)
-            smallest = 1.0 / float(v @ image)
-            v = image
-        return v, smallest
+        start = np.sin(1.0 + np.arange(self._free.size) ** 2)[None]  # no symmetry of the shell is one of this start
+        values, (row, *_), _ = subspace_iteration(self._solve, start, settled=1, tolerance=0.0, most_sweeps=steps)
+        return row, 1.0 / float(values[0])
 
 
 @njit()

@@ -131,7 +131,7 @@ class Tangent:
 
         start = np.random.default_rng(0).standard_normal((size, min(count + guards, int(np.count_nonzero(root))))).T
         values, rows, settled = subspace_iteration(
-            inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps, orthonormalise=by_reflections
+            inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps
         )
         shapes = np.array([factors.solve(root * row) for row in rows[:count]]).reshape(count, size)
         shapes /= np.sqrt(np.einsum("ki,i,ki->k", shapes, weight, shapes))[:, None]
@@ -174,7 +174,6 @@ class Tangent:
             settled=1,
             tolerance=1e-2,
             most_sweeps=MOST_SWEEPS,
-            orthonormalise=by_projections,
         )
         near = BELOW * (shift - 1.0 / float(value[0]))
         if near < shift and not (closer := self._shifted(near, weight)).negative:
@@ -290,7 +289,6 @@ def subspace_iteration(
     settled: int,
     tolerance: float,
     most_sweeps: int,
-    orthonormalise: Callable[[Floats], Floats],
 ) -> tuple[Floats, Floats, bool]:
     """The largest eigenvalues of a symmetric positive operator, and their directions, by subspace iteration with
     Rayleigh and Ritz's values, which are a little too small, never too large [Golub and Van Loan 2013, 8.2.4].
@@ -303,7 +301,6 @@ def subspace_iteration(
     tolerance : of the square of these ones' residuals over the eigenvalue, which is about the relative error of the
         eigenvalue [Parlett 1998, section 11.7].
     most_sweeps : it ends after so many in any case.
-    orthonormalise : of the rows of a matrix: `by_reflections` or, of few vectors, `by_projections`.
 
     Returns
     -------
@@ -311,7 +308,7 @@ def subspace_iteration(
     """
     rows, done = start, False
     for _ in range(most_sweeps):
-        rows = orthonormalise(rows)
+        rows = orthonormal(rows)
         images = np.array([apply(row) for row in rows])
         values, turn = np.linalg.eigh(np.einsum("ik,jk->ij", rows, images))
         values, turn = values[::-1], turn[:, ::-1]
@@ -333,9 +330,8 @@ def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, toleran
     tolerance : as of `subspace_iteration`.
     """
     values, (row, *_), settled = subspace_iteration(
-        lambda row: -inverse(row), start,
-        settled=1, tolerance=tolerance, most_sweeps=FEW_SWEEPS, orthonormalise=by_projections,
-    )  # fmt: skip
+        lambda row: -inverse(row), start, settled=1, tolerance=tolerance, most_sweeps=FEW_SWEEPS
+    )
     if settled and values[0] > 0:
         return np.asarray(row)
     from scipy.sparse.linalg import LinearOperator, eigsh  # here, as it is rare: a stiffness that has jumped
@@ -345,14 +341,11 @@ def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, toleran
     return np.asarray(eigsh(operator, k=1, which="SA", v0=start[0], tol=tolerance)[1][:, 0])
 
 
-def by_reflections(rows: Floats) -> Floats:
-    """Rows (m, n), made orthogonal and of unit length by Householder's reflections."""
-    return np.ascontiguousarray(np.linalg.qr(rows.T)[0].T)
+def orthonormal(rows: Floats) -> Floats:
+    """Rows (m, n), made orthogonal and of unit length by Gram and Schmidt, twice, the first row first.
 
-
-def by_projections(rows: Floats) -> Floats:
-    """Rows (m, n), made orthogonal and of unit length by Gram and Schmidt, twice, the first row first: of a few long
-    rows, where the threads of a BLAS cost more than they save."""
+    Sums are those of one thread: a BLAS would divide them among its threads, whose waiting costs more than it saves.
+    """
     result = rows.copy()
     for k, row in enumerate(result):
         for _ in range(2):
