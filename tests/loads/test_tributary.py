@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 import rodshell as rs
 from rodshell.loads.check import tributary_of
-from rodshell.loads.tributary import surface_triangles, tributary_areas
+from rodshell.loads.tributary import mesh_triangles, surface_triangles, tributary_areas
 
 
 def paraboloid_area(radius: float, height: float) -> float:
@@ -88,3 +88,19 @@ def test_areas_of_a_surface_in_triangles_of_many_sizes_are_those_of_its_formula(
     assert given.area.sum() == pytest.approx(plain.area.sum(), rel=4e-3)  # the mesh ends in chords
     np.testing.assert_allclose(given.area, plain.area, rtol=1e-2)
     np.testing.assert_allclose(given.plan_positions, plain.plan_positions, atol=0.03)
+
+
+def test_long_strips_of_a_vault_are_divided_across() -> None:
+    """A barrel vault of 30 m as CAD programs give it, two triangles a strip: no more triangles than its area needs."""
+    turns, step = np.linspace(-1.0, 1.0, 25), 0.05
+    ends = [np.column_stack([np.full(25, x), 4 * np.sin(turns), 4 * np.cos(turns)]) for x in (0.0, 30.0)]
+    k = np.arange(24)
+    faces = np.vstack([np.column_stack([k, k + 25, k + 26]), np.column_stack([k, k + 26, k + 1])])
+    vault = rs.Freeform.of(np.vstack(ends), faces)
+    corners, small = mesh_triangles(vault, step=step)
+    sides = np.linalg.norm(corners[np.roll(small, -1, axis=1)] - corners[small], axis=2)
+    assert sides.max() < 1.01 * step
+    a, b, c = (corners[small[:, j]] for j in range(3))
+    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    assert areas.sum() == pytest.approx(30.0 * 8.0, rel=1e-3)
+    assert len(small) < 10 * 240.0 / step**2  # right triangles with legs of `step`: 2

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.geometry.frames import dot
 from rodshell.targets import Target
 from rodshell.validation import brief
 
@@ -26,6 +27,7 @@ MOST_ACROSS = 900
 BISECTIONS = 40
 ON_THE_EDGE = 1e-6  # of the size: a vertex of a mesh so near to its end is inside
 STEEP, MOST_HALVINGS = 2.5, 8  # of the step: where the surface is steep longer sides are halved, so many times
+NEEDLE = 4.0  # a triangle's longest side over its height: longer ones are cut across first
 NEIGHBOURS, AS_NEAR = 4, 1e-6  # nodes that may share a corner, and by what share of the size their distances differ
 
 
@@ -200,9 +202,8 @@ def _stitched(
 def _divided(target: Target, points: Floats, faces: Ints, *, longest: float) -> tuple[Floats, Ints]:
     """The triangles, the sides of each divided into as many parts as leave none longer than `longest` [m], and lifted
     onto the surface; each with corners of its own."""
-    corners = points[faces]
-    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
-    parts = np.maximum(np.ceil(sides / longest), 1).astype(np.intp)
+    corners = _without_needles(points[faces], longest)
+    parts = np.maximum(np.ceil(_sides(corners).max(axis=1) / longest), 1).astype(np.intp)
     placed, divided, count = list[Floats](), list[Ints](), 0
     for n in np.unique(parts).tolist():
         shares, small = _lattice(n)
@@ -212,6 +213,32 @@ def _divided(target: Target, points: Floats, faces: Ints, *, longest: float) -> 
         divided.append((begin[:, None, None] + small).reshape(-1, 3))
         count += len(placed[-1])
     return target.retract(np.concatenate(placed)), np.concatenate(divided)
+
+
+def _without_needles(corners: Floats, longest: float) -> Floats:
+    """Triangles (m, 3, 3), of which those much longer than wide are cut across: else most of what they are divided into
+    would be needlessly small."""
+    sides, (a, b, c) = _sides(corners), corners.transpose(1, 0, 2)
+    length, double_area = sides.max(axis=1), np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    needle = (length**2 > NEEDLE * double_area) & (length > longest)
+    turned = (sides[needle].argmax(axis=1)[:, None] + np.arange(3)) % 3  # the longest side comes first
+    a, b, c = np.take_along_axis(corners[needle], turned[:, :, None], axis=1).transpose(1, 0, 2)
+    foot = a + (dot(c - a, b - a) / dot(b - a, b - a))[:, None] * (b - a)  # of the height on the longest side
+    tip, left, right = np.concatenate([a, b]), np.concatenate([foot, c]), np.concatenate([c, foot])
+    width, reach = np.linalg.norm(right - left, axis=1), np.linalg.norm(np.tile(foot, (2, 1)) - tip, axis=1)
+    parts = np.maximum(np.ceil(reach / np.maximum(width, longest)), 1).astype(np.intp)
+    done = [corners[~needle]]
+    for n in np.unique(parts).tolist():
+        shares = np.linspace(0.0, 1.0, n + 1)[:, None]
+        p, q = (tip[parts == n, None] + shares * (end - tip)[parts == n, None] for end in (left, right))
+        done.append(np.stack([p[:, :-1], p[:, 1:], q[:, 1:]], axis=2).reshape(-1, 3, 3))
+        done.append(np.stack([p[:, 1:-1], q[:, 2:], q[:, 1:-1]], axis=2).reshape(-1, 3, 3))
+    return np.concatenate(done)
+
+
+def _sides(corners: Floats) -> Floats:
+    """(m, 3) lengths of the sides of triangles (m, 3, 3), from each corner to the next."""
+    return np.asarray(np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2))
 
 
 def _lattice(parts: int) -> tuple[Floats, Ints]:
