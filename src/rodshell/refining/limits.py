@@ -19,7 +19,7 @@ from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, each_gradient
 from rodshell.rods.isotropic import IsotropicBend
 
-PROBE = 1e-4  # of the logarithms of properties: the energy's derivative is then exact to 1e-8
+PROBE = 1e-5  # of the logarithms of properties: the energy's derivative is then exact to 1e-8
 
 
 @dataclass(frozen=True)
