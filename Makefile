@@ -17,10 +17,10 @@ types:     ## mypy
 	mypy
 
 test-fast: ## tests that are not marked slow, over every kind of input and output
-	python -m pytest -m "not slow"
+	python -m pytest -n 2 -m "not slow"
 
 test:      ## all tests
-	python -m pytest
+	python -m pytest -n 2
 
 accept:    ## print the acceptance table
 	python -m tests.acceptance.accept

@@ -568,7 +568,7 @@ def implicit_on(block):
         ({"forces": (rs.Damping(coefficients=np.ones((2, 2))),)}, "damping coefficients"),
         ({"rod": rs.Rod(rs.GivenSection(1.0, 1.0, 1.0, 1.0))}, "mass per length"),
     ],
-    ids=str,
+    ids=lambda value: value if isinstance(value, str) else " ".join(value),
 )
 def test_motion_that_makes_no_sense_is_refused_with_its_reason(options, said):
     given = dict(options)
