@@ -288,6 +288,34 @@ def test_edges_bends_and_lengths_are_those_of_each_rod_in_turn(seed, count, edge
     np.testing.assert_allclose(flat, mesh.edge_lengths, rtol=0, atol=1e-9)
 
 
+@settings(max_examples=50, deadline=None)
+@given(seeds, st.integers(2, 8), st.floats(0.05, 0.8))
+def test_crossings_are_found_along_their_rods(seed, count, edge):
+    """The entry of each crossing on both its rods, those beside it, and linear interpolation between crossings."""
+    mesh = mesh_grid(random_rods(seed, count), edge)
+    crossings = mesh.grid.crossings
+    for c, side in product(range(len(crossings)), (0, 1)):
+        rod, entry = crossings.rods[c, side], int(mesh.at_crossings[c, side])
+        first, last = mesh.rod_slice(rod).start, mesh.rod_slice(rod).stop - 1
+        assert mesh.rod_of[entry] == rod
+        assert mesh.rod_nodes[entry] == mesh.joint_nodes[c]
+        assert mesh.stations[entry] == pytest.approx(crossings.at[c, side], abs=ROUND_OFF)
+        assert mesh.beside_crossings[c, side].tolist() == [max(entry - 1, first), min(entry + 1, last)]
+    if (mesh.grid.joint_counts() == 0).any():
+        with pytest.raises(ValueError, match="crosses no other"):
+            mesh.between_crossings  # noqa: B018
+        return
+    value = np.sin(7.0 * mesh.joint_nodes)  # of each crossing, the same where three rods meet
+    around, share = mesh.between_crossings
+    found = (1 - share) * value[around[:, 0]] + share * value[around[:, 1]]
+    for k in range(count):
+        on_rod, side = np.nonzero(crossings.rods == k)
+        order = np.argsort(crossings.at[on_rod, side])
+        at = crossings.at[on_rod, side][order]
+        expected = np.interp(mesh.stations[mesh.rod_slice(k)], at, value[on_rod[order]])
+        np.testing.assert_allclose(found[mesh.rod_slice(k)], expected, rtol=0, atol=1e-9)
+
+
 def test_marks_become_nodes_and_those_at_joints_or_ends_add_none():
     rods = [FlatRod.u("U01", 0.0, -0.5, 0.7), FlatRod.v("V01", 0.2, -0.4, 0.4)]
     grid = FlatGrid.of(rods)

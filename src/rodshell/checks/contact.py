@@ -205,7 +205,7 @@ class _Edges:
         rods = np.sort(crossings.rods, axis=1)
         swapped = (rods != crossings.rods)[:, :1]
         self.crossings = Crossings(rods, np.where(swapped, crossings.at[:, ::-1], crossings.at))
-        rod_of = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
+        rod_of = mesh.rod_of
         together = max(1, int(SHORT * outline.reach / mesh.edge_lengths.max()))
         kept = (np.arange(len(rod_of)) - mesh.rod_start[rod_of]) % together == 0
         kept[mesh.rod_stop - 1] = True

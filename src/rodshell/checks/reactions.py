@@ -16,7 +16,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.finite_sections import joint_normals, joint_tangents
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.joints.crossings import LinkerBend, RodNodes
+from rodshell.joints.crossings import LinkerBend
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium
@@ -140,7 +140,7 @@ def joint_loads(shell: Shell, state: Floats) -> JointLoads:
     state : (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
     """
     mesh, positions = shell.mesh, shell.positions(state)
-    met = RodNodes(mesh, shell.node_blocks, shell.first_angle).at_crossings
+    met = mesh.at_crossings
     normals = joint_normals(mesh, positions)
     between, moments = _between(shell, state, met)
     forces = _on_places(shell, state)[met] + between
@@ -167,8 +167,7 @@ def _rows(elements: Elements, state: Floats) -> Floats:
 def _on_places(shell: Shell, state: Floats) -> Floats:
     """(k, 3) gradient of each rod's own energy by each entry of `rod_nodes` [N]."""
     mesh = shell.mesh
-    rods = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
-    key = rods * len(shell.like) + shell.node_blocks
+    key = mesh.rod_of * len(shell.like) + shell.node_blocks
     order = np.argsort(key)
     result = np.zeros((len(key), 3))
     clamps = np.repeat(np.arange(len(mesh.rod_start)), 2)

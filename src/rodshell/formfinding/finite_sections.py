@@ -37,18 +37,8 @@ def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     mesh : of n nodes and c joints.
     positions : (n, 3) of the nodes [m].
     """
-    result = np.empty((len(mesh.grid.crossings), 2, 3))
-    for side in (0, 1):
-        rods, at = mesh.grid.crossings.rods[:, side], mesh.grid.crossings.at[:, side]
-        row = np.empty(len(rods), dtype=np.intp)
-        for rod in np.unique(rods):
-            here = mesh.rod_slice(int(rod))
-            on_rod = np.flatnonzero(rods == rod)
-            row[on_rod] = here.start + np.abs(mesh.stations[here] - at[on_rod, None]).argmin(axis=1)
-        before = np.maximum(row - 1, mesh.rod_start[rods])
-        after = np.minimum(row + 1, mesh.rod_stop[rods] - 1)
-        result[:, side] = positions[mesh.rod_nodes[after]] - positions[mesh.rod_nodes[before]]
-    return result
+    before, after = np.moveaxis(positions[mesh.rod_nodes[mesh.beside_crossings]], 2, 0)
+    return np.asarray(after - before)
 
 
 def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
@@ -70,14 +60,10 @@ def node_normals(mesh: GridMesh, positions: Floats) -> Floats:
     ----------
     positions : (n, 3) of the mesh's nodes [m].
     """
-    at_joints, total = joint_normals(mesh, positions), np.zeros((mesh.node_count, 3))
-    for rod in range(len(mesh.grid.rods)):
-        here = mesh.rod_slice(rod)
-        joints, side = np.nonzero(mesh.grid.crossings.rods == rod)
-        order = np.argsort(mesh.grid.crossings.at[joints, side])
-        at, normals = mesh.grid.crossings.at[joints, side][order], at_joints[joints[order]]
-        for k in range(3):
-            np.add.at(total[:, k], mesh.rod_nodes[here], np.interp(mesh.stations[here], at, normals[:, k]))
+    (crossings, share), at_joints = mesh.between_crossings, joint_normals(mesh, positions)
+    first, last = at_joints[crossings].transpose(1, 0, 2)
+    total = np.zeros((mesh.node_count, 3))
+    np.add.at(total, mesh.rod_nodes, first + share[:, None] * (last - first))
     return unit(total)
 
 

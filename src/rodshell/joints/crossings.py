@@ -16,7 +16,6 @@ reversed: its tangent, its second director and its twist angle change sign.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
@@ -49,18 +48,15 @@ class RodNodes:
     def __repr__(self) -> str:
         return f"RodNodes({len(self.blocks)} of {len(self.mesh.rod_start)} rods)"
 
-    @cached_property
+    @property
     def rods(self) -> Ints:
         """(k,) rod of each rod node."""
-        return np.repeat(np.arange(len(self.mesh.rod_start)), self.mesh.rod_stop - self.mesh.rod_start)
+        return self.mesh.rod_of
 
-    @cached_property
+    @property
     def at_crossings(self) -> Ints:
         """(c, 2) rod nodes at each crossing of the grid, of its first and its second rod."""
-        key = self.rods * self.mesh.node_count + self.mesh.rod_nodes
-        order = np.argsort(key, kind="stable")
-        wanted = self.mesh.grid.crossings.rods * self.mesh.node_count + self.mesh.joint_pairs
-        return np.asarray(order[np.searchsorted(key[order], wanted)])
+        return self.mesh.at_crossings
 
     def has_edge(self, rod_nodes: Ints, side: int) -> Bools:
         """Whether the rod has an edge before (side 0) or after (side 1) each of the `rod_nodes`.

@@ -67,9 +67,9 @@ class GridMesh:
         return self.rod_nodes[self.rod_slice(rod)]
 
     @cached_property
-    def _rod_of(self) -> Ints:
-        lengths = np.diff(np.append(self.rod_start, len(self.rod_nodes)))
-        return np.repeat(np.arange(len(self.rod_start)), lengths)
+    def rod_of(self) -> Ints:
+        """(k,) rod of each entry of `rod_nodes`."""
+        return np.repeat(np.arange(len(self.rod_start)), self.rod_stop - self.rod_start)
 
     @cached_property
     def edges(self) -> Ints:
@@ -79,12 +79,12 @@ class GridMesh:
     @cached_property
     def edge_rods(self) -> Ints:
         """(e,) rod of each edge."""
-        return np.asarray(self._rod_of[:-1][self._rod_of[1:] == self._rod_of[:-1]])
+        return np.asarray(self.rod_of[:-1][self.rod_of[1:] == self.rod_of[:-1]])
 
     @cached_property
     def edge_lengths(self) -> Floats:
         """(e,) rest lengths [m]."""
-        return np.asarray(np.diff(self.stations)[self._rod_of[1:] == self._rod_of[:-1]])
+        return np.asarray(np.diff(self.stations)[self.rod_of[1:] == self.rod_of[:-1]])
 
     @cached_property
     def around_edges(self) -> list[tuple[Ints, Ints, Floats]]:
@@ -112,12 +112,12 @@ class GridMesh:
     @cached_property
     def bend_rods(self) -> Ints:
         """(b,) rod of each bend."""
-        return np.asarray(self._rod_of[:-2][self._rod_of[2:] == self._rod_of[:-2]])
+        return np.asarray(self.rod_of[:-2][self.rod_of[2:] == self.rod_of[:-2]])
 
     @cached_property
     def voronoi_lengths(self) -> Floats:
         """(b,) half the rest length of the two edges of each bend [m] [HQK Eq 1b, of the rest state: see ERRATA]."""
-        whole = (self.stations[2:] - self.stations[:-2])[self._rod_of[2:] == self._rod_of[:-2]]
+        whole = (self.stations[2:] - self.stations[:-2])[self.rod_of[2:] == self.rod_of[:-2]]
         return np.asarray(0.5 * whole)
 
     @cached_property
@@ -130,6 +130,43 @@ class GridMesh:
         """(c, 2) nodes of each crossing on its two rods."""
         second = self.joint_nodes if self.second_nodes is None else self.second_nodes
         return np.column_stack([self.joint_nodes, second])
+
+    @cached_property
+    def at_crossings(self) -> Ints:
+        """(c, 2) entries of `rod_nodes` at each crossing of the grid, of its first and its second rod."""
+        key = self.rod_of * self.node_count + self.rod_nodes
+        order = np.argsort(key, kind="stable")
+        wanted = self.grid.crossings.rods * self.node_count + self.joint_pairs
+        return np.asarray(order[np.searchsorted(key[order], wanted)])
+
+    @cached_property
+    def beside_crossings(self) -> Ints:
+        """(c, 2, 2) entries of `rod_nodes` before and after each crossing on both its rods; at a rod's end its own."""
+        entries, rods = self.at_crossings, self.grid.crossings.rods
+        before, after = np.maximum(entries - 1, self.rod_start[rods]), np.minimum(entries + 1, self.rod_stop[rods] - 1)
+        return np.stack([before, after], axis=2)
+
+    @cached_property
+    def between_crossings(self) -> tuple[Ints, Floats]:
+        """Of each entry of `rod_nodes` the crossings before and after it on its rod (k, 2), and how far it is on the
+        way from the first to the second (k,), 0 to 1; before a rod's first crossing and past its last both are that.
+
+        Raises
+        ------
+        ValueError : some rod crosses no other.
+        """
+        if (self.grid.joint_counts() == 0).any():
+            raise ValueError("a rod that crosses no other has nothing to interpolate between")
+        entries = self.at_crossings.ravel()
+        order = np.argsort(entries, kind="stable")
+        entries, crossings = entries[order], order // 2
+        after = np.searchsorted(entries, np.arange(len(self.rod_nodes)), side="right")
+        around = np.clip(np.column_stack([after - 1, after]), 0, len(entries) - 1)
+        elsewhere = self.rod_of[entries[around]] != self.rod_of[:, None]
+        around = np.where(elsewhere, around[:, ::-1], around)
+        first, last = self.stations[entries[around]].T
+        share = np.clip((self.stations - first) / np.where(last > first, last - first, 1.0), 0.0, 1.0)
+        return crossings[around], share
 
     @property
     def layered(self) -> bool:
@@ -152,13 +189,9 @@ class GridMesh:
         ------
         InputError : the rods need more than two layers.
         """
-        side = sides(self.grid)[self._rod_of]
+        side, pairs = sides(self.grid)[self.rod_of], self.at_crossings
         flat = self.flat[self.rod_nodes]
         flat[:, 2] = 0.5 * eccentricity * side
-        key = self._rod_of * self.node_count + self.rod_nodes
-        order = np.argsort(key, kind="stable")
-        wanted = self.grid.crossings.rods * self.node_count + self.joint_nodes[:, None]
-        pairs = order[np.searchsorted(key[order], wanted)]
         nodes = np.arange(len(self.rod_nodes))
         return GridMesh(self.grid, flat, nodes, self.rod_start, self.stations, pairs[:, 0], pairs[:, 1])
 
@@ -169,7 +202,7 @@ class GridMesh:
 
     def _windows(self, width: int) -> Ints:
         last = len(self.rod_nodes) - width + 1
-        inside = self._rod_of[width - 1 :] == self._rod_of[:last]
+        inside = self.rod_of[width - 1 :] == self.rod_of[:last]
         columns = [self.rod_nodes[k : k + last][inside] for k in range(width)]
         return np.column_stack(columns)
 

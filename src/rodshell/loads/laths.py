@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.joints.crossings import RodNodes
+from rodshell.formfinding.finite_sections import joint_normals
 from rodshell.joints.standoff import Standoffs
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.cells import Pattern, flat_joints, lines
@@ -77,7 +77,7 @@ class Laths:
             raise InputError("these laths have no rod of their own: give one, such as that of the grid")
         pairs = braced_diagonals(mesh, structure.positions(before), target, self.pattern, self.across_openings)
         rows = lines(pairs, flat_joints(mesh.grid))
-        normals = _normals(mesh, structure.positions(before))
+        normals = joint_normals(mesh, structure.positions(before))
         over = before.state[outer_nodes(mesh)] + self.eccentricity * normals
         laid = _Laid.over(rows, over, normals, float(np.median(mesh.edge_lengths)))
         shell = Shell.of(laid.mesh, self.rod)
@@ -221,19 +221,10 @@ def _placed(before: Floats | None, flat: Floats, blocks: Ints, count: int) -> Fl
     return result
 
 
-def _normals(mesh: GridMesh, positions: Floats) -> Floats:
-    """(c, 3) normals of the crossings, by the nodes next to each on both of its rods, towards the outer side."""
-    at = positions[_neighbours(mesh)]
-    normal = np.cross(at[:, 0] - at[:, 2], at[:, 1] - at[:, 3])
-    return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
-
-
 def _neighbours(mesh: GridMesh) -> Ints:
     """(c, 4) nodes after each crossing on both rods, then before it, in the order in which their normal points up."""
-    nodes = RodNodes(mesh, mesh.rod_nodes, 0)
-    entries = nodes.at_crossings
-    rows = [np.where(nodes.has_edge(here, side), here + (2 * side - 1), here) for side in (1, 0) for here in entries.T]
-    found = mesh.rod_nodes[np.column_stack(rows)]
+    before, after = np.moveaxis(mesh.rod_nodes[mesh.beside_crossings], 2, 0)
+    found = np.column_stack([after, before])
     flat = mesh.flat[found, :2]
     a, b = flat[:, 0] - flat[:, 2], flat[:, 1] - flat[:, 3]
     down = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0

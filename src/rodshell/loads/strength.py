@@ -30,7 +30,6 @@ from rodshell.checks.bending import VON_MISES, Bending, bending_of, fibre_modulu
 from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
-from rodshell.joints.crossings import RodNodes
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
@@ -264,7 +263,7 @@ def utilisation(
     euler = spans.on_entries(np.maximum(-axial, 0.0) / euler_loads)
     turned = np.zeros(len(mesh.rod_nodes))
     if moments is not None and len(moments):
-        joints = RodNodes(mesh, shell.node_blocks, shell.first_angle).at_crossings
+        joints = mesh.at_crossings
         np.maximum.at(turned, joints, np.abs(moments)[:, None])
     uses: dict[By, Floats] = {}
     strength = limits.bending.get(duration)

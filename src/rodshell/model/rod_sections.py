@@ -51,7 +51,7 @@ class RodSections:
         ------
         InputError : a profile changes a length that the section does not have.
         """
-        rod_of = np.repeat(np.arange(len(rods)), mesh.rod_stop - mesh.rod_start)
+        rod_of = mesh.rod_of
         of_rods = _uniform(rods)
         nodes = of_rods[:, :3].take(rod_of, axis=0)
         edges, *rest = (column.take(mesh.edge_rods, axis=0) for column in (of_rods[:, :3], *of_rods[:, 3:].T))

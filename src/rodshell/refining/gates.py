@@ -293,11 +293,7 @@ def misfit(mesh: GridMesh) -> float:
 
 def _joint_stations(mesh: GridMesh) -> Floats:
     """(c, 2) distance of each crossing's node along its two rods [m], from the points that `FlatRod.origin` names."""
-    rod_of = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
-    key = rod_of * mesh.node_count + mesh.rod_nodes
-    order = np.argsort(key, kind="stable")
-    wanted = mesh.grid.crossings.rods * mesh.node_count + mesh.joint_pairs
-    return np.asarray(mesh.stations[order[np.searchsorted(key[order], wanted)]])
+    return np.asarray(mesh.stations[mesh.at_crossings])
 
 
 def _popped(form: PatchForm) -> PopUp:

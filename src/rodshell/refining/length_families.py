@@ -11,7 +11,6 @@ from scipy.sparse import csc_array, csr_array
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.joints.crossings import RodNodes
 from rodshell.layout import FlatGrid, FlatRod, GridMesh
 from rodshell.layout.flatgrid import Crossings
 from rodshell.refining.change import Change
@@ -84,7 +83,7 @@ class Tails:
         """
         mesh = structure.mesh
         ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
-        points = np.unique(np.append(ends, joint_entries(mesh)))
+        points = np.unique(np.append(ends, mesh.at_crossings))
         inner = points[np.searchsorted(points, ends) + np.tile([1, -1], len(mesh.rod_start))]
         tails = np.abs(mesh.stations[ends] - mesh.stations[inner])
         span, outward = usual_span(mesh), np.tile([-1.0, 1.0], len(mesh.rod_start))
@@ -116,7 +115,7 @@ class Offsets:
         mesh, rods = structure.mesh, structure.mesh.grid.rods
         if any(rod.family == "free" for rod in rods):
             raise InputError("offsets can only vary in a grid of two families of parallel rods: vary something else")
-        crossing = joint_entries(mesh).reshape(-1, 2)
+        crossing = mesh.at_crossings
         count, pairs = len(rods), mesh.grid.crossings.rods
         rows, columns = crossing[:, ::-1].ravel(), pairs.ravel()  # a rod moves the joints on those that it crosses
         moved = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(mesh.stations), count))
@@ -146,8 +145,8 @@ class Holes:
         structure : the shell.
         """
         mesh = structure.mesh
-        holes = np.unique(joint_entries(mesh))
-        rod = rods_of(mesh)
+        holes = np.unique(mesh.at_crossings)
+        rod = mesh.rod_of
         points = np.unique(np.append(holes, np.column_stack([mesh.rod_start, mesh.rod_stop - 1])))
         columns = np.arange(len(holes))
         moved = csr_array((np.ones(len(holes)), (holes, columns)), shape=(len(mesh.stations), len(holes)))
@@ -171,20 +170,10 @@ def edge_entries(mesh: GridMesh) -> tuple[Ints, Ints]:
     return begins, begins + 1
 
 
-def rods_of(mesh: GridMesh) -> Ints:
-    """(k,) rod of each entry of `rod_nodes`."""
-    return np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
-
-
-def joint_entries(mesh: GridMesh) -> Ints:
-    """(2c,) entries of `rod_nodes` at each crossing, on its first and its second rod in turn."""
-    return RodNodes(mesh, mesh.rod_nodes, 0).at_crossings.ravel()
-
-
 def usual_span(mesh: GridMesh) -> float:
     """Median distance of neighbouring joints along rods [m]."""
-    entries = np.unique(joint_entries(mesh))
-    same = np.diff(rods_of(mesh)[entries]) == 0
+    entries = np.unique(mesh.at_crossings)
+    same = np.diff(mesh.rod_of[entries]) == 0
     return float(np.median(np.diff(mesh.stations[entries])[same]))
 
 
@@ -220,8 +209,8 @@ def restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
         _moved(rod, float(start), float(end), float(by))
         for rod, (start, end), by in zip(mesh.grid.rods, ends, across, strict=True)
     )
-    crossings = Crossings(mesh.grid.crossings.rods, stations[joint_entries(mesh).reshape(-1, 2)])
-    flat, visits, rod_of = np.zeros((mesh.node_count, 2)), np.zeros(mesh.node_count), rods_of(mesh)
+    crossings = Crossings(mesh.grid.crossings.rods, stations[mesh.at_crossings])
+    flat, visits, rod_of = np.zeros((mesh.node_count, 2)), np.zeros(mesh.node_count), mesh.rod_of
     origins = np.array([rod.origin for rod in rods])[rod_of]
     directions = np.array([rod.direction for rod in rods])[rod_of]
     np.add.at(flat, mesh.rod_nodes, origins + stations[:, None] * directions)

@@ -13,7 +13,6 @@ from rodshell.arrays import Floats
 from rodshell.geometry.frames import dot
 from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES
 from rodshell.refining.change import STIFFNESSES
-from rodshell.refining.length_families import joint_entries, rods_of
 from rodshell.refining.structure import Point
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, each_gradient
@@ -97,11 +96,7 @@ class MinimumAngle:
     def _cosines(self, here: Point) -> tuple[Floats, Floats]:
         """(c,) cosine of the angle at each crossing, of the chords over the edges next to it; (c, n) slopes."""
         mesh = here.structure.mesh
-        entries, rod = joint_entries(mesh), rods_of(mesh)
-        before = np.where(rod[entries - 1] == rod[entries], entries - 1, entries)
-        after = np.minimum(entries + 1, len(rod) - 1)
-        after = np.where(rod[after] == rod[entries], after, entries)
-        ends = mesh.rod_nodes[np.column_stack([before, after])]
+        ends = mesh.rod_nodes[mesh.beside_crossings].reshape(-1, 2)
         chords = here.state[ends[:, 1]] - here.state[ends[:, 0]]
         length = np.linalg.norm(chords, axis=1)[:, None]
         unit = chords / length

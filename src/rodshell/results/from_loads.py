@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.joints.crossings import RodNodes
 from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
 from rodshell.loads.check import LoadedShell as CheckedShell
@@ -116,7 +115,7 @@ def _slipping(mesh: GridMesh, shell: CheckedShell) -> Ints:
     used = shell.used.uses.get("slip")
     if used is None:
         return np.empty(0, dtype=np.intp)
-    entries = RodNodes(mesh, mesh.rod_nodes, 0).at_crossings
+    entries = mesh.at_crossings
     return np.flatnonzero((used[entries] > 1).any(axis=1))
 
 

@@ -155,10 +155,7 @@ def handles(form: "Form") -> Mapping[str, Any] | None:
 
 def _joints(mesh: GridMesh) -> tuple[list[str], Ints]:
     """Ids of all joints, and the entry of `rod_nodes` (c, 2) of each on either rod; the first rod is named first."""
-    rods, count = mesh.grid.crossings.rods, mesh.node_count
-    key = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start) * count + mesh.rod_nodes
-    order = np.argsort(key, kind="stable")
-    entries = order[np.searchsorted(key[order], rods * count + mesh.joint_pairs)]
+    rods, entries = mesh.grid.crossings.rods, mesh.at_crossings
     names = [rod.name for rod in mesh.grid.rods]
     second = rods[:, 0] > rods[:, 1]
     rods, entries = (np.where(second[:, None], pairs[:, ::-1], pairs) for pairs in (rods, entries))
