@@ -1,7 +1,7 @@
 """A drawing: paths, marks and texts on named layers, y up [mm]. DXF, SVG, PDF and PNG are written from it."""
 
 import pathlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -181,8 +181,10 @@ class Drawing:
 
     def pen(self, item: Path | Mark) -> Pen:
         """The item's own pen, or that of its layer."""
+        if item.pen is not None:
+            return item.pen
         layer, wide = LAYERS[item.layer], self.pen_scale
-        return item.pen or Pen(layer.colour, wide * layer.pen, tuple(wide * dash for dash in layer.dash))
+        return Pen(layer.colour, wide * layer.pen, tuple(wide * dash for dash in layer.dash))
 
     @property
     def pen_scale(self) -> float:
@@ -207,24 +209,26 @@ class Drawing:
         scale : new lengths over old ones.
         shift : (2,) [mm].
         """
-        pens = {path.pen for path in self.paths} | {mark.pen for mark in self.marks}
-        pen = {old: _scaled(old, scale) for old in pens}
+        paths = [path for path in self.paths if path.flat]
+        used = {id(pen): pen for pen in (*(path.pen for path in paths), *(mark.pen for mark in self.marks))}
+        pens = {key: _scaled(pen, scale) for key, pen in used.items()}
+        at = _moved([*(mark.at for mark in self.marks), *(text.at for text in self.texts)], scale, shift)
+        marks, texts = at[: len(self.marks)], at[len(self.marks) :]
         return Drawing(
             self.name,
             self.title,
             scale * self.text,
             tuple(
-                Path(scale * path.points + shift, path.layer, path.closed, pen[path.pen], path.name, path.note)
-                for path in self.paths
-                if path.flat
+                Path(points, path.layer, path.closed, pens[id(path.pen)], path.name, path.note)
+                for path, points in zip(paths, _moved([path.points for path in paths], scale, shift), strict=True)
             ),
             tuple(
-                Mark(scale * mark.at + shift, scale * mark.radius, mark.layer, pen[mark.pen], mark.note)
-                for mark in self.marks
+                Mark(place, scale * mark.radius, mark.layer, pens[id(mark.pen)], mark.note)
+                for mark, place in zip(self.marks, marks, strict=True)
             ),
             tuple(
-                Text(t.text, scale * t.at + shift, scale * t.size, t.layer, t.anchor, t.angle, t.bold, t.colour, t.halo)
-                for t in self.texts
+                Text(t.text, place, scale * t.size, t.layer, t.anchor, t.angle, t.bold, t.colour, t.halo)
+                for t, place in zip(self.texts, texts, strict=True)
             ),
             self.left_out,
         )
@@ -238,19 +242,19 @@ class Drawing:
         """
         left, bottom, right, top = map(float, (*low, *high))
 
-        def meets(x0: float, y0: float, x1: float, y1: float) -> bool:
-            return x1 >= left and y1 >= bottom and x0 <= right and y0 <= top
-
-        paths = [
-            replace(path, points=part, closed=False)
-            for path in self.paths
-            if path.flat and meets(*path.extent)
-            for part in _inside(np.vstack([path.points, path.points[:1]]) if path.closed else path.points, low, high)
-        ]
-        boxes = [np.array([mark.at - mark.radius, mark.at + mark.radius]) for mark in self.marks]
-        marks = tuple(mark for mark, box in zip(self.marks, boxes, strict=True) if _within(box, low, high))
-        texts = tuple(text for text in self.texts if _within(text.box(), low, high))
-        return replace(self, paths=tuple(paths), marks=marks, texts=texts)
+        paths = list[Path]()
+        for path in self.paths:
+            x0, y0, x1, y1 = path.extent if path.flat else (np.inf, np.inf, -np.inf, -np.inf)
+            if left <= x0 and bottom <= y0 and x1 <= right and y1 <= top:
+                paths.append(path)
+            elif x1 >= left and y1 >= bottom and x0 <= right and y0 <= top:
+                points = np.vstack([path.points, path.points[:1]]) if path.closed else path.points
+                paths += [replace(path, points=part, closed=False) for part in _inside(points, low, high)]
+        texts = tuple(text for text in self.texts if within(text.box(), low, high))
+        radii = np.array([[mark.radius] for mark in self.marks])
+        at = np.array([mark.at for mark in self.marks]).reshape(-1, 2)
+        kept = np.flatnonzero(((at - radii >= low) & (at + radii <= high)).all(axis=1)) if len(at) else ()
+        return replace(self, paths=tuple(paths), marks=tuple(self.marks[k] for k in kept), texts=texts)
 
     def __add__(self, other: "Drawing") -> "Drawing":
         """This one with the other's content on top."""
@@ -330,11 +334,25 @@ class Pencil:
 
 
 def _scaled(pen: Pen | None, scale: float) -> Pen | None:
-    return pen and replace(pen, width=scale * pen.width, dash=tuple(scale * dash for dash in pen.dash))
+    return pen and Pen(pen.colour, scale * pen.width, tuple(scale * dash for dash in pen.dash), pen.fill)
 
 
-def _within(box: Floats, low: Floats, high: Floats) -> bool:
-    """Whether all points (k, 2) lie in a rectangle."""
+def _moved(groups: Sequence[Floats], scale: float, shift: Floats) -> list[Floats]:
+    """Points (..., 2) in groups, scaled about the origin and then shifted: all at once, since groups are many."""
+    if not groups:
+        return []
+    stops = np.cumsum([points.size // 2 for points in groups]).tolist()
+    moved = scale * np.concatenate([points.reshape(-1, 2) for points in groups]) + shift
+    return [moved[a:b].reshape(points.shape) for a, b, points in zip([0, *stops], stops, groups, strict=False)]
+
+
+def within(box: Floats, low: Floats, high: Floats) -> bool:
+    """Whether all points (k, 2) lie in a rectangle.
+
+    Parameters
+    ----------
+    box : (k, 2) points; low, high : (2,) lower left and upper right corner of the rectangle.
+    """
     (left, bottom), (right, top) = low.tolist(), high.tolist()
     return all(left <= x <= right and bottom <= y <= top for x, y in box.tolist())
 

@@ -115,13 +115,14 @@ def _add_path(space: "Modelspace", path: Path, layer: str) -> None:
 
 
 def _add_text(space: "Modelspace", text: Text, layer: str) -> None:
-    from ezdxf.enums import TextEntityAlignment as Alignment
-
+    at = text.at.tolist()
     look = {
-        "layer": layer, "style": STYLES[text.bold][0], "height": CAPITAL * text.size, "rotation": degrees(text.angle)
+        "layer": layer, "style": STYLES[text.bold][0], "height": CAPITAL * text.size, "rotation": degrees(text.angle),
+        "insert": at,
     }  # fmt: skip
-    alignment = {"start": Alignment.LEFT, "middle": Alignment.CENTER, "end": Alignment.RIGHT}[text.anchor]
-    space.add_text(_plain(text.text), dxfattribs=look).set_placement(text.at.tolist(), align=alignment)
+    if text.anchor != "start":  # on its baseline; the second point counts [DXF reference]
+        look |= {"halign": {"middle": 1, "end": 2}[text.anchor], "align_point": at}
+    space.add_text(_plain(text.text), dxfattribs=look)
 
 
 def _plain(text: str) -> str:

@@ -186,9 +186,10 @@ def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
     ----------
     size : of the text; room : what is taken; lines : (m, 2, 2), all in the unit of the label.
     """
+    box = label.box(size)
     return (
-        room.free(label.box(size))
-        and not lines_meet(label.box(size), lines)
+        room.free(box)
+        and not lines_meet(box, lines)
         and (not label.moved or room.free(off_its_mark(label.leader(size), size)))
     )
 

@@ -146,9 +146,9 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     _rods(pencil, plan, text)
     lines, across = np.concatenate([plan.cuts, *map(closed_segments, plan.footprint)]), plan.across
     _labels(pencil, plan, text, lines)
-    _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
+    room = _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
     for a, b in across:
-        _dimension(pencil, plan, a, b, text)
+        _dimension(pencil, plan, a, b, text, room)
     _axes(pencil, plan, text)
     return pencil.done("plan", FLAT_TITLE, text)
 
@@ -166,8 +166,9 @@ def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
                 pencil.line([end - across, end + across], "DIM")
 
 
-def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: Floats) -> None:
-    """A mark at each joint, and its id in a corner of the mesh next to it, nearer to it than to the next joint.
+def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: Floats) -> Room:
+    """A mark at each joint, and its id in a corner of the mesh next to it, nearer to it than to the next joint; returns
+    the room that all texts take.
 
     It is clear of all `lines` (m, 2, 2), and of those `across` (d, 2, 2) if it can be.
     An id that finds no room, or only in letters too small to read, is left to the mark's note and the schedule.
@@ -183,12 +184,14 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
         for clear_of, corner in product((both, lines), CORNERS if size >= SMALL * text else ()):
             off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
             label = Label(joint.id, mark + off * corner, 0.0, mark, moved=False)
-            if not lines_meet(label.box(size), clear_of) and room.claim(label.box(size)):
-                pencil.texts.append(label.written(size))
+            written = label.written(size)
+            if not lines_meet(written.box(), clear_of) and room.claim(written.box()):
+                pencil.texts.append(written)
                 break
         else:
             left_out += 1
     pencil.leave_out(left_out, len(plan.joints), "joint ids (named by the rods that cross)")
+    return room
 
 
 def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
@@ -267,18 +270,15 @@ def _largest_full(met: Bools, x: Floats, y: Floats) -> tuple[float, float, float
     return best[1]
 
 
-def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float) -> None:
-    """A thin line with its length, written off the labels, a third of the way along if it can be."""
+def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float, room: Room) -> None:
+    """A thin line with its length, written off what takes `room`, a third of the way along if it can be."""
     along = b - a
     pencil.line([a, b], "DIM", pen=Pen("#b08a2e", 0.05 * text, (1.5 * text, 0.5 * text, 0.3 * text, 0.5 * text)))
     words, angle = plan.rounding.mm(1e-3 * float(np.linalg.norm(along))), float(np.arctan2(along[1], along[0]))
-    room = Room(plan.spacing)
-    for other in pencil.texts:
-        room.take(other.box())
     shares = sorted(np.linspace(0.1, 0.9, 81).tolist(), key=lambda share: abs(share - 0.33))
     for size, share in ((size, share) for size in (text, SMALL * text) for share in shares):
         pencil.write(words, a + share * along, size, "DIM", anchor="middle", angle=angle, colour="#8a6a1c")
-        if room.free(pencil.texts[-1].box()):
+        if room.claim(pencil.texts[-1].box()):
             return
         pencil.texts.pop()
 
@@ -379,12 +379,12 @@ def _stop(
     pencil: Pencil, rod: GridRod, at: float, x: float, y: float, text: float, name: str, kind: str,
     layer: dict[str, int | None], mm: Show,
 ) -> None:  # fmt: skip
-    """A mark at `at`, its texts at `x`."""
+    """A mark at `at`, its texts at `x`, and a line from text to text through the middle of the mark."""
     shift = 0.35 * text
-    for side, far in ((1, 2.2), (-1, -1.6)):
-        if side > 0 or name:
-            way = [(at, y + 0.4 * side * text), (at, y + 0.7 * side * text), (x, y + 0.85 * far * text)]
-            pencil.line(way if abs(x - at) > 1e-6 else way[::2], "DIM")
+    way = [(x, y + 1.87 * text), (at, y + 0.7 * text), (at, y - 0.7 * text), (x, y - 1.36 * text)]
+    if not name:
+        way[2:] = [(at, y)]
+    pencil.line(way if abs(x - at) > 1e-6 else [way[0], way[-1]], "DIM")
     pencil.write(mm(1e-3 * at), (x + shift, y + 2.0 * text), text, "LABEL", angle=np.pi / 2)
     if name:
         pencil.write(name, (x + shift, y - 1.6 * text), text, "LABEL", anchor="end", angle=np.pi / 2)

@@ -13,7 +13,7 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text
+from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
 from rodshell.output.labels import Room
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
@@ -447,7 +447,8 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
     """Lines along which a sheet meets its neighbours, with their names, clear of the `texts` there."""
     pencil, (row, column), free = Pencil(), here, Room(20.0)
     for text in texts:
-        free.take(text.box())
+        if not within(text.box(), low, high):
+            free.take(text.box())
     pen = Pen("#b3372c", 0.25, (6.0, 1.5, 1.0, 1.5))
     sides: tuple[tuple[bool, tuple[int, int], list[Floats], tuple[float, float], float], ...] = (
         (bool(row > 0), (row - 1, column), [np.array([low[0], high[1]]), high], (0.0, 1.5), 0.0),
