@@ -122,6 +122,19 @@ def test_sheets_of_the_plan_meet_at_their_match_lines() -> None:
     assert words == {f"match line to part {row}{column}" for row in "ABCD" for column in "12"}
 
 
+def test_names_of_match_lines_are_clear_of_the_drawing_where_there_is_room() -> None:
+    """Lines cross the sheets' common edge, and leave room for a name only in its upper third."""
+    low, high = room(PAPER)
+    wide, tall = 1.5 * (high[0] - low[0]), high[1] - low[1] - 2 * OVERLAP
+    lines = [Line(np.array([[0.0, y], [wide, y]]), "CUT") for y in (*np.arange(0.0, 0.6 * tall, 5.0), tall)]
+    names = []
+    for sheet in tiled(Drawing("", "", 1.0, tuple(lines)), PAPER):
+        paths = [path.points for path in sheet.content.paths if path.layer == "CUT"]
+        drawn = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
+        names += [text for text in sheet.content.texts if not lines_meet(text.box(), drawn)]
+    assert sorted(text.text for text in names) == ["match line to part A1", "match line to part A2"]
+
+
 def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
     """Row A is the top one; the line to the next row is at the bottom, that to the next column on the right."""
     plan = flat_plan(archive("dome"))

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
+from itertools import product
 from math import ceil
 from textwrap import wrap
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
-from rodshell.output.labels import Room
+from rodshell.output.labels import Room, lines_meet
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash
@@ -339,7 +340,7 @@ def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Ite
             corner = origin + size * (column, count[1] - 1 - row)
             shift = low + OVERLAP - corner
             part = drawing.clipped(low - shift, high - shift).placed(1.0, shift)
-            lines = _match_lines(low + OVERLAP, high - OVERLAP, (row, column), count, part.texts)
+            lines = _match_lines(low + OVERLAP, high - OVERLAP, (row, column), count, part)
             yield Sheet(
                 f"{drawing.title} 1:{scale:g}, part {_part(row, column)} of {_part(*(count[::-1] - 1))}",
                 part + lines,
@@ -443,12 +444,15 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
     return pencil.done("", "", TEXT)
 
 
-def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, texts: Sequence[Text]) -> Drawing:
-    """Lines along which a sheet meets its neighbours, with their names, clear of the `texts` there."""
+def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, part: Drawing) -> Drawing:
+    """Lines along which a sheet meets its neighbours, with their names clear of the texts of its `part` of the drawing,
+    and of its lines where there is room."""
     pencil, (row, column), free = Pencil(), here, Room(20.0)
-    for text in texts:
+    for text in part.texts:
         if not within(text.box(), low, high):
             free.take(text.box())
+    paths = [path.points for path in part.paths if not within(path.points, low, high)]
+    drawn = np.concatenate([np.empty((0, 2, 2)), *(np.stack([line[:-1], line[1:]], axis=1) for line in paths)])
     pen = Pen("#b3372c", 0.25, (6.0, 1.5, 1.0, 1.5))
     sides: tuple[tuple[bool, tuple[int, int], list[Floats], tuple[float, float], float], ...] = (
         (bool(row > 0), (row - 1, column), [np.array([low[0], high[1]]), high], (0.0, 1.5), 0.0),
@@ -468,11 +472,12 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         pencil.line(line, "TITLE", pen=pen)
         start, along = line[0] + off, np.array([np.cos(angle), np.sin(angle)])
         words = f"match line to part {_part(*neighbour)}"
-        for step in range(4, int(np.linalg.norm(line[1] - line[0])) - 50, 2):
-            pencil.write(words, start + step * along, TEXT, "TITLE", angle=angle, colour=pen.colour)
-            if free.claim(pencil.texts[-1].box()):
+        steps = range(4, int(np.linalg.norm(line[1] - line[0])) - 50, 2)
+        for clear_of, step in product((drawn, drawn[:0]), steps):
+            written = Text(words, start + step * along, TEXT, "TITLE", angle=angle, colour=pen.colour)
+            if not lines_meet(written.box(), clear_of) and free.claim(written.box()):
+                pencil.texts.append(written)
                 break
-            pencil.texts.pop()
     return pencil.done("", "", TEXT)
 
 
