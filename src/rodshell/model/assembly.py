@@ -102,6 +102,15 @@ class Freedom:
         """
         return np.asarray(_reduce(np.ascontiguousarray(gradient), self.directions, self.count, self.size))
 
+    def within(self, gradient: Floats) -> Floats:
+        """The part (n, 3) of a gradient that acts along the free directions.
+
+        Parameters
+        ----------
+        gradient : (n, 3) [N].
+        """
+        return self.expand(self.reduce(gradient))
+
     def reduce_diagonal(self, diagonal: Floats) -> Floats:
         """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses.
 

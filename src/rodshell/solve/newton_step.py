@@ -23,6 +23,7 @@ TOLERANCE = 1e-13  # of the length: estimate of the error that is left
 FORCE_TOLERANCE = 1e-10  # of the largest axial force: the same for the forces
 LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
 CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
+MULTIPLIERS = 5e-3  # of the last change is left in forces that are multipliers of a penalty: 2e-4 to 1e-3 measured
 LONGEST_STEP = 0.15  # of the length
 PART = 0.25  # of a step that was too long is taken
 LONGER = 2.0  # growth of the longest step after one that was not
@@ -129,15 +130,16 @@ class NewtonStep:
         """
         problem, stretch = self._problem, self._problem.stretch
         if not self._chord:
-            self._factored = state, forces
-        at, strains = self._factored[0], self.strains(state)
+            self._factored, self._free = (state, forces), problem.constraint.freedom(state)
+        at, free, strains = self._factored[0], self._free, self.strains(state)
         base = forces if problem.inextensible else self._no_forces
-        self._free = free = problem.constraint.freedom(state)
         gradient = np.zeros_like(state) if problem.load is None else -problem.load
         hessians = [NO_HESSIANS] * len(self.elements) if self._chord else self._hessians[:-1]
         evaluate_all(self.elements, state, gradient, hessians)
         if self._chord:  # what the edges lack acts along those of the matrix, else strains do not settle
             stretch.add_axial(state, forces, gradient)
+            if self._curved:  # less the forces of the constraint, which act across the free directions of this state
+                gradient = problem.constraint.freedom(state).within(gradient)
             stretch.add_axial(at, base + stretch.stiffness * strains - forces, gradient)
         else:
             if self._curved:
@@ -216,7 +218,8 @@ class NewtonStep:
         size = max(float(np.abs(after).max(initial=0.0)), self._least_force)
         changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
         shrunk = moved / max(self._last[0], TINY), changed / max(self._last[1], TINY)
-        rates = shrunk if self._chord else (max(CURVED * moved, changed), changed)
+        left = MULTIPLIERS if self._problem.inextensible else changed
+        rates = shrunk if self._chord else (max(CURVED * moved, changed), left)
         self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
         self._was_chord, self._last = self._chord, (moved, changed)
         count_again = since >= STALE > changed / 3
