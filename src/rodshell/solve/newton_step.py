@@ -310,7 +310,9 @@ class NewtonStep:
         """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue."""
         start = np.sin(1.0 + np.arange(self._free.size) ** 2)[None]  # no symmetry of the shell is one of this start
         assert self._factors is not None
-        values, (row, *_), _ = subspace_iteration(self._factors.solve, start, settled=1, tolerance=0.0, most_sweeps=steps)
+        values, (row, *_), _ = subspace_iteration(
+            self._factors.solve, start, settled=1, tolerance=0.0, most_sweeps=steps
+        )
         return row, 1.0 / float(values[0])
 
 

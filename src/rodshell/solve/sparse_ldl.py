@@ -417,14 +417,9 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
     """Segments of the rows of `along` (d, n), blocks sorted by each coordinate, are divided in place until they are
     small, and stay sorted; `segment` is the segment of each block."""
     n = len(coordinates)
-    segment = np.zeros(n, dtype=np.int64)
-    rank, crossing, part = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int8)
-    kept, size, sorted_blocks = (
-        np.empty((3, n), dtype=np.int64),
-        np.zeros(3, dtype=np.int64),
-        np.empty(n, dtype=np.int64),
-    )
-    furthest = np.empty((n, 2), dtype=np.int64)
+    segment, rank, part = np.zeros(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    first, last = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    touching, kept = np.empty((2, n + 1), dtype=np.int64), np.empty((3, n + 1), dtype=np.int64)
     begins, ends = np.empty(n + 2, dtype=np.int64), np.empty(n + 2, dtype=np.int64)  # a stack of segments
     begins[0], ends[0], height = 0, n, 1
     newest = 0
@@ -433,36 +428,36 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
         begin, end = begins[height], ends[height]
         if end - begin <= LEAF:
             continue
-        here = segment[along[0, begin]]
-        longest, blocks = _longest(coordinates, along, begin, end), sorted_blocks[: end - begin]
-        for k in range(len(blocks)):
-            blocks[k] = along[longest, begin + k]
-            rank[blocks[k]] = k
-        best = _best_cut(blocks, segment, here, rank, start, neighbours, crossing, furthest)
-        _separate(blocks, rank, best, furthest, part)
+        here, longest = segment[along[0, begin]], _longest(coordinates, along, begin, end)
+        for k in range(begin, end):
+            rank[along[longest, k]] = k - begin
+        cut, joining = _best_cut(
+            along[longest, begin:end], segment, here, rank, start, neighbours, first, last, touching
+        )
+        for k in range(begin, end):
+            b = along[longest, k]
+            side = 1 if rank[b] > cut else 0
+            joins = last[b] > cut if joining == 0 else first[b] <= cut
+            part[b] = 2 if side == joining and joins else side
         for d in range(len(along)):
-            row = along[d]
-            for side in range(3):
-                size[side] = 0
+            row, none, one, two = along[d], 0, 0, 0
             for k in range(begin, end):
                 b = row[k]
-                side = part[b]
-                kept[side, size[side]] = b
-                size[side] += 1
-            at = begin
-            for side in range(3):
-                for k in range(size[side]):
-                    row[at + k] = kept[side, k]
-                at += size[side]
+                kept[0, none] = kept[1, one] = kept[2, two] = b
+                none, one, two = none + (part[b] == 0), one + (part[b] == 1), two + (part[b] == 2)
+            for k in range(none):
+                row[begin + k] = kept[0, k]
+            for k in range(one):
+                row[begin + none + k] = kept[1, k]
+            for k in range(two):
+                row[begin + none + one + k] = kept[2, k]
+        middle, stop = begin + none, begin + none + one
+        for k in range(begin, end):
+            segment[along[0, k]] = newest + 1 if k < middle else (newest + 2 if k < stop else -1)
         newest += 2
-        at = begin
-        for side in range(3):
-            for k in range(at, at + size[side]):
-                segment[along[0, k]] = newest - side if side < 2 else -1
-            if side < 2 and size[side] > 0:
-                begins[height], ends[height] = at, at + size[side]
-                height += 1
-            at += size[side]
+        begins[height], ends[height] = begin, middle
+        begins[height + 1], ends[height + 1] = middle, stop
+        height += 2
     return along[0]
 
 
@@ -478,43 +473,30 @@ def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
 
 
 @njit()
-def _best_cut(blocks, segment, here, rank, start, neighbours, crossing, furthest):  # type: ignore[no-untyped-def]
-    """Rank of the last block before the straight cut that few couplings cross, near the middle. `furthest` (n, 2)
-    returns the lowest and the highest rank to which each block is coupled in the segment, its own among them."""
+def _best_cut(blocks, segment, here, rank, start, neighbours, first, last, touching):  # type: ignore[no-untyped-def]
+    """Rank of the last block before the cut, near the middle of the sorted `blocks` of a segment, that the fewest blocks
+    join; and the side that these are on. `first` and `last` (n,) return the lowest and the highest rank to which each
+    block is coupled in the segment, its own among them; `touching` (2, n + 1) is scratch."""
     n = len(blocks)
     for k in range(n + 1):
-        crossing[k] = 0
-    for b in blocks:
-        low, high = rank[b], rank[b]
+        touching[0, k] = touching[1, k] = 0
+    for k in range(n):
+        b, low, high = blocks[k], k, k
         for e in range(start[b], start[b + 1]):
             other = neighbours[e]
-            if segment[other] == here:
-                low, high = min(low, rank[other]), max(high, rank[other])
-                if rank[other] > rank[b]:
-                    crossing[rank[b]] += 1
-                    crossing[rank[other]] -= 1
-        furthest[b, 0], furthest[b, 1] = low, high
+            at = rank[other] if segment[other] == here else k
+            low, high = min(low, at), max(high, at)
+        first[b], last[b] = low, high
+        touching[0, k] += 1  # before the cut, and coupled to what is behind it: from this cut on, up to the last
+        touching[0, high] -= 1
+        touching[1, low] += 1  # behind the cut
+        touching[1, k] -= 1
     margin = max(1, int(UNBALANCED * n))
-    best, least, across = margin - 1, np.inf, 0
+    best, least, joining, before, behind = margin - 1, np.inf, 0, 0, 0
     for k in range(n - margin):
-        across += crossing[k]
-        cost = across * (1.0 + abs(2.0 * (k + 1) / n - 1.0))
+        before += touching[0, k]
+        behind += touching[1, k]
+        cost = min(before, behind) * (1.0 + abs(2.0 * (k + 1) / n - 1.0))
         if k >= margin - 1 and cost < least:
-            best, least = k, cost
-    return best
-
-
-@njit()
-def _separate(blocks, rank, best, furthest, part):  # type: ignore[no-untyped-def]
-    """Parts 0 before and 1 after the cut, and 2, which joins them: those on one side that are coupled to the other."""
-    touching = np.zeros(2, dtype=np.int64)
-    for b in blocks:
-        side = 0 if rank[b] <= best else 1
-        part[b] = side
-        if (furthest[b, 1] > best) if side == 0 else (furthest[b, 0] <= best):
-            part[b] = 3 + side
-            touching[side] += 1
-    joining = 0 if touching[0] <= touching[1] else 1
-    for b in blocks:
-        if part[b] >= 3:
-            part[b] = 2 if part[b] - 3 == joining else part[b] - 3
+            best, least, joining = k, cost, 0 if before <= behind else 1
+    return best, joining
