@@ -474,9 +474,9 @@ def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
 
 @njit()
 def _best_cut(blocks, segment, here, rank, start, neighbours, first, last, touching):  # type: ignore[no-untyped-def]
-    """Rank of the last block before the cut, near the middle of the sorted `blocks` of a segment, that the fewest blocks
-    join; and the side that these are on. `first` and `last` (n,) return the lowest and the highest rank to which each
-    block is coupled in the segment, its own among them; `touching` (2, n + 1) is scratch."""
+    """Rank of the last block before the cut that the fewest blocks join, near the middle of the sorted `blocks` of a
+    segment; and the side that these are on. `first` and `last` (n,) return the lowest and the highest rank to which
+    each block is coupled in the segment, its own among them; `touching` (2, n + 1) is scratch."""
     n = len(blocks)
     for k in range(n + 1):
         touching[0, k] = touching[1, k] = 0
