@@ -30,7 +30,8 @@ LONGER = 2.0  # growth of the longest step after one that was not
 NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand, be it a saddle,
 NEARER = 0.5  # and at most so much of the last ones: past a limit point nothing is near, and steps do not shrink
 STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
-CHORDS, NEWTONS = 1 / 3, 5e-3  # of the last change follows at most, after a chord step and after Newton's
+SQUARED = 5e-3  # of their last change is the next one of the forces at most, after a step of Newton's;
+AGAIN = 3.0  # times as little as the last change was of the one before it, after a chord step
 CHORD = 5e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
@@ -223,7 +224,8 @@ class NewtonStep:
         rates = shrunk if self._chord else (max(CURVED * moved, changed), left)
         self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
         self._was_chord, self._last = self._chord, (moved, changed)
-        count_again = since >= STALE > changed * (CHORDS if self._was_chord else NEWTONS)
+        foreseen = changed * (AGAIN * shrunk[1] if self._was_chord else SQUARED)
+        count_again = since >= STALE > foreseen
         self._chord = moved < CHORD and not count_again and not self.negative_modes
 
     def _times(self, motion: Floats) -> Floats:
