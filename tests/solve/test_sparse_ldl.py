@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sparse
 
+import rodshell as rs
 from rodshell.solve import dense, sparse_ldl
 from rodshell.solve.sparse_ldl import Multifrontal, Qdldl, SingularError, dissect
 
@@ -73,6 +74,21 @@ def test_large_fronts_go_through_blas_and_still_agree():
     assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
     right = RANDOM.standard_normal(size)
     assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-9
+
+
+def multiplications(plan):
+    """Of the factorisation: each pivot takes its row off those below."""
+    rows, pivots = np.diff(plan.row_start), np.diff(plan.first)
+    return sum(int(((n - np.arange(k)) ** 2).sum()) for n, k in zip(rows, pivots, strict=True))
+
+
+def test_dissection_of_a_shell_takes_a_third_of_the_multiplications_of_minimum_degree():
+    """0.30 measured; 0.40 where cuts are where the fewest couplings cross, whatever number of blocks they leave."""
+    rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+    trimmed = rs.trim(rs.drape(rs.GridLayout.orthogonal(spacing=0.03, edge=0.005), rod, rs.Hemisphere(radius=0.2)))
+    solver = rs.pop_up(rs.map_back(trimmed), trimmed.boundary, rod).equilibrium.problem.pattern.solver
+    other = Multifrontal(solver.indptr, solver.indices)
+    assert multiplications(solver.plan) < 0.34 * multiplications(other.plan)
 
 
 def test_memory_that_was_not_set_is_not_read(monkeypatch):
