@@ -75,7 +75,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_put_arms": "f2 i1 i i f3",
         "_rows_to_renew": "f3 i2 f2 f b2 f2",
         "_straighten": "f2 f2 f1 i1 f2 f1 f2 f3",
-        "_sweep": "f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2",
+        "_sweep": "f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2 f",
     },
     "rods.bend_twist": {
         "_bend_twist": "f2 i2 f2 f1 f2 f1 f3 f3 f1 f2 f3",

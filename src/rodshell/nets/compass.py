@@ -209,7 +209,7 @@ def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # t
     chords that `turn` out of the tangent plane as the last ones did."""
     ahead = np.empty((len(row), 3))
     for m in range(len(row)):
-        steep, out, square = np.sqrt(_dot(gradient[m], gradient[m])), 0.0, 0.0
+        steep, out, square = np.sqrt(dot(gradient[m], gradient[m])), 0.0, 0.0
         for k in range(3):
             normal[m, k] = gradient[m, k] / steep
             out += tangent[m, k] * normal[m, k]
@@ -350,10 +350,11 @@ def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, chan
         at_a, at_b = (a[m, 0], a[m, 1], a[m, 2]), (b[m, 0], b[m, 1], b[m, 2])
         slope = (gradient[m, 0], gradient[m, 1], gradient[m, 2])
         if len(hessian):
-            step, sine[m] = layered_step(here, at_a, at_b, slope, hessian[m], heights, from_a, from_b, value[m])
+            step, volume = layered_step(here, at_a, at_b, slope, hessian[m], heights, from_a, from_b, value[m])
         else:
             x, y = less(here, at_a), less(here, at_b)
-            step, sine[m] = compass_step(x, y, x, y, slope, from_a, from_b, value[m])
+            step, volume = compass_step(x, y, x, y, slope, from_a, from_b, value[m])
+        sine[m] = sine_of(volume, slope, from_a, from_b)
         for k in range(3):
             p[m, k] -= step[k]
         change[m] = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a, from_b)
@@ -365,10 +366,9 @@ def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, chan
 @njit(error_model="numpy")
 def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """Newton's step towards |x| = from_a, |y| = from_b and f = 0 from x = P - A, y = P - B and f = level with the
-    gradient g, to be subtracted from P; and the sine of the crossing angle, y x x along the normal.
+    gradient g, to be subtracted from P; and the volume of the three gradients, see `sine_of`.
 
-    `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers. The inverse of
-    the three gradients consists of their cross products.
+    `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers.
 
     Parameters
     ----------
@@ -378,16 +378,40 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
     from_a, from_b : wanted lengths of x and y [m].
     level : f at P.
     """
-    normal, along, across = _cross(by_x, by_y), _cross(by_y, g), _cross(g, by_x)
-    volume = _dot(normal, g)
-    ra, rb = 0.5 * (_dot(x, x) - from_a * from_a) / volume, 0.5 * (_dot(y, y) - from_b * from_b) / volume
-    rest = level / volume
-    step = (
-        ra * along[0] + rb * across[0] + rest * normal[0],
-        ra * along[1] + rb * across[1] + rest * normal[1],
-        ra * along[2] + rb * across[2] + rest * normal[2],
+    inverse = inverse_of(by_x, by_y, g)
+    return solution(inverse, past(x, from_a), past(y, from_b), level), inverse[3]
+
+
+@njit(error_model="numpy")
+def inverse_of(by_x, by_y, g):  # type: ignore[no-untyped-def]
+    """The inverse of the matrix of three gradients: their cross products, which are to be divided by their volume; and
+    this volume."""
+    normal = _cross(by_x, by_y)
+    return _cross(by_y, g), _cross(g, by_x), normal, dot(normal, g)
+
+
+@njit(error_model="numpy")
+def solution(inverse, a, b, level):  # type: ignore[no-untyped-def]
+    along, across, normal, volume = inverse
+    scale = 1.0 / volume
+    a, b, level = scale * a, scale * b, scale * level
+    return (
+        a * along[0] + b * across[0] + level * normal[0],
+        a * along[1] + b * across[1] + level * normal[1],
+        a * along[2] + b * across[2] + level * normal[2],
     )
-    return step, -volume / (np.sqrt(_dot(g, g)) * from_a * from_b)
+
+
+@njit()
+def past(x, length):  # type: ignore[no-untyped-def]
+    """x^2/2 less its wanted value."""
+    return 0.5 * (dot(x, x) - length * length)
+
+
+@njit(error_model="numpy")
+def sine_of(volume, g, from_a, from_b):  # type: ignore[no-untyped-def]
+    """Sine of the crossing angle, y x x along the normal, from the volume of the gradients of x^2/2, y^2/2 and f."""
+    return -volume / (np.sqrt(dot(g, g)) * from_a * from_b)
 
 
 @njit(error_model="numpy")
@@ -404,7 +428,7 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
     from_a, from_b : wanted lengths of x and y [m].
     level : f at P.
     """
-    steep = np.sqrt(_dot(g, g))
+    steep = np.sqrt(dot(g, g))
     n = (g[0] / steep, g[1] / steep, g[2] / steep)
     x, y = less(p, a), less(p, b)
     x = (x[0] + heights[1] * n[0], x[1] + heights[1] * n[1], x[2] + heights[1] * n[2])
@@ -416,7 +440,7 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
 @njit()
 def _by_point(x, height, n, hessian):  # type: ignore[no-untyped-def]
     """x (1 + h dn/dP) with dn/dP = (1 - n n) F''/|F'|; the height comes divided by |F'|."""
-    out = _dot(x, n)
+    out = dot(x, n)
     w = (x[0] - out * n[0], x[1] - out * n[1], x[2] - out * n[2])
     return (
         x[0] + height * (hessian[0, 0] * w[0] + hessian[1, 0] * w[1] + hessian[2, 0] * w[2]),
@@ -437,5 +461,5 @@ def _cross(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit()
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

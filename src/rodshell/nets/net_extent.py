@@ -18,14 +18,14 @@ from rodshell.layout.gridlayout import auto_edge
 from rodshell.layout.mesh import edge_counts
 from rodshell.nets.compass import ON_SURFACE, Heights, Net, fill_quadrants, lay_axes
 from rodshell.nets.net_ends import inside_nodes
-from rodshell.nets.net_refinement import march_near
+from rodshell.nets.net_refinement import CONVERGED, march_near
 from rodshell.targets import Target
 from rodshell.units import length_text
 
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # steps of the first march, from the anchor each way
-ROUGH = 1e-2  # of a step: tolerance of the first march
+ROUGH = 1e-2  # of a step: tolerance of the first march; of the size, see `march_near`: of that which finds the lines
 FEWEST_STEPS = 6  # from each line to the next
 MOST_NODES = 4_000_000
 
@@ -70,6 +70,7 @@ def march_covering(
     coarser: Net | None = None,
     *,
     heights: Heights = ON_SURFACE,
+    converged: float = CONVERGED,
 ) -> Covering:
     """March a net as far as the target, and a margin past its end.
 
@@ -85,16 +86,19 @@ def march_covering(
     near : the net in longer steps.
     coarser : the same net in yet longer steps, see `march_near`.
     heights : see `Net`.
+    converged : see `march_near`.
     """
     wanted = wanted_nodes(near, 1, u, v, margin)
-    net = march_near(target, u, v, anchor, heading, near, coarser=coarser, wanted=wanted, heights=heights)
+    net = march_near(
+        target, u, v, anchor, heading, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged
+    )
     while True:
         found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
         more = wanted_nodes(found, 0, u, v, SURELY * margin) & ~wanted
         if not more.any():
             return found
         wanted |= more
-        fill_quadrants(target, net, wanted)
+        fill_quadrants(target, net, wanted, tolerance=converged**1.5)
 
 
 def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
@@ -205,7 +209,7 @@ def find_lines(
                 f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
                 f"unit, or use {_coarser(target)}"
             )
-        near = march_covering(target, u, v, start, heading, margin, near, heights=heights)
+        near = march_covering(target, u, v, start, heading, margin, near, heights=heights, converged=ROUGH)
         if not near.inside.any():
             raise InputError("no node of the net is inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare

@@ -16,21 +16,24 @@ from rodshell.nets.compass import (
     NEWTON_STEPS,
     ON_SURFACE,
     SMALLEST_SINE,
-    TOLERANCE,
     Heights,
     Layer,
     Net,
     axes,
-    compass_step,
+    dot,
     fill_quadrants,
+    inverse_of,
     lay_axes,
     layered_step,
     less,
+    past,
+    sine_of,
+    solution,
 )
 from rodshell.targets import Implicit, Target
 
 ROUNDS = 6
-CONVERGED = 2e-5  # of the target's size: motion in a round; the remaining error is its third power
+CONVERGED = 2e-5  # of the size, and of a step on local models: the last motion, of which the third power is left
 EXACT = 1e-13  # of the step, on a local model
 CLEARLY = 1.5  # ratio of the squares of the steps of two nets, above which their difference can be extrapolated
 BEYOND = 2.5  # steps of the known net by which a guess may be outside it
@@ -47,6 +50,7 @@ def march_near(
     coarser: Net | None = None,
     wanted: Bools | None = None,
     heights: Heights = ON_SURFACE,
+    converged: float = CONVERGED,
 ) -> Net:
     """March a net as `march` does, starting from a similar net; a bad guess costs time, not accuracy.
 
@@ -56,13 +60,15 @@ def march_near(
     near : the similar net.
     coarser : the same net as `near` in longer steps, from which the start is extrapolated.
     wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
+    converged : the last motion of nodes, relative to the target's size; the error that is left is its third power.
     """
     guess = near if coarser is None else _extrapolated(near, coarser, u, v)
     net = Net(u, v, interpolated(guess, u, v), heights=heights)
-    if not _refine_axes(target, net, anchor, heading):
-        lay_axes(target, net, anchor, heading)
-    _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted)
-    fill_quadrants(target, net, wanted)
+    tolerance = converged**1.5  # of Newton's method, which leaves its square
+    if not _refine_axes(target, net, anchor, heading, converged):
+        lay_axes(target, net, anchor, heading, tolerance=tolerance)
+    _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted, converged)
+    fill_quadrants(target, net, wanted, tolerance=tolerance)
     return net
 
 
@@ -95,7 +101,7 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
     return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
 
 
-def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
+def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats, converged: float) -> bool:
     """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
     i0, j0 = net.origin
     directions, starts = axes(target, anchor, heading), np.tile(anchor, (4, 1))
@@ -109,7 +115,7 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> b
         layers = [(Layer(target, height), part) for height, part in zip(net.heights, parts, strict=True)]
         starts = np.concatenate([np.tile(layer.of(anchor[None]), (2, 1)) for layer, _ in layers])
         points = np.concatenate([layer.of(points[part]) for layer, part in layers])
-    moved = np.inf
+    moved, limit = np.inf, converged * target.size
     for _ in range(ROUNDS):
         if layers:
             models = [layer.implicit(points[part]) for layer, part in layers]
@@ -117,9 +123,9 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> b
         else:
             model = target.implicit(points)
         moved = _straighten(starts, directions, steps, stops, points, *model)
-        if not moved >= CONVERGED * target.size:
+        if not moved >= limit:
             break
-    if not moved < CONVERGED * target.size:
+    if not moved < limit:
         return False
     if layers:
         points = np.concatenate([layer.below(points[part]) for layer, part in layers])
@@ -206,25 +212,29 @@ def _straighten(starts, directions, steps, stops, points, value, gradient, hessi
     return moved
 
 
-def _refine(target: Target, net: Net, wanted: Bools) -> None:
+def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> None:
     """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for nodes that do not
     converge. A round evaluates the target only where the last one moved a node: elsewhere its model is still good."""
     i0, j0 = net.origin
     row, moved, new = np.empty(wanted.shape, dtype=np.intp), np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
     models = _chosen(net.points, wanted, i0, j0, row)
     value, gradient, hessian = target.implicit(models)
-    layered, limit = net.heights != ON_SURFACE, CONVERGED * target.size
+    layered, limit = net.heights != ON_SURFACE, converged * target.size
+    tolerance = converged**1.5 if layered else converged
     normals = np.zeros_like(net.points) if layered else np.empty((0, 0, 3))
     if layered:
         normals[row >= 0] = unit(gradient[row[row >= 0]])  # exact on the axes, which stay; others follow in order
     for _ in range(ROUNDS):
         _sweep(
-            net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved
-        )
+            net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved,
+            tolerance,
+        )  # fmt: skip
         rows, unconverged = _rows_to_renew(net.points, row, moved, limit, new, models)
         if not unconverged:
             return
         value[rows], gradient[rows], hessian[rows] = target.implicit(models[rows])
+        if not layered and np.abs(value[rows]).max() <= converged**3 * target.size:
+            return  # the models were exact, as those of quadrics are
     _forget(net.points, moved >= limit, i0, j0)
 
 
@@ -272,11 +282,11 @@ def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-u
 
 @njit(error_model="numpy")
 def _sweep(  # type: ignore[no-untyped-def]
-    points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved
+    points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved, tolerance
 ):
     """March the `points` (nu, nv, 3) on second order models at `models` (n, 3); `row` (nu, nv) is the model of each, -1
     where there is none, and `moved` (nu, nv) returns the distance from it. Nodes whose models and neighbours are not
-    `new` (nu, nv) do not move.
+    `new` (nu, nv) do not move. `tolerance` : of the last change of a node, relative to its step.
 
     `normals` (nu, nv, 3) of the surface at the points are updated if rods are at `heights` above it; empty otherwise.
     """
@@ -304,19 +314,22 @@ def _sweep(  # type: ignore[no-untyped-def]
                 from_a, from_b = abs(v[j] - v[q]), abs(u[i] - u[p])
                 if layered:
                     a, b = _raised(a, heights[1], normals, i, q), _raised(b, heights[0], normals, p, j)
-                change, sine, tries = np.inf, 0.0, 0
-                while change > TOLERANCE and tries < NEWTON_STEPS:
+                step_size, change, volume, tries = min(from_a, from_b), np.inf, 0.0, 0
+                slope = (0.0, 0.0, 0.0)
+                while change > tolerance * step_size and tries < NEWTON_STEPS:
                     now = _plus(here, away)
                     level, slope = _model(r, away, value, gradient, hessian)
                     if layered:
-                        step, sine = layered_step(now, a, b, slope, hessian[r], heights, from_a, from_b, level)
+                        step, volume = layered_step(now, a, b, slope, hessian[r], heights, from_a, from_b, level)
                     else:
-                        x, y = less(now, a), less(now, b)
-                        step, sine = compass_step(x, y, x, y, slope, from_a, from_b, level)
+                        step, volume = _quadratic_step(
+                            less(now, a), less(now, b), slope, r, hessian, from_a, from_b, level
+                        )
                     away = less(away, step)
-                    change = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a, from_b)
+                    change = max(abs(step[0]), abs(step[1]), abs(step[2]))
                     tries += 1
-                if change <= TOLERANCE and sine * i_side * j_side > SMALLEST_SINE:
+                sine = i_side * j_side * sine_of(volume, slope, from_a, from_b)
+                if change <= tolerance * step_size and sine > SMALLEST_SINE:
                     moved[i, j] = max(abs(away[0]), abs(away[1]), abs(away[2]))
                     points[i, j, 0], points[i, j, 1], points[i, j, 2] = _plus(here, away)
                     if layered:
@@ -328,13 +341,33 @@ def _sweep(  # type: ignore[no-untyped-def]
                     points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
 
 
+@njit(error_model="numpy")
+def _quadratic_step(x, y, slope, r, hessian, from_a, from_b, level):  # type: ignore[no-untyped-def]
+    """As `compass_step`, of third order (Chebyshev's method): on a second order model all three equations are
+    quadratic, so that what a step leaves of them is known: half its square, twice, and half its product with F''."""
+    inverse = inverse_of(x, y, slope)
+    step = solution(inverse, past(x, from_a), past(y, from_b), level)
+    square = 0.5 * dot(step, step)
+    more = solution(inverse, square, square, 0.5 * dot(step, _bent(r, step, hessian)))
+    return _plus(step, more), inverse[3]
+
+
+@njit()
+def _bent(r, away, hessian):  # type: ignore[no-untyped-def]
+    """The product of the Hessian r with the vector `away`."""
+    x, y, z = away
+    return (
+        hessian[r, 0, 0] * x + hessian[r, 0, 1] * y + hessian[r, 0, 2] * z,
+        hessian[r, 1, 0] * x + hessian[r, 1, 1] * y + hessian[r, 1, 2] * z,
+        hessian[r, 2, 0] * x + hessian[r, 2, 1] * y + hessian[r, 2, 2] * z,
+    )
+
+
 @njit()
 def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
     """Value and gradient of the second order model r, at a distance `away` from its point."""
     x, y, z = away
-    bx = hessian[r, 0, 0] * x + hessian[r, 0, 1] * y + hessian[r, 0, 2] * z
-    by = hessian[r, 1, 0] * x + hessian[r, 1, 1] * y + hessian[r, 1, 2] * z
-    bz = hessian[r, 2, 0] * x + hessian[r, 2, 1] * y + hessian[r, 2, 2] * z
+    bx, by, bz = _bent(r, away, hessian)
     gx, gy, gz = gradient[r, 0], gradient[r, 1], gradient[r, 2]
     level = value[r] + (gx + 0.5 * bx) * x + (gy + 0.5 * by) * y + (gz + 0.5 * bz) * z
     return level, (gx + bx, gy + by, gz + bz)
