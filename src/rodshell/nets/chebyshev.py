@@ -20,7 +20,7 @@ from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import rod_names
-from rodshell.nets.compass import ON_SURFACE
+from rodshell.nets.compass import ON_SURFACE, Axes, axes
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
 from rodshell.targets import Target
@@ -126,7 +126,7 @@ def chebyshev_net(
     if anchor is not None:
         point("anchor", anchor)
     number("eccentricity", eccentricity, "m")
-    start, heading = _start(target, layout, anchor)
+    start = _start(target, layout, anchor)
     if max(layout.spacing) >= 2 * target.size:
         raise InputError(
             f"the spacing {max(layout.spacing):g} m is larger than the target, which is {2 * target.size:g} m wide: "
@@ -140,9 +140,9 @@ def chebyshev_net(
     heights = (-0.5 * eccentricity, 0.5 * eccentricity) if eccentricity else ON_SURFACE
     similar = warm_start.net if warm_start else None
     for parts in SEARCHES:
-        lines, rough = find_lines(target, layout, start, heading, similar, parts, heights)
-        coarse = march_lines(target, layout, lines, start, heading, 2, rough, heights=heights)
-        fine = march_lines(target, layout, lines, start, heading, 1, coarse, rough, heights=heights)
+        lines, rough = find_lines(target, layout, start, similar, parts, heights)
+        coarse = march_lines(target, layout, lines, start, 2, rough, heights=heights)
+        fine = march_lines(target, layout, lines, start, 1, coarse, rough, heights=heights)
         if not (fine.inside[[0, -1]].any() or fine.inside[:, [0, -1]].any()):
             break
     else:
@@ -172,9 +172,8 @@ def chebyshev_net(
     )
 
 
-def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> tuple[Floats, Floats]:
-    """The anchor, lifted vertically onto the target, and the tangent along the heading in plan; with that of the other
-    axis where the families do not cross at right angles."""
+def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> Axes:
+    """The axes through the anchor, lifted vertically onto the target, the first along the heading in plan."""
     x, y = anchor if anchor is not None else target.summit
     remedy = "leave it out for the highest point, or let a search choose (--anchor auto)"
     try:
@@ -187,9 +186,9 @@ def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | Non
     plan = np.array([cos(layout.rotate), sin(layout.rotate)])
     along = np.array([*plan * n[2], -plan @ n[:2]])
     if layout.crossing == pi / 2:
-        return lifted[0], along
+        return axes(target, lifted[0], along)
     both = cos(layout.crossing) * along + sin(layout.crossing) * np.cross(n, along)
-    return lifted[0], np.stack([along, both])
+    return axes(target, lifted[0], np.stack([along, both]))
 
 
 def _require_room(target: Target, net: Covering, height: float) -> None:

@@ -11,6 +11,7 @@ The net's points P are on the target, between the layers.
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,6 +54,19 @@ class Net:
         return int(np.argmin(np.abs(self.u))), int(np.argmin(np.abs(self.v)))
 
 
+class Axes(NamedTuple):
+    """Where the axes of a net cross.
+
+    Parameters
+    ----------
+    anchor : (3,) point of the surface [m].
+    tangents : (4, 3) unit tangents there, towards +u, -u, +v and -v.
+    """
+
+    anchor: Floats
+    tangents: Floats
+
+
 def march(
     target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats, *, heights: Heights = ON_SURFACE
 ) -> Net:
@@ -62,57 +76,57 @@ def march(
     ----------
     target : the surface.
     u, v : ascending material coordinates of the lines, both containing 0 [m].
-    anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
-        parts in the tangent plane are used.
+    anchor, heading : see `axes`.
     heights : see `Net`.
     """
     points = np.full((len(u), len(v), 3), np.nan)
     net = Net(u, v, points, heights=heights)
-    lay_axes(target, net, anchor, heading)
+    lay_axes(target, net, axes(target, anchor, heading))
     fill_quadrants(target, net)
     return net
 
 
-def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats, *, tolerance: float = TOLERANCE) -> None:
+def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERANCE) -> None:
     """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
 
     Parameters
     ----------
-    target, anchor, heading : see `march`.
+    target : the surface.
+    start : where the axes cross.
     net : whose points on the axes are set.
     tolerance : see `geodesics`.
     """
     i0, j0 = net.origin
+    anchor, tangents = start
     net.points[i0, j0] = anchor
     steps = [np.diff(net.u[i0:]), np.diff(-net.u[i0::-1]), np.diff(net.v[j0:]), np.diff(-net.v[j0::-1])]
-    directions = axes(target, anchor, heading)
     if net.heights == ON_SURFACE:
-        arms = geodesics(target, np.tile(anchor, (4, 1)), directions, steps, tolerance=tolerance)
+        arms = geodesics(target, np.repeat(anchor[None], 4, axis=0), tangents, steps, tolerance=tolerance)
     else:
         arms = list[Floats]()
         for height, pair in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
             layer = Layer(target, height)
-            start = np.tile(layer.of(anchor[None]), (2, 1))
-            on_layer = geodesics(layer, start, directions[pair], steps[pair], tolerance=tolerance)
+            begin = np.repeat(layer.of(anchor[None]), 2, axis=0)
+            on_layer = geodesics(layer, begin, tangents[pair], steps[pair], tolerance=tolerance)
             arms += [layer.below(arm) for arm in on_layer]
     net.points[i0 + 1 :, j0], net.points[i0 - 1 :: -1, j0] = arms[0], arms[1] if i0 else arms[1][:0]
     net.points[i0, j0 + 1 :], net.points[i0, j0 - 1 :: -1] = arms[2], arms[3] if j0 else arms[3][:0]
 
 
-def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
-    """Unit tangents (4, 3) at the anchor towards +u, -u, +v and -v; see `march`.
+def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
+    """The axes through a point of a surface.
 
     Parameters
     ----------
     target : the surface.
     anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) or (2, 3), see `march`.
+    heading : (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
+        parts in the tangent plane are used.
     """
     normal = target.level(anchor[None])[1][0]
     along = heading - (heading @ normal / (normal @ normal))[..., None] * normal
     both = unit(along if along.ndim == 2 else np.stack([along, cross(normal, along)]))
-    return np.stack([both, -both], axis=1).reshape(4, 3)
+    return Axes(anchor, np.stack([both, -both], axis=1).reshape(4, 3))
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from rodshell.layout import GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import auto_edge
 from rodshell.layout.mesh import edge_counts
-from rodshell.nets.compass import ON_SURFACE, Heights, Net, fill_quadrants, lay_axes
+from rodshell.nets.compass import ON_SURFACE, Axes, Heights, Net, fill_quadrants, lay_axes
 from rodshell.nets.net_ends import inside_nodes
 from rodshell.nets.net_refinement import CONVERGED, march_near
 from rodshell.targets import Target
@@ -63,8 +63,7 @@ def march_covering(
     target: Target,
     u: Floats,
     v: Floats,
-    anchor: Floats,
-    heading: Floats,
+    start: Axes,
     margin: Floats,
     near: Covering,
     coarser: Net | None = None,
@@ -80,8 +79,7 @@ def march_covering(
     ----------
     target : the surface.
     u, v : (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
-    anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there.
+    start : where the axes cross.
     margin : (2,) along u and v [m].
     near : the net in longer steps.
     coarser : the same net in yet longer steps, see `march_near`.
@@ -89,9 +87,7 @@ def march_covering(
     converged : see `march_near`.
     """
     wanted = wanted_nodes(near, 1, u, v, margin)
-    net = march_near(
-        target, u, v, anchor, heading, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged
-    )
+    net = march_near(target, u, v, start, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged)
     while True:
         found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
         more = wanted_nodes(found, 0, u, v, SURELY * margin) & ~wanted
@@ -168,8 +164,7 @@ class LatticeLines:
 def find_lines(
     target: Target,
     layout: GridLayout,
-    start: Floats,
-    heading: Floats,
+    start: Axes,
     near: Covering | None,
     parts: int,
     heights: Heights = ON_SURFACE,
@@ -180,8 +175,7 @@ def find_lines(
     ----------
     target : the surface.
     layout : whose lines are wanted.
-    start : (3,) the anchor [m].
-    heading : (3,) direction of the u axis there.
+    start : where the axes cross.
     near : a net that may be similar, or None.
     parts : steps of the march per spacing.
     heights : see `Net`.
@@ -196,7 +190,7 @@ def find_lines(
     """
     step, margin = _across(layout) / parts, MARGIN * _across(layout)
     spare = np.repeat(margin, 2)
-    near = near or _stride(target, start, heading, heights)
+    near = near or _stride(target, start, heights)
     reach = np.minimum(near.reach(1) + spare, 4 * target.size)
     for _ in range(12):
         u, v = (
@@ -209,7 +203,7 @@ def find_lines(
                 f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
                 f"unit, or use {_coarser(target)}"
             )
-        near = march_covering(target, u, v, start, heading, margin, near, heights=heights, converged=ROUGH)
+        near = march_covering(target, u, v, start, margin, near, heights=heights, converged=ROUGH)
         if not near.inside.any():
             raise InputError("no node of the net is inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare
@@ -227,11 +221,11 @@ def _across(layout: GridLayout) -> Floats:
     return np.array(layout.spacing[::-1])
 
 
-def _stride(target: Target, start: Floats, heading: Floats, heights: Heights) -> Covering:
+def _stride(target: Target, start: Axes, heights: Heights) -> Covering:
     """The first net, in long steps: its axes, and the nodes between the parts of them that are inside."""
     s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(STRIDE * target.size)
     net = Net(s, s, np.full((len(s), len(s), 3), np.nan), heights=heights)
-    lay_axes(target, net, start, heading, tolerance=ROUGH)
+    lay_axes(target, net, start, tolerance=ROUGH)
     inside = target.margin(np.concatenate([net.points[:, STRIDES], net.points[STRIDES]])).reshape(2, -1) > 0
     rows, columns = (_around(axis) for axis in inside)
     fill_quadrants(target, net, rows[:, None] & columns, tolerance=ROUGH)
@@ -257,8 +251,7 @@ def march_lines(
     target: Target,
     layout: GridLayout,
     lines: LatticeLines,
-    start: Floats,
-    heading: Floats,
+    start: Axes,
     every: int,
     *near: Covering,
     heights: Heights = ON_SURFACE,
@@ -270,14 +263,13 @@ def march_lines(
     target : the surface.
     layout : of the lines.
     lines : see `find_lines`.
-    start : (3,) the anchor [m].
-    heading : (3,) direction of the u axis there.
+    start : where the axes cross.
     every : 1 for all nodes, 2 for every second node.
     near : one or two nets in longer steps, the finer first.
     heights : see `Net`.
     """
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
-    return march_covering(target, u, v, start, heading, MARGIN * _across(layout), *near, heights=heights)
+    return march_covering(target, u, v, start, MARGIN * _across(layout), *near, heights=heights)
 
 
 def _refuse_too_many(target: Target, layout: GridLayout, lines: LatticeLines) -> None:

@@ -16,10 +16,10 @@ from rodshell.nets.compass import (
     NEWTON_STEPS,
     ON_SURFACE,
     SMALLEST_SINE,
+    Axes,
     Heights,
     Layer,
     Net,
-    axes,
     dot,
     fill_quadrants,
     inverse_of,
@@ -43,8 +43,7 @@ def march_near(
     target: Target,
     u: Floats,
     v: Floats,
-    anchor: Floats,
-    heading: Floats,
+    start: Axes,
     near: Net,
     *,
     coarser: Net | None = None,
@@ -56,7 +55,8 @@ def march_near(
 
     Parameters
     ----------
-    target, u, v, anchor, heading, heights : see `march`.
+    target, u, v, heights : see `march`.
+    start : where the axes cross.
     near : the similar net.
     coarser : the same net as `near` in longer steps, from which the start is extrapolated.
     wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
@@ -65,8 +65,8 @@ def march_near(
     guess = near if coarser is None else _extrapolated(near, coarser, u, v)
     net = Net(u, v, interpolated(guess, u, v), heights=heights)
     tolerance = converged**1.5  # of Newton's method, which leaves its square
-    if not _refine_axes(target, net, anchor, heading, converged):
-        lay_axes(target, net, anchor, heading, tolerance=tolerance)
+    if not _refine_axes(target, net, start, converged):
+        lay_axes(target, net, start, tolerance=tolerance)
     _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted, converged)
     fill_quadrants(target, net, wanted, tolerance=tolerance)
     return net
@@ -98,14 +98,14 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
     (nu, nv, 3) points [m]; NaN further away.
     """
     i0, j0 = net.origin
-    return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
+    return np.asarray(resampled(net.u, net.v, net.points.reshape(len(net.u), -1), i0, j0, u, v, BEYOND))
 
 
-def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats, converged: float) -> bool:
+def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> bool:
     """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
     i0, j0 = net.origin
-    directions, starts = axes(target, anchor, heading), np.tile(anchor, (4, 1))
-    net.points[i0, j0] = anchor
+    starts = np.repeat(start.anchor[None], 4, axis=0)
+    net.points[i0, j0] = start.anchor
     points, steps, stops = _arms(net.points, net.u, net.v, i0, j0)
     if not np.isfinite(points).all():
         return False
@@ -113,7 +113,7 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats, conv
     if net.heights != ON_SURFACE:  # each axis on its own
         parts = slice(0, stops[2]), slice(stops[2], stops[4])
         layers = [(Layer(target, height), part) for height, part in zip(net.heights, parts, strict=True)]
-        starts = np.concatenate([np.tile(layer.of(anchor[None]), (2, 1)) for layer, _ in layers])
+        starts = np.concatenate([np.repeat(layer.of(start.anchor[None]), 2, axis=0) for layer, _ in layers])
         points = np.concatenate([layer.of(points[part]) for layer, part in layers])
     moved, limit = np.inf, converged * target.size
     for _ in range(ROUNDS):
@@ -122,7 +122,7 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats, conv
             model = Implicit(*(np.concatenate(values) for values in zip(*models, strict=True)))
         else:
             model = target.implicit(points)
-        moved = _straighten(starts, directions, steps, stops, points, *model)
+        moved = _straighten(starts, start.tangents, steps, stops, points, *model)
         if not moved >= limit:
             break
     if not moved < limit:
@@ -135,7 +135,7 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats, conv
 
 @njit()
 def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
-    """The nodes (n, 3) of the axes but the anchor, one arm after the other, in the order of `axes` and outwards; the
+    """The nodes (n, 3) of the axes but the anchor, one arm after the other, outwards as `Axes.tangents`; the
     steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
     stops = np.zeros(5, dtype=np.intp)
     for arm in range(4):
