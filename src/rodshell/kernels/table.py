@@ -67,7 +67,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_squares": "f3 f1 f1",
     },
     "nets.net_extent": {
-        "_wanted": "b2 f1 f1 i f1 f1 f f",
+        "_want": "b2 f1 f1 i f1 f1 f f b2",
     },
     "nets.net_refinement": {
         "_arms": "f3 f1 f1 i i",

@@ -51,7 +51,7 @@ class Net:
     @cached_property
     def origin(self) -> tuple[int, int]:
         """Indices of the anchor, (u, v) = (0, 0)."""
-        return int(np.argmin(np.abs(self.u))), int(np.argmin(np.abs(self.v)))
+        return int(np.abs(self.u).argmin()), int(np.abs(self.v).argmin())
 
 
 class Axes(NamedTuple):

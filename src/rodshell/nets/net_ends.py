@@ -61,22 +61,31 @@ def inside_nodes(target: Target, net: Net) -> Bools:
 
 @njit()
 def _connect(region, reached):  # type: ignore[no-untyped-def]
-    """Extend the nodes `reached` (nu, nv) to all nodes of the `region` (nu, nv) that are connected with them."""
-    nu, nv = region.shape
-    stack, top = np.empty((region.size, 2), dtype=np.intp), 0
-    for i in range(nu):
-        for j in range(nv):
-            if reached[i, j]:
-                stack[top, 0], stack[top, 1] = i, j
-                top += 1
-    while top > 0:
-        top -= 1
-        i, j = stack[top, 0], stack[top, 1]
-        for p, q in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
-            if 0 <= p < nu and 0 <= q < nv and region[p, q] and not reached[p, q]:
-                reached[p, q] = True
-                stack[top, 0], stack[top, 1] = p, q
-                top += 1
+    """Extend the nodes `reached` (nu, nv) to all nodes of the `region` (nu, nv) that are connected with them: a run of
+    nodes is reached from any of them, or from a run next to it."""
+    runs = _runs(region)
+    found, pairs = np.zeros(len(runs), dtype=np.bool_), np.empty((2 * len(runs), 2), dtype=np.intp)
+    first, count, changed = 0, 0, True
+    for r in range(len(runs)):
+        i = runs[r, 0]
+        for j in range(runs[r, 1], runs[r, 2] + 1):
+            found[r] |= reached[i, j]
+        while first < r and (runs[first, 0] < i - 1 or (runs[first, 0] == i - 1 and runs[first, 2] < runs[r, 1])):
+            first += 1
+        s = first
+        while runs[s, 0] == i - 1 and runs[s, 1] <= runs[r, 2]:
+            pairs[count, 0], pairs[count, 1] = s, r
+            count, s = count + 1, s + 1
+    while changed:
+        changed = False
+        for n in range(2 * count):  # there and back
+            r, s = pairs[min(n, 2 * count - 1 - n)]
+            if found[r] != found[s]:
+                found[r] = found[s] = changed = True
+    for r in range(len(runs)):
+        if found[r]:
+            for j in range(runs[r, 1], runs[r, 2] + 1):
+                reached[runs[r, 0], j] = True
 
 
 def _region(target: Target, net: Net) -> Bools:

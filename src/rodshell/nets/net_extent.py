@@ -90,10 +90,8 @@ def march_covering(
     net = march_near(target, u, v, start, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged)
     while True:
         found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
-        more = wanted_nodes(found, 0, u, v, SURELY * margin) & ~wanted
-        if not more.any():
+        if not _want(found.inside, u, v, 0, u, v, *(SURELY * margin), wanted):
             return found
-        wanted |= more
         fill_quadrants(target, net, wanted, tolerance=converged**1.5)
 
 
@@ -111,16 +109,17 @@ def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats
     -------
     (nu, nv) booleans.
     """
-    if not near.inside.any():
-        return np.ones((len(u), len(v)), dtype=bool)
-    return np.asarray(_wanted(near.inside, near.u, near.v, past, u, v, *margin))
+    wanted = np.zeros((len(u), len(v)), dtype=bool)
+    _want(near.inside, near.u, near.v, past, u, v, *margin, wanted)
+    return wanted
 
 
 @njit()
-def _wanted(inside, known_u, known_v, past, u, v, margin_u, margin_v):  # type: ignore[no-untyped-def]
-    """See `wanted_nodes`. In each quadrant the nodes are below a staircase that only descends, away from the axis."""
-    wanted = np.zeros((len(u), len(v)), dtype=np.bool_)
+def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # type: ignore[no-untyped-def]
+    """Add to the `wanted` nodes, see `wanted_nodes`; return whether any was not wanted before. In each quadrant they
+    are below a staircase that only descends, away from the axis."""
     i_axis, j_axis, (nu, nv) = np.argmin(np.abs(u)), np.argmin(np.abs(v)), inside.shape
+    added, nothing = False, not inside.any()
     for quadrant in range(4):
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
         ends, height = np.full(nu + 1, np.inf), np.full(nu + 1, -np.inf)  # end and height of each step
@@ -132,17 +131,23 @@ def _wanted(inside, known_u, known_v, past, u, v, margin_u, margin_v):  # type: 
                 if inside[i, j]:
                     height[k] = max(height[k], j_side * known_v[min(max(j + j_side * past, 0), nv - 1)])
                     break
-        k, shifted = 0, 0
+        k, shifted, count = 0, 0, len(v) - j_axis if j_side > 0 else j_axis + 1
         for i in range(i_axis, len(u) if i_side > 0 else -1, i_side):
             while ends[k] < abs(u[i]):
                 k += 1
             while ends[shifted] + margin_u < abs(u[i]):
                 shifted += 1
-            for j in range(j_axis, len(v) if j_side > 0 else -1, j_side):
-                if abs(v[j]) > max(height[shifted], height[k] + margin_v):
-                    break
+            while (
+                not nothing
+                and count > 0
+                and abs(v[j_axis + j_side * (count - 1)]) > max(height[shifted], height[k] + margin_v)
+            ):
+                count -= 1
+            first = j_axis if j_side > 0 else j_axis + 1 - count
+            for j in range(first, first + count):
+                added |= not wanted[i, j]
                 wanted[i, j] = True
-    return wanted
+    return added
 
 
 @dataclass(frozen=True, eq=False)

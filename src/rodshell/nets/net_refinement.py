@@ -67,8 +67,8 @@ def march_near(
     tolerance = converged**1.5  # of Newton's method, which leaves its square
     if not _refine_axes(target, net, start, converged):
         lay_axes(target, net, start, tolerance=tolerance)
-    _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted, converged)
-    fill_quadrants(target, net, wanted, tolerance=tolerance)
+    if not _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted, converged):
+        fill_quadrants(target, net, wanted, tolerance=tolerance)
     return net
 
 
@@ -177,6 +177,7 @@ def _straighten(starts, directions, steps, stops, points, value, gradient, hessi
             m, p = (k + 1) % 3, (k + 2) % 3
             point[k], tangent[k] = starts[arm, k], directions[arm, k]
             normal[k] = directions[0, m] * directions[2, p] - directions[0, p] * directions[2, m]
+        turn = 0.0  # of the last chord out of the tangent plane, the first guess of the next one's
         for s in range(stops[arm], stops[arm + 1]):
             h, square = steps[s], 0.0
             out = tangent[0] * normal[0] + tangent[1] * normal[1] + tangent[2] * normal[2]
@@ -185,7 +186,7 @@ def _straighten(starts, directions, steps, stops, points, value, gradient, hessi
                 square += flat[k] * flat[k]
             for k in range(3):
                 flat[k] /= np.sqrt(square)
-            turn, change = 0.0, np.inf
+            change = np.inf
             for _ in range(NEWTON_STEPS):
                 cos, sin = np.cos(turn), np.sin(turn)
                 for k in range(3):
@@ -212,12 +213,15 @@ def _straighten(starts, directions, steps, stops, points, value, gradient, hessi
     return moved
 
 
-def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> None:
+def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
     """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for nodes that do not
-    converge. A round evaluates the target only where the last one moved a node: elsewhere its model is still good."""
+    converge. Return whether all did.
+
+    A round evaluates the target only where the last one moved a node: elsewhere its model is still good.
+    """
     i0, j0 = net.origin
     row, moved, new = np.empty(wanted.shape, dtype=np.intp), np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
-    models = _chosen(net.points, wanted, i0, j0, row)
+    models, guessed = _chosen(net.points, wanted, i0, j0, row)
     value, gradient, hessian = target.implicit(models)
     layered, limit = net.heights != ON_SURFACE, converged * target.size
     tolerance = converged**1.5 if layered else converged
@@ -229,46 +233,46 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> None:
             net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved,
             tolerance,
         )  # fmt: skip
-        rows, unconverged = _rows_to_renew(net.points, row, moved, limit, new, models)
-        if not unconverged:
-            return
+        rows, found = _rows_to_renew(net.points, row, moved, limit, new, models)
+        if len(rows) == 0:
+            return bool(guessed and found)
         value[rows], gradient[rows], hessian[rows] = target.implicit(models[rows])
         if not layered and np.abs(value[rows]).max() <= converged**3 * target.size:
-            return  # the models were exact, as those of quadrics are
+            return bool(guessed and found)  # models with F = 0 there were exact, as those of quadrics are
     _forget(net.points, moved >= limit, i0, j0)
+    return False
 
 
 @njit()
 def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
-    """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes; the others become NaN.
-    `row` (nu, nv) is the index of each in the result, -1 for the others."""
-    count = 0
+    """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes, the others become NaN;
+    and whether there is one of each. `row` (nu, nv) is the index of each in the result, -1 for the others."""
+    chosen, count, whole = np.empty((row.size, 3)), 0, True
     for i in range(row.shape[0]):
         for j in range(row.shape[1]):
-            row[i, j] = -1
-            if (wanted[i, j] or i == i0 or j == j0) and not np.isnan(points[i, j, 0]):
+            asked, row[i, j] = wanted[i, j] or i == i0 or j == j0, -1
+            if asked and not np.isnan(points[i, j, 0]):
                 row[i, j] = count
+                for k in range(3):
+                    chosen[count, k] = points[i, j, k]
                 count += 1
-    chosen = np.empty((count, 3))
-    for i in range(row.shape[0]):
-        for j in range(row.shape[1]):
-            for k in range(3):
-                if row[i, j] < 0:
+            else:
+                whole &= not asked
+                for k in range(3):
                     points[i, j, k] = np.nan
-                else:
-                    chosen[row[i, j], k] = points[i, j, k]
-    return chosen
+    return chosen[:count], whole
 
 
 @njit()
 def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-untyped-def]
     """The rows (n,) of nodes that have `moved` by more than the `limit`, whose `models` are put where they are now and
-    which alone are `new`; and whether there are any."""
-    count = 0
+    which alone are `new`; and whether no node was lost."""
+    count, whole = 0, True
     for i in range(row.shape[0]):
         for j in range(row.shape[1]):
             new[i, j] = moved[i, j] >= limit
             count += new[i, j]
+            whole &= row[i, j] < 0 or not np.isnan(moved[i, j])
     rows, filled = np.empty(count, dtype=np.intp), 0
     for i in range(row.shape[0] if count > 0 else 0):
         for j in range(row.shape[1]):
@@ -277,7 +281,7 @@ def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-u
                 filled += 1
                 for k in range(3):
                     models[row[i, j], k] = points[i, j, k]
-    return rows, count > 0
+    return rows, whole
 
 
 @njit(error_model="numpy")
