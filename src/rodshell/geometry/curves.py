@@ -24,16 +24,24 @@ def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
     -------
     (n, d) values at `s`.
     """
-    result = np.zeros((points.shape[0], points.shape[2]))
+    result = np.empty((points.shape[0], points.shape[2]))
     for n in range(len(s)):
-        for j in range(knots.shape[1]):
-            weight = 1.0
-            for k in range(knots.shape[1]):
-                if j != k:
-                    weight *= (s[n] - knots[n, k]) / (knots[n, j] - knots[n, k])
-            for d in range(points.shape[2]):
-                result[n, d] += weight * points[n, j, d]
+        put_lagrange(knots, points, n, s[n], result, n)
     return result
+
+
+@njit(error_model="numpy")
+def put_lagrange(knots, points, n, at, result, row):  # type: ignore[no-untyped-def]
+    """Put the value `at` a parameter of polynomial n of `lagrange` into a row of the result."""
+    for d in range(points.shape[2]):
+        result[row, d] = 0.0
+    for j in range(knots.shape[1]):
+        weight = 1.0
+        for k in range(knots.shape[1]):
+            if j != k:
+                weight *= (at - knots[n, k]) / (knots[n, j] - knots[n, k])
+        for d in range(points.shape[2]):
+            result[row, d] += weight * points[n, j, d]
 
 
 def on_curve(knots: Floats, points: Floats, s: Floats) -> Floats:

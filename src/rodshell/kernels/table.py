@@ -61,7 +61,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_by_squares": "f3 i2 f1 f1",
         "_connect": "b2 b2",
         "_extrapolate": "i1 f2 i1 f2 f f2 f1",
-        "_narrow": "f1 f1 i1 f1 f2 b",
+        "_narrow": "f1 f2 f3 f1 i1 f2 f2 b",
         "_runs": "b2",
         "_set_inside": "i2 f1 b2",
         "_squares": "f3 f1 f1",

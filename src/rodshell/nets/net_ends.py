@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.geometry.curves import lagrange
+from rodshell.geometry.curves import lagrange, put_lagrange
 from rodshell.kernels import njit
 from rodshell.nets.compass import Net
 from rodshell.targets import Target
@@ -256,34 +256,31 @@ def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: 
     """
     below = np.minimum(target.margin(lagrange(knots, points, outer)), 0.0)
     above = target.margin(lagrange(knots, points, inner))
-    found, index, at = inner.copy(), np.arange(len(inner)), inner.copy()
+    found, index, there = inner.copy(), np.arange(len(inner)), np.empty((len(inner), 3))
     bracket = np.stack([outer, inner, below, above, np.zeros(len(inner)), 1e-15 * (np.abs(outer) + np.abs(inner))])
-    left = _narrow(above, found, index, at, bracket, True)
+    left = _narrow(above, knots, points, found, index, bracket, there, True)
     for _ in range(MOST_STEPS):
         if left == 0:
             break
-        here = index[:left]
-        value = target.margin(lagrange(knots[here], points[here], at[:left]))
-        left = _narrow(value, found, index, at, bracket, False)
+        left = _narrow(target.margin(there[:left]), knots, points, found, index, bracket, there, False)
     return found
 
 
 @njit(error_model="numpy")
-def _narrow(value, found, index, at, bracket, first):  # type: ignore[no-untyped-def]
+def _narrow(value, knots, points, found, index, bracket, there, first):  # type: ignore[no-untyped-def]
     """One step of `_roots`: the brackets of the roots that are left are narrowed by the `value` (n,) at their last
     guess, except the `first` time. Returns how many roots are left: these are moved to the front.
 
     found : (m,) the last guess of every root.
-    index, at : (m,) of those that are left: the root, and the next guess.
+    index, there : (m,), (m, 3) of those that are left: the root, and the point at its next guess.
     bracket : (6, m) of those: outer and inner end, the values there, the end that moved last (1 for the inner, -1 for
         the outer), and the smallest step.
     """
     left = 0
     for k in range(len(value)):
         outer, inner, below, above = bracket[0, k], bracket[1, k], bracket[2, k], bracket[3, k]
-        side, tiny, before = bracket[4, k], bracket[5, k], at[k]
+        side, tiny, before = bracket[4, k], bracket[5, k], found[index[k]]
         if not first:
-            found[index[k]] = before
             if value[k] > 0.0:
                 below, above, inner = (0.5 if side > 0.0 else 1.0) * below, value[k], before
                 side = 1.0
@@ -294,10 +291,11 @@ def _narrow(value, found, index, at, bracket, first):  # type: ignore[no-untyped
                 continue
         share = above / (above - below)
         guess = inner + (share if np.isfinite(share) else 0.5) * (outer - inner)
+        found[index[k]] = guess
         if not first and not abs(guess - before) > tiny:
-            found[index[k]] = guess
             continue
-        index[left], at[left] = index[k], guess
+        index[left] = index[k]
+        put_lagrange(knots, points, index[k], guess, there, left)
         bracket[0, left], bracket[1, left], bracket[2, left] = outer, inner, below
         bracket[3, left], bracket[4, left], bracket[5, left] = above, side, tiny
         left += 1

@@ -236,9 +236,10 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
         rows, found = _rows_to_renew(net.points, row, moved, limit, new, models)
         if len(rows) == 0:
             return bool(guessed and found)
-        value[rows], gradient[rows], hessian[rows] = target.implicit(models[rows])
-        if not layered and np.abs(value[rows]).max() <= converged**3 * target.size:
+        now = target.implicit(models[rows])
+        if not layered and np.abs(now.value).max() <= converged**3 * target.size:
             return bool(guessed and found)  # models with F = 0 there were exact, as those of quadrics are
+        value[rows], gradient[rows], hessian[rows] = now
     _forget(net.points, moved >= limit, i0, j0)
     return False
 
