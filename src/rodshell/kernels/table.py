@@ -49,10 +49,10 @@ KERNELS: dict[str, dict[str, str]] = {
     },
     "nets.compass": {
         "_begin_chords": "f1 i1 f2 f2 f2 f2 f2 f1",
-        "_end_chords": "f1 i1 f2 f2 f f1 f1 f2 f2",
+        "_end_chords": "f2 i i1 f2 f2 f f1 f1 f2 f3",
         "_keep": "i2 f2 f2 f1 f1 f f3 b2",
         "_next_nodes": "f3 b2 f1 f1 i i i",
-        "_still_going": "f1 i1 i f2 f2 f1",
+        "_still_going": "f2 i i1 i f2 f2 f1",
         "_towards": "f2 f2 f2 f2 ff f1 f2 f3 f f1 f1",
         "_turn_chords": "f1 i1 f2 f2 f2 f1 f2 f f1 f1 f2",
     },

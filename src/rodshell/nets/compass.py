@@ -190,8 +190,8 @@ def geodesics(
     path = np.full((*chords.shape, 3), np.nan)
     row, turn, change = np.arange(count), np.zeros(count), np.empty(count)
     here, tangent, flat, normal = start.copy(), direction.copy(), np.empty((count, 3)), np.empty((count, 3))
-    for chord, reached in zip(chords, path, strict=True):
-        count = _still_going(chord, row, count, here, tangent, turn)
+    count = _still_going(chords, 0, row, count, here, tangent, turn)
+    for n, chord in enumerate(chords):
         if count == 0:
             break
         going = row[:count]
@@ -200,16 +200,16 @@ def geodesics(
             value, gradient = target.level(ahead)
             if not _turn_chords(chord, going, here, flat, normal, value, gradient, tolerance, turn, change, ahead):
                 break
-        _end_chords(chord, going, here, ahead, tolerance, turn, change, tangent, reached)
+        count = _end_chords(chords, n, row, here, ahead, tolerance, turn, change, tangent, path)
     return [path[: len(s), k] for k, s in enumerate(steps)]
 
 
 @njit()
-def _still_going(chord, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
-    """Of the first `count` geodesics those that have a next chord and were not lost, moved to the front."""
+def _still_going(chords, n, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
+    """Of the first `count` geodesics those that have a chord n and were not lost, moved to the front."""
     left = 0
-    for m in range(count):
-        if chord[row[m]] > 0.0 and np.isfinite(here[m, 0]):
+    for m in range(count if n < len(chords) else 0):
+        if chords[n, row[m]] > 0.0 and np.isfinite(here[m, 0]):
             row[left], turn[left] = row[m], turn[m]
             for k in range(3):
                 here[left, k], tangent[left, k] = here[m, k], tangent[m, k]
@@ -259,13 +259,15 @@ def _turn_chords(  # type: ignore[no-untyped-def]
 
 
 @njit()
-def _end_chords(chord, row, here, ahead, tolerance, turn, change, tangent, reached):  # type: ignore[no-untyped-def]
-    """Continue from the points `ahead`, which are also `reached` (k, 3); NaN for chords that found none."""
-    for m in range(len(row)):
+def _end_chords(chords, n, row, here, ahead, tolerance, turn, change, tangent, path):  # type: ignore[no-untyped-def]
+    """Continue from the points `ahead` (m, 3), at which the chords n of the first m geodesics of `row` end; NaN in
+    `path` (len(chords), k, 3) for those that found none. Returns how many have a next chord, see `_still_going`."""
+    for m in range(len(ahead)):
         lost = not (abs(turn[m]) < 1.2 and abs(change[m]) < tolerance)
         for k in range(3):
-            tangent[m, k] = (ahead[m, k] - here[m, k]) / chord[row[m]]
-            here[m, k] = reached[row[m], k] = np.nan if lost else ahead[m, k]
+            tangent[m, k] = (ahead[m, k] - here[m, k]) / chords[n, row[m]]
+            here[m, k] = path[n, row[m], k] = np.nan if lost else ahead[m, k]
+    return _still_going(chords, n + 1, row, len(ahead), here, tangent, turn)
 
 
 def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tolerance: float = TOLERANCE) -> None:
@@ -294,8 +296,9 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
 def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
     """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
 
-    Returns the anti-diagonal to continue from; the indices (n, 2) of the nodes; their neighbours (3, n, 3): A towards
-    the u axis, B towards the v axis, and D across; and (3, n) the two chords and the sign of the quadrant.
+    Returns the anti-diagonal to continue from; the indices (n, 2) of the nodes; (3, n, 3) their neighbours A towards
+    the u axis and B towards the v axis, and the guess A + B - D with D across; and (3, n) the two chords and the sign
+    of the quadrant.
     """
     nodes, count, first = np.empty((tried.size, 2), dtype=np.intp), 0, len(u) + len(v)
     for quadrant in range(4):
@@ -315,7 +318,8 @@ def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyp
         i, j = nodes[n, 0], nodes[n, 1]
         p, q = (i - 1 if i > i0 else i + 1), (j - 1 if j > j0 else j + 1)
         for k in range(3):
-            known[0, n, k], known[1, n, k], known[2, n, k] = points[i, q, k], points[p, j, k], points[p, q, k]
+            known[0, n, k], known[1, n, k] = points[i, q, k], points[p, j, k]
+            known[2, n, k] = points[i, q, k] + points[p, j, k] - points[p, q, k]
         chords[0, n], chords[1, n], chords[2, n] = abs(v[j] - v[q]), abs(u[i] - u[p]), (i - p) * (j - q)
     return first + 1, nodes[:count].copy(), known, chords
 
@@ -323,10 +327,9 @@ def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyp
 def _compass(
     target: Target, heights: Heights, known: Floats, chords: Floats, tolerance: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Points P (n, 3) of the surface at the `chords` from A and from B, opposite to D, see `_next_nodes`; for rods at
+    """Points P (n, 3) of the surface at the `chords` from A and from B, see `_next_nodes`; for rods at
     `heights` the distances are those of points of their layers. And their last changes and sines, see `_towards`."""
-    a, b, d = known
-    p = a + b - d
+    a, b, p = known
     layered, none = heights != ON_SURFACE, np.empty((0, 3, 3))
     if layered:  # A and B on the layers of the rods that lead from them to P
         a, b = Layer(target, heights[1]).of(a), Layer(target, heights[0]).of(b)
