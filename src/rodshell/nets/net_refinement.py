@@ -296,12 +296,14 @@ def _sweep(  # type: ignore[no-untyped-def]
     `normals` (nu, nv, 3) of the surface at the points are updated if rods are at `heights` above it; empty otherwise.
     """
     layered = len(normals) > 0
-    for quadrant in range(4):
-        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
-        i_stop, j_stop = (len(u) if i_side > 0 else -1), (len(v) if j_side > 0 else -1)
-        for i in range(i0 + i_side, i_stop, i_side):
+    for i_side in (1, -1):
+        for i in range(i0 + i_side, len(u) if i_side > 0 else -1, i_side):
             p = i - i_side
-            for j in range(j0 + j_side, j_stop, j_side):
+            for k in range(2 * max(j0, len(v) - 1 - j0)):
+                j_side = 1 - 2 * (k % 2)
+                j = j0 + j_side * (k // 2 + 1)
+                if not 0 <= j < len(v):
+                    continue
                 q = j - j_side
                 new[i, j] |= new[i, q] | new[p, j] | new[p, q]
                 if not new[i, j]:
