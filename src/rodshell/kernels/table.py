@@ -59,7 +59,7 @@ KERNELS: dict[str, dict[str, str]] = {
     "nets.net_ends": {
         "_around_ends": "f1 f3 i2 f2 f3 f1 f1",
         "_by_squares": "f3 i2 f1 f1",
-        "_connect": "b2 b2",
+        "_connected": "b2 i i",
         "_extrapolate": "i1 f2 i1 f2 f f2 f1",
         "_narrow": "f1 f2 f3 f1 i1 f2 f2 b",
         "_runs": "b2",

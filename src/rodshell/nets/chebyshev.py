@@ -328,29 +328,25 @@ def _name_rods(
     spacing = max(layout.spacing)
     for family, every, cuts in families:
         make = FlatRod.u if family == "u" else FlatRod.v
-        touching, first = np.unique(cuts.line, return_index=True)
-        offsets, stops, pieces = every[touching], [*first.tolist(), len(cuts.line)], cuts.ends.tolist()
-        built = layout.offsets(family)
+        pieces: dict[float, list[list[float]]] = {}  # of each line that touches the target, by its offset
+        for offset, piece in zip(every[cuts.line].tolist(), cuts.ends.tolist(), strict=True):
+            pieces.setdefault(offset, []).append(piece)
+        offsets, built = np.array(list(pieces)), layout.offsets(family)
         if built is None:
             lattice = layout.lattice(family, offsets.min(initial=0.0), offsets.max(initial=0.0))
             built = offsets[np.abs(lattice[_nearest(lattice, offsets)] - offsets) < 1e-6 * spacing]
-        here, found = np.full(len(built), -1), np.zeros(len(built), dtype=bool)
-        if len(offsets):
-            here = _nearest(offsets, built)
-            found = np.abs(offsets[here] - built) <= 1e-9 * spacing
-        others = np.ones(len(offsets), dtype=bool)
-        others[here[found]] = False
-        for name, line, on_target in zip(rod_names(family, len(built)), here.tolist(), found.tolist(), strict=True):
-            if not on_target:
+        lines_there = offsets[_nearest(offsets, built)] if pieces else np.full(len(built), np.inf)
+        apart = np.abs(lines_there - built)
+        for name, offset, away in zip(rod_names(family, len(built)), lines_there.tolist(), apart.tolist(), strict=True):
+            if away > 1e-9 * spacing:
                 dropped.append((name, "it never touches the target"))
                 continue
-            parts, offset = pieces[stops[line] : stops[line + 1]], float(offsets[line])
+            parts = pieces.pop(offset)
             for label, (start, end) in zip(piece_names(name, len(parts)), parts, strict=True):
                 rods.append(make(label, offset, start, end, virtual=label in layout.left_out))
             if len(parts) > 1:
                 broken.append(name)
-        for line in np.flatnonzero(others).tolist():
-            parts, offset = pieces[stops[line] : stops[line + 1]], float(offsets[line])
+        for offset, parts in pieces.items():
             labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
             rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
     return tuple(rods), dropped, [_in_pieces(broken)] if broken else []

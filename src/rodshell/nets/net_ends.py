@@ -47,23 +47,20 @@ def inside_nodes(target: Target, net: Net) -> Bools:
     -------
     (nu, nv) booleans.
     """
-    region = _region(target, net)
-    reached = np.zeros_like(region)
-    i, j = net.origin
-    reached[i, j] = region[i, j]
-    if not region[i, j]:
-        for axis, seeds in ((region[i:, j], reached[i:, j]), (region[i::-1, j], reached[i::-1, j]),
-                            (region[i, j:], reached[i, j:]), (region[i, j::-1], reached[i, j::-1])):  # fmt: skip
-            seeds[np.argmax(axis)] = axis.any()
-    _connect(region, reached)
-    return reached
+    return np.asarray(_connected(_region(target, net), *net.origin))
 
 
 @njit()
-def _connect(region, reached):  # type: ignore[no-untyped-def]
-    """Extend the nodes `reached` (nu, nv) to all nodes of the `region` (nu, nv) that are connected with them: a run of
-    nodes is reached from any of them, or from a run next to it."""
-    runs = _runs(region)
+def _connected(region, i0, j0):  # type: ignore[no-untyped-def]
+    """The nodes (nu, nv) of the `region` (nu, nv) that are connected with node (i0, j0), or with the first along the
+    axes. A run of nodes is reached from any of them, or from a run next to it."""
+    reached, runs = np.zeros(region.shape, dtype=np.bool_), _runs(region)
+    for i_side, j_side in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        i, j = i0, j0
+        while 0 <= i < region.shape[0] and 0 <= j < region.shape[1] and not region[i, j]:
+            i, j = i + i_side, j + j_side
+        if 0 <= i < region.shape[0] and 0 <= j < region.shape[1]:
+            reached[i, j] = True
     found, pairs = np.zeros(len(runs), dtype=np.bool_), np.empty((2 * len(runs), 2), dtype=np.intp)
     first, count, changed = 0, 0, True
     for r in range(len(runs)):
@@ -86,6 +83,7 @@ def _connect(region, reached):  # type: ignore[no-untyped-def]
         if found[r]:
             for j in range(runs[r, 1], runs[r, 2] + 1):
                 reached[runs[r, 0], j] = True
+    return reached
 
 
 def _region(target: Target, net: Net) -> Bools:

@@ -25,7 +25,8 @@ from rodshell.units import length_text
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # steps of the first march, from the anchor each way
-ROUGH = 1e-2  # of a step: tolerance of the first march; of the size, see `march_near`: of that which finds the lines
+ROUGH = 5e-2  # of a step: tolerance of the first march, which leaves its square
+FAIR = 1e-2  # of the size: last motion of the march that finds the lines, see `march_near`
 FEWEST_STEPS = 6  # from each line to the next
 MOST_NODES = 4_000_000
 
@@ -208,7 +209,7 @@ def find_lines(
                 f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
                 f"unit, or use {_coarser(target)}"
             )
-        near = march_covering(target, u, v, start, margin, near, heights=heights, converged=ROUGH)
+        near = march_covering(target, u, v, start, margin, near, heights=heights, converged=FAIR)
         if not near.inside.any():
             raise InputError("no node of the net is inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare
@@ -297,7 +298,8 @@ def _coarser(target: Target) -> str:
 def _subdivided(offsets: Floats, edge: float) -> Floats:
     """Material coordinates of nodes: from line to line an even number of at least six steps, as many as edges if
     these are enough."""
-    edges, gaps = edge_counts(np.diff(offsets), edge), np.diff(offsets)
+    gaps = np.diff(offsets)
+    edges = edge_counts(gaps, edge)
     steps = 2 * np.where(edges < FEWEST_STEPS, np.maximum(FEWEST_STEPS // 2, edges), (edges + 1) // 2)
     span = np.repeat(np.arange(len(edges)), steps)
     along = np.arange(len(span)) - np.repeat(np.cumsum(steps) - steps, steps)
