@@ -9,7 +9,7 @@ import rodshell as rs
 from rodshell.formfinding.popup import corresponding_rods, transferred_edges, transferred_nodes
 from rodshell.nets import net_refinement
 from rodshell.nets.chebyshev import chebyshev_net
-from rodshell.nets.compass import march
+from rodshell.nets.compass import axes, march
 from rodshell.nets.net_refinement import march_near
 from tests.formfinding.altered import at_positions
 
@@ -50,7 +50,7 @@ def test_all_nodes_together_are_the_net_that_the_march_finds_one_by_one(target, 
     u, v = lines(0.35, 0.01), lines(0.3, 0.0125)
     rough = march(target, lines(0.4, step), lines(0.36, step), anchor, heading)
     expected = march(target, u, v, anchor, heading).points
-    found = march_near(target, u, v, anchor, heading, rough).points
+    found = march_near(target, u, v, axes(target, anchor, heading), rough).points
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
     assert largest(found - expected) < EXACT
 
@@ -72,7 +72,7 @@ def test_a_bad_guess_of_the_net_does_no_harm(worse):
             points[:30] = np.nan
         case "folded over":  # a solution of the same equations, but for the side on which P lies
             points[51:] = points[49:27:-1]
-    found = march_near(HEMISPHERE, u, u, anchor, heading, replace(expected, points=points)).points
+    found = march_near(HEMISPHERE, u, u, axes(HEMISPHERE, anchor, heading), replace(expected, points=points)).points
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected.points))
     assert largest(found - expected.points) < EXACT
 
@@ -82,7 +82,9 @@ def test_what_has_not_settled_is_marched(monkeypatch):
     monkeypatch.setattr(net_refinement, "ROUNDS", 1)
     anchor, heading = np.array([0.0, 0.0, SIZE]), np.array([1.0, 0.0, 0.0])
     u, rough = lines(0.3, 0.01), lines(0.32, 0.04)
-    found = march_near(HEMISPHERE, u, u, anchor, heading, march(HEMISPHERE, rough, rough, anchor, heading)).points
+    found = march_near(
+        HEMISPHERE, u, u, axes(HEMISPHERE, anchor, heading), march(HEMISPHERE, rough, rough, anchor, heading)
+    ).points
     assert largest(found - march(HEMISPHERE, u, u, anchor, heading).points) < EXACT
 
 

@@ -10,7 +10,7 @@ import rodshell as rs
 from rodshell.geometry.curves import resampled
 from rodshell.nets import net_extent
 from rodshell.nets.apron import RINGS
-from rodshell.nets.compass import Net, fill_quadrants, march
+from rodshell.nets.compass import Net, axes, fill_quadrants, march
 from rodshell.nets.net_ends import inside_nodes
 from rodshell.nets.net_extent import Covering, march_covering, wanted_nodes
 from tests.targets.test_nets_on_files import TARGETS as FILES
@@ -107,13 +107,11 @@ def test_a_rougher_net_that_tells_too_little_does_no_harm():
     margin = 2.3 * np.array(net.layout.spacing[::-1])
     expected = net.net
     i, j = expected.origin
-    heading = expected.points[i + 1, j] - expected.points[i, j]
+    start = axes(net.target, expected.points[i, j], expected.points[i + 1, j] - expected.points[i, j])
     for known in (1, 0):
         inside = np.zeros_like(expected.inside)
         inside[i, j] = known
-        found = march_covering(
-            net.target, expected.u, expected.v, expected.points[i, j], heading, margin, replace(expected, inside=inside)
-        )
+        found = march_covering(net.target, expected.u, expected.v, start, margin, replace(expected, inside=inside))
         np.testing.assert_array_equal(found.inside, expected.inside)
         assert np.isfinite(found.points[expected.inside]).all()
 
@@ -191,7 +189,11 @@ def test_a_line_is_continued_from_the_nodes_that_hang_together_with_its_origin()
     part[0] = part[8] = 1e3
     three[[2, 6]] = np.nan
     alone[[2, 4]] = np.nan
-    found = resampled(knots, np.stack([whole, part, three, alone], axis=1), 3, at, 2.0)
+    one = np.zeros(1)
+    along = [resampled(knots, one, line, 3, 0, at, one, 2.0) for line in (whole, part, three, alone)]
+    across = [resampled(one, knots, line.reshape(1, -1), 0, 3, one, at, 2.0) for line in (whole, part, three, alone)]
+    found = np.reshape(along, (4, -1, 3))
+    np.testing.assert_array_equal(found, np.reshape(across, (4, -1, 3)))
     for line, low, high in ((0, -3.0, 5.3), (1, -0.9 - 1.8, 2.0 + 1.6), (2, -1.4, 1.2 + 1.0)):
         there = np.isfinite(found[line, :, 0])
         np.testing.assert_array_equal(there, (at > low) & (at < high))

@@ -24,7 +24,7 @@ KERNELS: dict[str, dict[str, str]] = {
     "geometry.curves": {
         "_on_curve": "f1 f2 f1",
         "lagrange": "f2 f3 f1",
-        "resampled": "f1 f3 i f1 f",
+        "resampled": "f1 f1 f2 i i f1 f1 f",
     },
     "joints.relative_rotation": {
         "_relative_rotation": "f2 i2 i2 f2 f3 c2 f1 f3 f3 f2 f3",
@@ -49,25 +49,25 @@ KERNELS: dict[str, dict[str, str]] = {
     },
     "nets.compass": {
         "_begin_chords": "f1 i1 f2 f2 f2 f2 f2 f1",
-        "_end_chords": "f1 i1 f2 f2 f f1 f1 f2 f2",
+        "_end_chords": "f2 i i1 f2 f2 f f1 f1 f2 f3",
         "_keep": "i2 f2 f2 f1 f1 f f3 b2",
         "_next_nodes": "f3 b2 f1 f1 i i i",
-        "_still_going": "f1 i1 i f2 f2 f1",
+        "_still_going": "f2 i i1 i f2 f2 f1",
         "_towards": "f2 f2 f2 f2 ff f1 f2 f3 f f1 f1",
         "_turn_chords": "f1 i1 f2 f2 f2 f1 f2 f f1 f1 f2",
     },
     "nets.net_ends": {
         "_around_ends": "f1 f3 i2 f2 f3 f1 f1",
         "_by_squares": "f3 i2 f1 f1",
-        "_connect": "b2 b2",
+        "_connected": "b2 i i",
         "_extrapolate": "i1 f2 i1 f2 f f2 f1",
-        "_narrow": "f1 f1 i1 f1 f2 b",
+        "_narrow": "f1 f2 f3 f1 i1 f2 f2 b",
         "_runs": "b2",
         "_set_inside": "i2 f1 b2",
         "_squares": "f3 f1 f1",
     },
     "nets.net_extent": {
-        "_wanted": "b2 f1 f1 i f1 f1 f f",
+        "_want": "b2 f1 f1 i f1 f1 f f b2",
     },
     "nets.net_refinement": {
         "_arms": "f3 f1 f1 i i",
@@ -75,7 +75,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_put_arms": "f2 i1 i i f3",
         "_rows_to_renew": "f3 i2 f2 f b2 f2",
         "_straighten": "f2 f2 f1 i1 f2 f1 f2 f3",
-        "_sweep": "f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2",
+        "_sweep": "f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2 f",
     },
     "rods.bend_twist": {
         "_bend_twist": "f2 i2 f2 f1 f2 f1 f3 f3 f1 f2 f3",

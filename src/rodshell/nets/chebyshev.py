@@ -20,7 +20,7 @@ from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import rod_names
-from rodshell.nets.compass import ON_SURFACE
+from rodshell.nets.compass import ON_SURFACE, Axes, axes
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
 from rodshell.targets import Target
@@ -126,7 +126,7 @@ def chebyshev_net(
     if anchor is not None:
         point("anchor", anchor)
     number("eccentricity", eccentricity, "m")
-    start, heading = _start(target, layout, anchor)
+    start = _start(target, layout, anchor)
     if max(layout.spacing) >= 2 * target.size:
         raise InputError(
             f"the spacing {max(layout.spacing):g} m is larger than the target, which is {2 * target.size:g} m wide: "
@@ -140,9 +140,9 @@ def chebyshev_net(
     heights = (-0.5 * eccentricity, 0.5 * eccentricity) if eccentricity else ON_SURFACE
     similar = warm_start.net if warm_start else None
     for parts in SEARCHES:
-        lines, rough = find_lines(target, layout, start, heading, similar, parts, heights)
-        coarse = march_lines(target, layout, lines, start, heading, 2, rough, heights=heights)
-        fine = march_lines(target, layout, lines, start, heading, 1, coarse, rough, heights=heights)
+        lines, rough = find_lines(target, layout, start, similar, parts, heights)
+        coarse = march_lines(target, layout, lines, start, 2, rough, heights=heights)
+        fine = march_lines(target, layout, lines, start, 1, coarse, rough, heights=heights)
         if not (fine.inside[[0, -1]].any() or fine.inside[:, [0, -1]].any()):
             break
     else:
@@ -172,9 +172,8 @@ def chebyshev_net(
     )
 
 
-def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> tuple[Floats, Floats]:
-    """The anchor, lifted vertically onto the target, and the tangent along the heading in plan; with that of the other
-    axis where the families do not cross at right angles."""
+def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> Axes:
+    """The axes through the anchor, lifted vertically onto the target, the first along the heading in plan."""
     x, y = anchor if anchor is not None else target.summit
     remedy = "leave it out for the highest point, or let a search choose (--anchor auto)"
     try:
@@ -187,9 +186,9 @@ def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | Non
     plan = np.array([cos(layout.rotate), sin(layout.rotate)])
     along = np.array([*plan * n[2], -plan @ n[:2]])
     if layout.crossing == pi / 2:
-        return lifted[0], along
+        return axes(target, lifted[0], along)
     both = cos(layout.crossing) * along + sin(layout.crossing) * np.cross(n, along)
-    return lifted[0], np.stack([along, both])
+    return axes(target, lifted[0], np.stack([along, both]))
 
 
 def _require_room(target: Target, net: Covering, height: float) -> None:
@@ -329,29 +328,25 @@ def _name_rods(
     spacing = max(layout.spacing)
     for family, every, cuts in families:
         make = FlatRod.u if family == "u" else FlatRod.v
-        touching, first = np.unique(cuts.line, return_index=True)
-        offsets, stops, pieces = every[touching], [*first.tolist(), len(cuts.line)], cuts.ends.tolist()
-        built = layout.offsets(family)
+        pieces: dict[float, list[list[float]]] = {}  # of each line that touches the target, by its offset
+        for offset, piece in zip(every[cuts.line].tolist(), cuts.ends.tolist(), strict=True):
+            pieces.setdefault(offset, []).append(piece)
+        offsets, built = np.array(list(pieces)), layout.offsets(family)
         if built is None:
             lattice = layout.lattice(family, offsets.min(initial=0.0), offsets.max(initial=0.0))
             built = offsets[np.abs(lattice[_nearest(lattice, offsets)] - offsets) < 1e-6 * spacing]
-        here, found = np.full(len(built), -1), np.zeros(len(built), dtype=bool)
-        if len(offsets):
-            here = _nearest(offsets, built)
-            found = np.abs(offsets[here] - built) <= 1e-9 * spacing
-        others = np.ones(len(offsets), dtype=bool)
-        others[here[found]] = False
-        for name, line, on_target in zip(rod_names(family, len(built)), here.tolist(), found.tolist(), strict=True):
-            if not on_target:
+        lines_there = offsets[_nearest(offsets, built)] if pieces else np.full(len(built), np.inf)
+        apart = np.abs(lines_there - built)
+        for name, offset, away in zip(rod_names(family, len(built)), lines_there.tolist(), apart.tolist(), strict=True):
+            if away > 1e-9 * spacing:
                 dropped.append((name, "it never touches the target"))
                 continue
-            parts, offset = pieces[stops[line] : stops[line + 1]], float(offsets[line])
+            parts = pieces.pop(offset)
             for label, (start, end) in zip(piece_names(name, len(parts)), parts, strict=True):
                 rods.append(make(label, offset, start, end, virtual=label in layout.left_out))
             if len(parts) > 1:
                 broken.append(name)
-        for line in np.flatnonzero(others).tolist():
-            parts, offset = pieces[stops[line] : stops[line + 1]], float(offsets[line])
+        for offset, parts in pieces.items():
             labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
             rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
     return tuple(rods), dropped, [_in_pieces(broken)] if broken else []

@@ -11,6 +11,7 @@ The net's points P are on the target, between the layers.
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,7 +51,20 @@ class Net:
     @cached_property
     def origin(self) -> tuple[int, int]:
         """Indices of the anchor, (u, v) = (0, 0)."""
-        return int(np.argmin(np.abs(self.u))), int(np.argmin(np.abs(self.v)))
+        return int(np.abs(self.u).argmin()), int(np.abs(self.v).argmin())
+
+
+class Axes(NamedTuple):
+    """Where the axes of a net cross.
+
+    Parameters
+    ----------
+    anchor : (3,) point of the surface [m].
+    tangents : (4, 3) unit tangents there, towards +u, -u, +v and -v.
+    """
+
+    anchor: Floats
+    tangents: Floats
 
 
 def march(
@@ -62,57 +76,57 @@ def march(
     ----------
     target : the surface.
     u, v : ascending material coordinates of the lines, both containing 0 [m].
-    anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
-        parts in the tangent plane are used.
+    anchor, heading : see `axes`.
     heights : see `Net`.
     """
     points = np.full((len(u), len(v), 3), np.nan)
     net = Net(u, v, points, heights=heights)
-    lay_axes(target, net, anchor, heading)
+    lay_axes(target, net, axes(target, anchor, heading))
     fill_quadrants(target, net)
     return net
 
 
-def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats, *, tolerance: float = TOLERANCE) -> None:
+def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERANCE) -> None:
     """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
 
     Parameters
     ----------
-    target, anchor, heading : see `march`.
+    target : the surface.
+    start : where the axes cross.
     net : whose points on the axes are set.
     tolerance : see `geodesics`.
     """
     i0, j0 = net.origin
+    anchor, tangents = start
     net.points[i0, j0] = anchor
     steps = [np.diff(net.u[i0:]), np.diff(-net.u[i0::-1]), np.diff(net.v[j0:]), np.diff(-net.v[j0::-1])]
-    directions = axes(target, anchor, heading)
     if net.heights == ON_SURFACE:
-        arms = geodesics(target, np.tile(anchor, (4, 1)), directions, steps, tolerance=tolerance)
+        arms = geodesics(target, np.repeat(anchor[None], 4, axis=0), tangents, steps, tolerance=tolerance)
     else:
         arms = list[Floats]()
         for height, pair in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
             layer = Layer(target, height)
-            start = np.tile(layer.of(anchor[None]), (2, 1))
-            on_layer = geodesics(layer, start, directions[pair], steps[pair], tolerance=tolerance)
+            begin = np.repeat(layer.of(anchor[None]), 2, axis=0)
+            on_layer = geodesics(layer, begin, tangents[pair], steps[pair], tolerance=tolerance)
             arms += [layer.below(arm) for arm in on_layer]
     net.points[i0 + 1 :, j0], net.points[i0 - 1 :: -1, j0] = arms[0], arms[1] if i0 else arms[1][:0]
     net.points[i0, j0 + 1 :], net.points[i0, j0 - 1 :: -1] = arms[2], arms[3] if j0 else arms[3][:0]
 
 
-def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
-    """Unit tangents (4, 3) at the anchor towards +u, -u, +v and -v; see `march`.
+def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
+    """The axes through a point of a surface.
 
     Parameters
     ----------
     target : the surface.
     anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) or (2, 3), see `march`.
+    heading : (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
+        parts in the tangent plane are used.
     """
     normal = target.level(anchor[None])[1][0]
     along = heading - (heading @ normal / (normal @ normal))[..., None] * normal
     both = unit(along if along.ndim == 2 else np.stack([along, cross(normal, along)]))
-    return np.stack([both, -both], axis=1).reshape(4, 3)
+    return Axes(anchor, np.stack([both, -both], axis=1).reshape(4, 3))
 
 
 @dataclass(frozen=True)
@@ -176,8 +190,8 @@ def geodesics(
     path = np.full((*chords.shape, 3), np.nan)
     row, turn, change = np.arange(count), np.zeros(count), np.empty(count)
     here, tangent, flat, normal = start.copy(), direction.copy(), np.empty((count, 3)), np.empty((count, 3))
-    for chord, reached in zip(chords, path, strict=True):
-        count = _still_going(chord, row, count, here, tangent, turn)
+    count = _still_going(chords, 0, row, count, here, tangent, turn)
+    for n, chord in enumerate(chords):
         if count == 0:
             break
         going = row[:count]
@@ -186,16 +200,16 @@ def geodesics(
             value, gradient = target.level(ahead)
             if not _turn_chords(chord, going, here, flat, normal, value, gradient, tolerance, turn, change, ahead):
                 break
-        _end_chords(chord, going, here, ahead, tolerance, turn, change, tangent, reached)
+        count = _end_chords(chords, n, row, here, ahead, tolerance, turn, change, tangent, path)
     return [path[: len(s), k] for k, s in enumerate(steps)]
 
 
 @njit()
-def _still_going(chord, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
-    """Of the first `count` geodesics those that have a next chord and were not lost, moved to the front."""
+def _still_going(chords, n, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
+    """Of the first `count` geodesics those that have a chord n and were not lost, moved to the front."""
     left = 0
-    for m in range(count):
-        if chord[row[m]] > 0.0 and np.isfinite(here[m, 0]):
+    for m in range(count if n < len(chords) else 0):
+        if chords[n, row[m]] > 0.0 and np.isfinite(here[m, 0]):
             row[left], turn[left] = row[m], turn[m]
             for k in range(3):
                 here[left, k], tangent[left, k] = here[m, k], tangent[m, k]
@@ -209,7 +223,7 @@ def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # t
     chords that `turn` out of the tangent plane as the last ones did."""
     ahead = np.empty((len(row), 3))
     for m in range(len(row)):
-        steep, out, square = np.sqrt(_dot(gradient[m], gradient[m])), 0.0, 0.0
+        steep, out, square = np.sqrt(dot(gradient[m], gradient[m])), 0.0, 0.0
         for k in range(3):
             normal[m, k] = gradient[m, k] / steep
             out += tangent[m, k] * normal[m, k]
@@ -245,13 +259,15 @@ def _turn_chords(  # type: ignore[no-untyped-def]
 
 
 @njit()
-def _end_chords(chord, row, here, ahead, tolerance, turn, change, tangent, reached):  # type: ignore[no-untyped-def]
-    """Continue from the points `ahead`, which are also `reached` (k, 3); NaN for chords that found none."""
-    for m in range(len(row)):
+def _end_chords(chords, n, row, here, ahead, tolerance, turn, change, tangent, path):  # type: ignore[no-untyped-def]
+    """Continue from the points `ahead` (m, 3), at which the chords n of the first m geodesics of `row` end; NaN in
+    `path` (len(chords), k, 3) for those that found none. Returns how many have a next chord, see `_still_going`."""
+    for m in range(len(ahead)):
         lost = not (abs(turn[m]) < 1.2 and abs(change[m]) < tolerance)
         for k in range(3):
-            tangent[m, k] = (ahead[m, k] - here[m, k]) / chord[row[m]]
-            here[m, k] = reached[row[m], k] = np.nan if lost else ahead[m, k]
+            tangent[m, k] = (ahead[m, k] - here[m, k]) / chords[n, row[m]]
+            here[m, k] = path[n, row[m], k] = np.nan if lost else ahead[m, k]
+    return _still_going(chords, n + 1, row, len(ahead), here, tangent, turn)
 
 
 def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tolerance: float = TOLERANCE) -> None:
@@ -280,8 +296,9 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
 def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
     """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
 
-    Returns the anti-diagonal to continue from; the indices (n, 2) of the nodes; their neighbours (3, n, 3): A towards
-    the u axis, B towards the v axis, and D across; and (3, n) the two chords and the sign of the quadrant.
+    Returns the anti-diagonal to continue from; the indices (n, 2) of the nodes; (3, n, 3) their neighbours A towards
+    the u axis and B towards the v axis, and the guess A + B - D with D across; and (3, n) the two chords and the sign
+    of the quadrant.
     """
     nodes, count, first = np.empty((tried.size, 2), dtype=np.intp), 0, len(u) + len(v)
     for quadrant in range(4):
@@ -301,7 +318,8 @@ def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyp
         i, j = nodes[n, 0], nodes[n, 1]
         p, q = (i - 1 if i > i0 else i + 1), (j - 1 if j > j0 else j + 1)
         for k in range(3):
-            known[0, n, k], known[1, n, k], known[2, n, k] = points[i, q, k], points[p, j, k], points[p, q, k]
+            known[0, n, k], known[1, n, k] = points[i, q, k], points[p, j, k]
+            known[2, n, k] = points[i, q, k] + points[p, j, k] - points[p, q, k]
         chords[0, n], chords[1, n], chords[2, n] = abs(v[j] - v[q]), abs(u[i] - u[p]), (i - p) * (j - q)
     return first + 1, nodes[:count].copy(), known, chords
 
@@ -309,10 +327,9 @@ def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyp
 def _compass(
     target: Target, heights: Heights, known: Floats, chords: Floats, tolerance: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Points P (n, 3) of the surface at the `chords` from A and from B, opposite to D, see `_next_nodes`; for rods at
+    """Points P (n, 3) of the surface at the `chords` from A and from B, see `_next_nodes`; for rods at
     `heights` the distances are those of points of their layers. And their last changes and sines, see `_towards`."""
-    a, b, d = known
-    p = a + b - d
+    a, b, p = known
     layered, none = heights != ON_SURFACE, np.empty((0, 3, 3))
     if layered:  # A and B on the layers of the rods that lead from them to P
         a, b = Layer(target, heights[1]).of(a), Layer(target, heights[0]).of(b)
@@ -350,10 +367,11 @@ def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, chan
         at_a, at_b = (a[m, 0], a[m, 1], a[m, 2]), (b[m, 0], b[m, 1], b[m, 2])
         slope = (gradient[m, 0], gradient[m, 1], gradient[m, 2])
         if len(hessian):
-            step, sine[m] = layered_step(here, at_a, at_b, slope, hessian[m], heights, from_a, from_b, value[m])
+            step, volume = layered_step(here, at_a, at_b, slope, hessian[m], heights, from_a, from_b, value[m])
         else:
             x, y = less(here, at_a), less(here, at_b)
-            step, sine[m] = compass_step(x, y, x, y, slope, from_a, from_b, value[m])
+            step, volume = compass_step(x, y, x, y, slope, from_a, from_b, value[m])
+        sine[m] = sine_of(volume, slope, from_a, from_b)
         for k in range(3):
             p[m, k] -= step[k]
         change[m] = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a, from_b)
@@ -365,10 +383,9 @@ def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, chan
 @njit(error_model="numpy")
 def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """Newton's step towards |x| = from_a, |y| = from_b and f = 0 from x = P - A, y = P - B and f = level with the
-    gradient g, to be subtracted from P; and the sine of the crossing angle, y x x along the normal.
+    gradient g, to be subtracted from P; and the volume of the three gradients, see `sine_of`.
 
-    `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers. The inverse of
-    the three gradients consists of their cross products.
+    `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers.
 
     Parameters
     ----------
@@ -378,16 +395,40 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
     from_a, from_b : wanted lengths of x and y [m].
     level : f at P.
     """
-    normal, along, across = _cross(by_x, by_y), _cross(by_y, g), _cross(g, by_x)
-    volume = _dot(normal, g)
-    ra, rb = 0.5 * (_dot(x, x) - from_a * from_a) / volume, 0.5 * (_dot(y, y) - from_b * from_b) / volume
-    rest = level / volume
-    step = (
-        ra * along[0] + rb * across[0] + rest * normal[0],
-        ra * along[1] + rb * across[1] + rest * normal[1],
-        ra * along[2] + rb * across[2] + rest * normal[2],
+    inverse = inverse_of(by_x, by_y, g)
+    return solution(inverse, past(x, from_a), past(y, from_b), level), inverse[3]
+
+
+@njit(error_model="numpy")
+def inverse_of(by_x, by_y, g):  # type: ignore[no-untyped-def]
+    """The inverse of the matrix of three gradients: their cross products, which are to be divided by their volume; and
+    this volume."""
+    normal = _cross(by_x, by_y)
+    return _cross(by_y, g), _cross(g, by_x), normal, dot(normal, g)
+
+
+@njit(error_model="numpy")
+def solution(inverse, a, b, level):  # type: ignore[no-untyped-def]
+    along, across, normal, volume = inverse
+    scale = 1.0 / volume
+    a, b, level = scale * a, scale * b, scale * level
+    return (
+        a * along[0] + b * across[0] + level * normal[0],
+        a * along[1] + b * across[1] + level * normal[1],
+        a * along[2] + b * across[2] + level * normal[2],
     )
-    return step, -volume / (np.sqrt(_dot(g, g)) * from_a * from_b)
+
+
+@njit()
+def past(x, length):  # type: ignore[no-untyped-def]
+    """x^2/2 less its wanted value."""
+    return 0.5 * (dot(x, x) - length * length)
+
+
+@njit(error_model="numpy")
+def sine_of(volume, g, from_a, from_b):  # type: ignore[no-untyped-def]
+    """Sine of the crossing angle, y x x along the normal, from the volume of the gradients of x^2/2, y^2/2 and f."""
+    return -volume / (np.sqrt(dot(g, g)) * from_a * from_b)
 
 
 @njit(error_model="numpy")
@@ -404,7 +445,7 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
     from_a, from_b : wanted lengths of x and y [m].
     level : f at P.
     """
-    steep = np.sqrt(_dot(g, g))
+    steep = np.sqrt(dot(g, g))
     n = (g[0] / steep, g[1] / steep, g[2] / steep)
     x, y = less(p, a), less(p, b)
     x = (x[0] + heights[1] * n[0], x[1] + heights[1] * n[1], x[2] + heights[1] * n[2])
@@ -416,7 +457,7 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
 @njit()
 def _by_point(x, height, n, hessian):  # type: ignore[no-untyped-def]
     """x (1 + h dn/dP) with dn/dP = (1 - n n) F''/|F'|; the height comes divided by |F'|."""
-    out = _dot(x, n)
+    out = dot(x, n)
     w = (x[0] - out * n[0], x[1] - out * n[1], x[2] - out * n[2])
     return (
         x[0] + height * (hessian[0, 0] * w[0] + hessian[1, 0] * w[1] + hessian[2, 0] * w[2]),
@@ -437,5 +478,5 @@ def _cross(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit()
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.geometry.curves import lagrange
+from rodshell.geometry.curves import lagrange, put_lagrange
 from rodshell.kernels import njit
 from rodshell.nets.compass import Net
 from rodshell.targets import Target
@@ -47,36 +47,43 @@ def inside_nodes(target: Target, net: Net) -> Bools:
     -------
     (nu, nv) booleans.
     """
-    region = _region(target, net)
-    reached = np.zeros_like(region)
-    i, j = net.origin
-    reached[i, j] = region[i, j]
-    if not region[i, j]:
-        for axis, seeds in ((region[i:, j], reached[i:, j]), (region[i::-1, j], reached[i::-1, j]),
-                            (region[i, j:], reached[i, j:]), (region[i, j::-1], reached[i, j::-1])):  # fmt: skip
-            seeds[np.argmax(axis)] = axis.any()
-    _connect(region, reached)
-    return reached
+    return np.asarray(_connected(_region(target, net), *net.origin))
 
 
 @njit()
-def _connect(region, reached):  # type: ignore[no-untyped-def]
-    """Extend the nodes `reached` (nu, nv) to all nodes of the `region` (nu, nv) that are connected with them."""
-    nu, nv = region.shape
-    stack, top = np.empty((region.size, 2), dtype=np.intp), 0
-    for i in range(nu):
-        for j in range(nv):
-            if reached[i, j]:
-                stack[top, 0], stack[top, 1] = i, j
-                top += 1
-    while top > 0:
-        top -= 1
-        i, j = stack[top, 0], stack[top, 1]
-        for p, q in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
-            if 0 <= p < nu and 0 <= q < nv and region[p, q] and not reached[p, q]:
-                reached[p, q] = True
-                stack[top, 0], stack[top, 1] = p, q
-                top += 1
+def _connected(region, i0, j0):  # type: ignore[no-untyped-def]
+    """The nodes (nu, nv) of the `region` (nu, nv) that are connected with node (i0, j0), or with the first along the
+    axes. A run of nodes is reached from any of them, or from a run next to it."""
+    reached, runs = np.zeros(region.shape, dtype=np.bool_), _runs(region)
+    for i_side, j_side in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        i, j = i0, j0
+        while 0 <= i < region.shape[0] and 0 <= j < region.shape[1] and not region[i, j]:
+            i, j = i + i_side, j + j_side
+        if 0 <= i < region.shape[0] and 0 <= j < region.shape[1]:
+            reached[i, j] = True
+    found, pairs = np.zeros(len(runs), dtype=np.bool_), np.empty((2 * len(runs), 2), dtype=np.intp)
+    first, count, changed = 0, 0, True
+    for r in range(len(runs)):
+        i = runs[r, 0]
+        for j in range(runs[r, 1], runs[r, 2] + 1):
+            found[r] |= reached[i, j]
+        while first < r and (runs[first, 0] < i - 1 or (runs[first, 0] == i - 1 and runs[first, 2] < runs[r, 1])):
+            first += 1
+        s = first
+        while runs[s, 0] == i - 1 and runs[s, 1] <= runs[r, 2]:
+            pairs[count, 0], pairs[count, 1] = s, r
+            count, s = count + 1, s + 1
+    while changed:
+        changed = False
+        for n in range(2 * count):  # there and back
+            r, s = pairs[min(n, 2 * count - 1 - n)]
+            if found[r] != found[s]:
+                found[r] = found[s] = changed = True
+    for r in range(len(runs)):
+        if found[r]:
+            for j in range(runs[r, 1], runs[r, 2] + 1):
+                reached[runs[r, 0], j] = True
+    return reached
 
 
 def _region(target: Target, net: Net) -> Bools:
@@ -247,34 +254,31 @@ def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: 
     """
     below = np.minimum(target.margin(lagrange(knots, points, outer)), 0.0)
     above = target.margin(lagrange(knots, points, inner))
-    found, index, at = inner.copy(), np.arange(len(inner)), inner.copy()
+    found, index, there = inner.copy(), np.arange(len(inner)), np.empty((len(inner), 3))
     bracket = np.stack([outer, inner, below, above, np.zeros(len(inner)), 1e-15 * (np.abs(outer) + np.abs(inner))])
-    left = _narrow(above, found, index, at, bracket, True)
+    left = _narrow(above, knots, points, found, index, bracket, there, True)
     for _ in range(MOST_STEPS):
         if left == 0:
             break
-        here = index[:left]
-        value = target.margin(lagrange(knots[here], points[here], at[:left]))
-        left = _narrow(value, found, index, at, bracket, False)
+        left = _narrow(target.margin(there[:left]), knots, points, found, index, bracket, there, False)
     return found
 
 
 @njit(error_model="numpy")
-def _narrow(value, found, index, at, bracket, first):  # type: ignore[no-untyped-def]
+def _narrow(value, knots, points, found, index, bracket, there, first):  # type: ignore[no-untyped-def]
     """One step of `_roots`: the brackets of the roots that are left are narrowed by the `value` (n,) at their last
     guess, except the `first` time. Returns how many roots are left: these are moved to the front.
 
     found : (m,) the last guess of every root.
-    index, at : (m,) of those that are left: the root, and the next guess.
+    index, there : (m,), (m, 3) of those that are left: the root, and the point at its next guess.
     bracket : (6, m) of those: outer and inner end, the values there, the end that moved last (1 for the inner, -1 for
         the outer), and the smallest step.
     """
     left = 0
     for k in range(len(value)):
         outer, inner, below, above = bracket[0, k], bracket[1, k], bracket[2, k], bracket[3, k]
-        side, tiny, before = bracket[4, k], bracket[5, k], at[k]
+        side, tiny, before = bracket[4, k], bracket[5, k], found[index[k]]
         if not first:
-            found[index[k]] = before
             if value[k] > 0.0:
                 below, above, inner = (0.5 if side > 0.0 else 1.0) * below, value[k], before
                 side = 1.0
@@ -285,10 +289,11 @@ def _narrow(value, found, index, at, bracket, first):  # type: ignore[no-untyped
                 continue
         share = above / (above - below)
         guess = inner + (share if np.isfinite(share) else 0.5) * (outer - inner)
+        found[index[k]] = guess
         if not first and not abs(guess - before) > tiny:
-            found[index[k]] = guess
             continue
-        index[left], at[left] = index[k], guess
+        index[left] = index[k]
+        put_lagrange(knots, points, index[k], guess, there, left)
         bracket[0, left], bracket[1, left], bracket[2, left] = outer, inner, below
         bracket[3, left], bracket[4, left], bracket[5, left] = above, side, tiny
         left += 1

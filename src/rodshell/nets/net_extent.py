@@ -16,16 +16,17 @@ from rodshell.layout import GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import auto_edge
 from rodshell.layout.mesh import edge_counts
-from rodshell.nets.compass import ON_SURFACE, Heights, Net, fill_quadrants, lay_axes
+from rodshell.nets.compass import ON_SURFACE, Axes, Heights, Net, fill_quadrants, lay_axes
 from rodshell.nets.net_ends import inside_nodes
-from rodshell.nets.net_refinement import march_near
+from rodshell.nets.net_refinement import CONVERGED, march_near
 from rodshell.targets import Target
 from rodshell.units import length_text
 
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # steps of the first march, from the anchor each way
-ROUGH = 1e-2  # of a step: tolerance of the first march
+ROUGH = 5e-2  # of a step: tolerance of the first march, which leaves its square
+FAIR = 1e-2  # of the size: last motion of the march that finds the lines, see `march_near`
 FEWEST_STEPS = 6  # from each line to the next
 MOST_NODES = 4_000_000
 
@@ -63,13 +64,13 @@ def march_covering(
     target: Target,
     u: Floats,
     v: Floats,
-    anchor: Floats,
-    heading: Floats,
+    start: Axes,
     margin: Floats,
     near: Covering,
     coarser: Net | None = None,
     *,
     heights: Heights = ON_SURFACE,
+    converged: float = CONVERGED,
 ) -> Covering:
     """March a net as far as the target, and a margin past its end.
 
@@ -79,22 +80,20 @@ def march_covering(
     ----------
     target : the surface.
     u, v : (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
-    anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there.
+    start : where the axes cross.
     margin : (2,) along u and v [m].
     near : the net in longer steps.
     coarser : the same net in yet longer steps, see `march_near`.
     heights : see `Net`.
+    converged : see `march_near`.
     """
     wanted = wanted_nodes(near, 1, u, v, margin)
-    net = march_near(target, u, v, anchor, heading, near, coarser=coarser, wanted=wanted, heights=heights)
+    net = march_near(target, u, v, start, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged)
     while True:
         found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
-        more = wanted_nodes(found, 0, u, v, SURELY * margin) & ~wanted
-        if not more.any():
+        if not _want(found.inside, u, v, 0, u, v, *(SURELY * margin), wanted):
             return found
-        wanted |= more
-        fill_quadrants(target, net, wanted)
+        fill_quadrants(target, net, wanted, tolerance=converged**1.5)
 
 
 def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
@@ -111,16 +110,17 @@ def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats
     -------
     (nu, nv) booleans.
     """
-    if not near.inside.any():
-        return np.ones((len(u), len(v)), dtype=bool)
-    return np.asarray(_wanted(near.inside, near.u, near.v, past, u, v, *margin))
+    wanted = np.zeros((len(u), len(v)), dtype=bool)
+    _want(near.inside, near.u, near.v, past, u, v, *margin, wanted)
+    return wanted
 
 
 @njit()
-def _wanted(inside, known_u, known_v, past, u, v, margin_u, margin_v):  # type: ignore[no-untyped-def]
-    """See `wanted_nodes`. In each quadrant the nodes are below a staircase that only descends, away from the axis."""
-    wanted = np.zeros((len(u), len(v)), dtype=np.bool_)
+def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # type: ignore[no-untyped-def]
+    """Add to the `wanted` nodes, see `wanted_nodes`; return whether any was not wanted before. In each quadrant they
+    are below a staircase that only descends, away from the axis."""
     i_axis, j_axis, (nu, nv) = np.argmin(np.abs(u)), np.argmin(np.abs(v)), inside.shape
+    added, nothing = False, not inside.any()
     for quadrant in range(4):
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
         ends, height = np.full(nu + 1, np.inf), np.full(nu + 1, -np.inf)  # end and height of each step
@@ -132,17 +132,23 @@ def _wanted(inside, known_u, known_v, past, u, v, margin_u, margin_v):  # type: 
                 if inside[i, j]:
                     height[k] = max(height[k], j_side * known_v[min(max(j + j_side * past, 0), nv - 1)])
                     break
-        k, shifted = 0, 0
+        k, shifted, count = 0, 0, len(v) - j_axis if j_side > 0 else j_axis + 1
         for i in range(i_axis, len(u) if i_side > 0 else -1, i_side):
             while ends[k] < abs(u[i]):
                 k += 1
             while ends[shifted] + margin_u < abs(u[i]):
                 shifted += 1
-            for j in range(j_axis, len(v) if j_side > 0 else -1, j_side):
-                if abs(v[j]) > max(height[shifted], height[k] + margin_v):
-                    break
+            while (
+                not nothing
+                and count > 0
+                and abs(v[j_axis + j_side * (count - 1)]) > max(height[shifted], height[k] + margin_v)
+            ):
+                count -= 1
+            first = j_axis if j_side > 0 else j_axis + 1 - count
+            for j in range(first, first + count):
+                added |= not wanted[i, j]
                 wanted[i, j] = True
-    return wanted
+    return added
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +170,7 @@ class LatticeLines:
 def find_lines(
     target: Target,
     layout: GridLayout,
-    start: Floats,
-    heading: Floats,
+    start: Axes,
     near: Covering | None,
     parts: int,
     heights: Heights = ON_SURFACE,
@@ -176,8 +181,7 @@ def find_lines(
     ----------
     target : the surface.
     layout : whose lines are wanted.
-    start : (3,) the anchor [m].
-    heading : (3,) direction of the u axis there.
+    start : where the axes cross.
     near : a net that may be similar, or None.
     parts : steps of the march per spacing.
     heights : see `Net`.
@@ -192,7 +196,7 @@ def find_lines(
     """
     step, margin = _across(layout) / parts, MARGIN * _across(layout)
     spare = np.repeat(margin, 2)
-    near = near or _stride(target, start, heading, heights)
+    near = near or _stride(target, start, heights)
     reach = np.minimum(near.reach(1) + spare, 4 * target.size)
     for _ in range(12):
         u, v = (
@@ -205,7 +209,7 @@ def find_lines(
                 f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
                 f"unit, or use {_coarser(target)}"
             )
-        near = march_covering(target, u, v, start, heading, margin, near, heights=heights)
+        near = march_covering(target, u, v, start, margin, near, heights=heights, converged=FAIR)
         if not near.inside.any():
             raise InputError("no node of the net is inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare
@@ -223,11 +227,11 @@ def _across(layout: GridLayout) -> Floats:
     return np.array(layout.spacing[::-1])
 
 
-def _stride(target: Target, start: Floats, heading: Floats, heights: Heights) -> Covering:
+def _stride(target: Target, start: Axes, heights: Heights) -> Covering:
     """The first net, in long steps: its axes, and the nodes between the parts of them that are inside."""
     s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(STRIDE * target.size)
     net = Net(s, s, np.full((len(s), len(s), 3), np.nan), heights=heights)
-    lay_axes(target, net, start, heading, tolerance=ROUGH)
+    lay_axes(target, net, start, tolerance=ROUGH)
     inside = target.margin(np.concatenate([net.points[:, STRIDES], net.points[STRIDES]])).reshape(2, -1) > 0
     rows, columns = (_around(axis) for axis in inside)
     fill_quadrants(target, net, rows[:, None] & columns, tolerance=ROUGH)
@@ -253,8 +257,7 @@ def march_lines(
     target: Target,
     layout: GridLayout,
     lines: LatticeLines,
-    start: Floats,
-    heading: Floats,
+    start: Axes,
     every: int,
     *near: Covering,
     heights: Heights = ON_SURFACE,
@@ -266,14 +269,13 @@ def march_lines(
     target : the surface.
     layout : of the lines.
     lines : see `find_lines`.
-    start : (3,) the anchor [m].
-    heading : (3,) direction of the u axis there.
+    start : where the axes cross.
     every : 1 for all nodes, 2 for every second node.
     near : one or two nets in longer steps, the finer first.
     heights : see `Net`.
     """
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
-    return march_covering(target, u, v, start, heading, MARGIN * _across(layout), *near, heights=heights)
+    return march_covering(target, u, v, start, MARGIN * _across(layout), *near, heights=heights)
 
 
 def _refuse_too_many(target: Target, layout: GridLayout, lines: LatticeLines) -> None:
@@ -296,7 +298,8 @@ def _coarser(target: Target) -> str:
 def _subdivided(offsets: Floats, edge: float) -> Floats:
     """Material coordinates of nodes: from line to line an even number of at least six steps, as many as edges if
     these are enough."""
-    edges, gaps = edge_counts(np.diff(offsets), edge), np.diff(offsets)
+    gaps = np.diff(offsets)
+    edges = edge_counts(gaps, edge)
     steps = 2 * np.where(edges < FEWEST_STEPS, np.maximum(FEWEST_STEPS // 2, edges), (edges + 1) // 2)
     span = np.repeat(np.arange(len(edges)), steps)
     along = np.arange(len(span)) - np.repeat(np.cumsum(steps) - steps, steps)

@@ -16,21 +16,24 @@ from rodshell.nets.compass import (
     NEWTON_STEPS,
     ON_SURFACE,
     SMALLEST_SINE,
-    TOLERANCE,
+    Axes,
     Heights,
     Layer,
     Net,
-    axes,
-    compass_step,
+    dot,
     fill_quadrants,
+    inverse_of,
     lay_axes,
     layered_step,
     less,
+    past,
+    sine_of,
+    solution,
 )
 from rodshell.targets import Implicit, Target
 
 ROUNDS = 6
-CONVERGED = 2e-5  # of the target's size: motion in a round; the remaining error is its third power
+CONVERGED = 2e-5  # of the size, and of a step on local models: the last motion, of which the third power is left
 EXACT = 1e-13  # of the step, on a local model
 CLEARLY = 1.5  # ratio of the squares of the steps of two nets, above which their difference can be extrapolated
 BEYOND = 2.5  # steps of the known net by which a guess may be outside it
@@ -40,29 +43,32 @@ def march_near(
     target: Target,
     u: Floats,
     v: Floats,
-    anchor: Floats,
-    heading: Floats,
+    start: Axes,
     near: Net,
     *,
     coarser: Net | None = None,
     wanted: Bools | None = None,
     heights: Heights = ON_SURFACE,
+    converged: float = CONVERGED,
 ) -> Net:
     """March a net as `march` does, starting from a similar net; a bad guess costs time, not accuracy.
 
     Parameters
     ----------
-    target, u, v, anchor, heading, heights : see `march`.
+    target, u, v, heights : see `march`.
+    start : where the axes cross.
     near : the similar net.
     coarser : the same net as `near` in longer steps, from which the start is extrapolated.
     wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
+    converged : the last motion of nodes, relative to the target's size; the error that is left is its third power.
     """
     guess = near if coarser is None else _extrapolated(near, coarser, u, v)
     net = Net(u, v, interpolated(guess, u, v), heights=heights)
-    if not _refine_axes(target, net, anchor, heading):
-        lay_axes(target, net, anchor, heading)
-    _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted)
-    fill_quadrants(target, net, wanted)
+    tolerance = converged**1.5  # of Newton's method, which leaves its square
+    if not _refine_axes(target, net, start, converged):
+        lay_axes(target, net, start, tolerance=tolerance)
+    if not _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted, converged):
+        fill_quadrants(target, net, wanted, tolerance=tolerance)
     return net
 
 
@@ -92,14 +98,14 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
     (nu, nv, 3) points [m]; NaN further away.
     """
     i0, j0 = net.origin
-    return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
+    return np.asarray(resampled(net.u, net.v, net.points.reshape(len(net.u), -1), i0, j0, u, v, BEYOND))
 
 
-def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
+def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> bool:
     """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
     i0, j0 = net.origin
-    directions, starts = axes(target, anchor, heading), np.tile(anchor, (4, 1))
-    net.points[i0, j0] = anchor
+    starts = np.repeat(start.anchor[None], 4, axis=0)
+    net.points[i0, j0] = start.anchor
     points, steps, stops = _arms(net.points, net.u, net.v, i0, j0)
     if not np.isfinite(points).all():
         return False
@@ -107,19 +113,19 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> b
     if net.heights != ON_SURFACE:  # each axis on its own
         parts = slice(0, stops[2]), slice(stops[2], stops[4])
         layers = [(Layer(target, height), part) for height, part in zip(net.heights, parts, strict=True)]
-        starts = np.concatenate([np.tile(layer.of(anchor[None]), (2, 1)) for layer, _ in layers])
+        starts = np.concatenate([np.repeat(layer.of(start.anchor[None]), 2, axis=0) for layer, _ in layers])
         points = np.concatenate([layer.of(points[part]) for layer, part in layers])
-    moved = np.inf
+    moved, limit = np.inf, converged * target.size
     for _ in range(ROUNDS):
         if layers:
             models = [layer.implicit(points[part]) for layer, part in layers]
             model = Implicit(*(np.concatenate(values) for values in zip(*models, strict=True)))
         else:
             model = target.implicit(points)
-        moved = _straighten(starts, directions, steps, stops, points, *model)
-        if not moved >= CONVERGED * target.size:
+        moved = _straighten(starts, start.tangents, steps, stops, points, *model)
+        if not moved >= limit:
             break
-    if not moved < CONVERGED * target.size:
+    if not moved < limit:
         return False
     if layers:
         points = np.concatenate([layer.below(points[part]) for layer, part in layers])
@@ -129,7 +135,7 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> b
 
 @njit()
 def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
-    """The nodes (n, 3) of the axes but the anchor, one arm after the other, in the order of `axes` and outwards; the
+    """The nodes (n, 3) of the axes but the anchor, one arm after the other, outwards as `Axes.tangents`; the
     steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
     stops = np.zeros(5, dtype=np.intp)
     for arm in range(4):
@@ -171,6 +177,7 @@ def _straighten(starts, directions, steps, stops, points, value, gradient, hessi
             m, p = (k + 1) % 3, (k + 2) % 3
             point[k], tangent[k] = starts[arm, k], directions[arm, k]
             normal[k] = directions[0, m] * directions[2, p] - directions[0, p] * directions[2, m]
+        turn = 0.0  # of the last chord out of the tangent plane, the first guess of the next one's
         for s in range(stops[arm], stops[arm + 1]):
             h, square = steps[s], 0.0
             out = tangent[0] * normal[0] + tangent[1] * normal[1] + tangent[2] * normal[2]
@@ -179,7 +186,7 @@ def _straighten(starts, directions, steps, stops, points, value, gradient, hessi
                 square += flat[k] * flat[k]
             for k in range(3):
                 flat[k] /= np.sqrt(square)
-            turn, change = 0.0, np.inf
+            change = np.inf
             for _ in range(NEWTON_STEPS):
                 cos, sin = np.cos(turn), np.sin(turn)
                 for k in range(3):
@@ -206,59 +213,67 @@ def _straighten(starts, directions, steps, stops, points, value, gradient, hessi
     return moved
 
 
-def _refine(target: Target, net: Net, wanted: Bools) -> None:
+def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
     """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for nodes that do not
-    converge. A round evaluates the target only where the last one moved a node: elsewhere its model is still good."""
+    converge. Return whether all did.
+
+    A round evaluates the target only where the last one moved a node: elsewhere its model is still good.
+    """
     i0, j0 = net.origin
     row, moved, new = np.empty(wanted.shape, dtype=np.intp), np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
-    models = _chosen(net.points, wanted, i0, j0, row)
+    models, guessed = _chosen(net.points, wanted, i0, j0, row)
     value, gradient, hessian = target.implicit(models)
-    layered, limit = net.heights != ON_SURFACE, CONVERGED * target.size
+    layered, limit = net.heights != ON_SURFACE, converged * target.size
+    tolerance = converged**1.5 if layered else converged
     normals = np.zeros_like(net.points) if layered else np.empty((0, 0, 3))
     if layered:
         normals[row >= 0] = unit(gradient[row[row >= 0]])  # exact on the axes, which stay; others follow in order
     for _ in range(ROUNDS):
         _sweep(
-            net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved
-        )
-        rows, unconverged = _rows_to_renew(net.points, row, moved, limit, new, models)
-        if not unconverged:
-            return
-        value[rows], gradient[rows], hessian[rows] = target.implicit(models[rows])
+            net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved,
+            tolerance,
+        )  # fmt: skip
+        rows, found = _rows_to_renew(net.points, row, moved, limit, new, models)
+        if len(rows) == 0:
+            return bool(guessed and found)
+        now = target.implicit(models[rows])
+        if not layered and np.abs(now.value).max() <= converged**3 * target.size:
+            return bool(guessed and found)  # models with F = 0 there were exact, as those of quadrics are
+        value[rows], gradient[rows], hessian[rows] = now
     _forget(net.points, moved >= limit, i0, j0)
+    return False
 
 
 @njit()
 def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
-    """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes; the others become NaN.
-    `row` (nu, nv) is the index of each in the result, -1 for the others."""
-    count = 0
+    """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes, the others become NaN;
+    and whether there is one of each. `row` (nu, nv) is the index of each in the result, -1 for the others."""
+    chosen, count, whole = np.empty((row.size, 3)), 0, True
     for i in range(row.shape[0]):
         for j in range(row.shape[1]):
-            row[i, j] = -1
-            if (wanted[i, j] or i == i0 or j == j0) and not np.isnan(points[i, j, 0]):
+            asked, row[i, j] = wanted[i, j] or i == i0 or j == j0, -1
+            if asked and not np.isnan(points[i, j, 0]):
                 row[i, j] = count
+                for k in range(3):
+                    chosen[count, k] = points[i, j, k]
                 count += 1
-    chosen = np.empty((count, 3))
-    for i in range(row.shape[0]):
-        for j in range(row.shape[1]):
-            for k in range(3):
-                if row[i, j] < 0:
+            else:
+                whole &= not asked
+                for k in range(3):
                     points[i, j, k] = np.nan
-                else:
-                    chosen[row[i, j], k] = points[i, j, k]
-    return chosen
+    return chosen[:count], whole
 
 
 @njit()
 def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-untyped-def]
     """The rows (n,) of nodes that have `moved` by more than the `limit`, whose `models` are put where they are now and
-    which alone are `new`; and whether there are any."""
-    count = 0
+    which alone are `new`; and whether no node was lost."""
+    count, whole = 0, True
     for i in range(row.shape[0]):
         for j in range(row.shape[1]):
             new[i, j] = moved[i, j] >= limit
             count += new[i, j]
+            whole &= row[i, j] < 0 or not np.isnan(moved[i, j])
     rows, filled = np.empty(count, dtype=np.intp), 0
     for i in range(row.shape[0] if count > 0 else 0):
         for j in range(row.shape[1]):
@@ -267,26 +282,28 @@ def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-u
                 filled += 1
                 for k in range(3):
                     models[row[i, j], k] = points[i, j, k]
-    return rows, count > 0
+    return rows, whole
 
 
 @njit(error_model="numpy")
 def _sweep(  # type: ignore[no-untyped-def]
-    points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved
+    points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved, tolerance
 ):
     """March the `points` (nu, nv, 3) on second order models at `models` (n, 3); `row` (nu, nv) is the model of each, -1
     where there is none, and `moved` (nu, nv) returns the distance from it. Nodes whose models and neighbours are not
-    `new` (nu, nv) do not move.
+    `new` (nu, nv) do not move. `tolerance` : of the last change of a node, relative to its step.
 
     `normals` (nu, nv, 3) of the surface at the points are updated if rods are at `heights` above it; empty otherwise.
     """
     layered = len(normals) > 0
-    for quadrant in range(4):
-        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
-        i_stop, j_stop = (len(u) if i_side > 0 else -1), (len(v) if j_side > 0 else -1)
-        for i in range(i0 + i_side, i_stop, i_side):
+    for i_side in (1, -1):
+        for i in range(i0 + i_side, len(u) if i_side > 0 else -1, i_side):
             p = i - i_side
-            for j in range(j0 + j_side, j_stop, j_side):
+            for k in range(2 * max(j0, len(v) - 1 - j0)):
+                j_side = 1 - 2 * (k % 2)
+                j = j0 + j_side * (k // 2 + 1)
+                if not 0 <= j < len(v):
+                    continue
                 q = j - j_side
                 new[i, j] |= new[i, q] | new[p, j] | new[p, q]
                 if not new[i, j]:
@@ -304,19 +321,22 @@ def _sweep(  # type: ignore[no-untyped-def]
                 from_a, from_b = abs(v[j] - v[q]), abs(u[i] - u[p])
                 if layered:
                     a, b = _raised(a, heights[1], normals, i, q), _raised(b, heights[0], normals, p, j)
-                change, sine, tries = np.inf, 0.0, 0
-                while change > TOLERANCE and tries < NEWTON_STEPS:
+                step_size, change, volume, tries = min(from_a, from_b), np.inf, 0.0, 0
+                slope = (0.0, 0.0, 0.0)
+                while change > tolerance * step_size and tries < NEWTON_STEPS:
                     now = _plus(here, away)
                     level, slope = _model(r, away, value, gradient, hessian)
                     if layered:
-                        step, sine = layered_step(now, a, b, slope, hessian[r], heights, from_a, from_b, level)
+                        step, volume = layered_step(now, a, b, slope, hessian[r], heights, from_a, from_b, level)
                     else:
-                        x, y = less(now, a), less(now, b)
-                        step, sine = compass_step(x, y, x, y, slope, from_a, from_b, level)
+                        step, volume = _quadratic_step(
+                            less(now, a), less(now, b), slope, r, hessian, from_a, from_b, level
+                        )
                     away = less(away, step)
-                    change = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a, from_b)
+                    change = max(abs(step[0]), abs(step[1]), abs(step[2]))
                     tries += 1
-                if change <= TOLERANCE and sine * i_side * j_side > SMALLEST_SINE:
+                sine = i_side * j_side * sine_of(volume, slope, from_a, from_b)
+                if change <= tolerance * step_size and sine > SMALLEST_SINE:
                     moved[i, j] = max(abs(away[0]), abs(away[1]), abs(away[2]))
                     points[i, j, 0], points[i, j, 1], points[i, j, 2] = _plus(here, away)
                     if layered:
@@ -328,13 +348,33 @@ def _sweep(  # type: ignore[no-untyped-def]
                     points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
 
 
+@njit(error_model="numpy")
+def _quadratic_step(x, y, slope, r, hessian, from_a, from_b, level):  # type: ignore[no-untyped-def]
+    """As `compass_step`, of third order (Chebyshev's method): on a second order model all three equations are
+    quadratic, so that what a step leaves of them is known: half its square, twice, and half its product with F''."""
+    inverse = inverse_of(x, y, slope)
+    step = solution(inverse, past(x, from_a), past(y, from_b), level)
+    square = 0.5 * dot(step, step)
+    more = solution(inverse, square, square, 0.5 * dot(step, _bent(r, step, hessian)))
+    return _plus(step, more), inverse[3]
+
+
+@njit()
+def _bent(r, away, hessian):  # type: ignore[no-untyped-def]
+    """The product of the Hessian r with the vector `away`."""
+    x, y, z = away
+    return (
+        hessian[r, 0, 0] * x + hessian[r, 0, 1] * y + hessian[r, 0, 2] * z,
+        hessian[r, 1, 0] * x + hessian[r, 1, 1] * y + hessian[r, 1, 2] * z,
+        hessian[r, 2, 0] * x + hessian[r, 2, 1] * y + hessian[r, 2, 2] * z,
+    )
+
+
 @njit()
 def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
     """Value and gradient of the second order model r, at a distance `away` from its point."""
     x, y, z = away
-    bx = hessian[r, 0, 0] * x + hessian[r, 0, 1] * y + hessian[r, 0, 2] * z
-    by = hessian[r, 1, 0] * x + hessian[r, 1, 1] * y + hessian[r, 1, 2] * z
-    bz = hessian[r, 2, 0] * x + hessian[r, 2, 1] * y + hessian[r, 2, 2] * z
+    bx, by, bz = _bent(r, away, hessian)
     gx, gy, gz = gradient[r, 0], gradient[r, 1], gradient[r, 2]
     level = value[r] + (gx + 0.5 * bx) * x + (gy + 0.5 * by) * y + (gz + 0.5 * bz) * z
     return level, (gx + bx, gy + by, gz + bz)
