@@ -7,3 +7,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Longs = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+# glibc returns freed memory at the top of its heap to the system, and the system clears each page that is asked for
+# again: milliseconds a solve. By what it has seen a program free at once it raises the size that it keeps (mallopt(3),
+# M_TRIM_THRESHOLD), and how arrays happen to lie decides when. So it is shown a block that no page is ever asked for.
+_SHOWN = 31 << 20  # bytes: a little less than the most that it heeds, 32 MB; twice as much is kept
+np.empty(_SHOWN, dtype=np.uint8)

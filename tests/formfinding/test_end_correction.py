@@ -8,11 +8,16 @@ from scipy.interpolate import CubicSpline
 
 import rodshell as rs
 from rodshell.formfinding.bound_drape import corrected_ends
+from rodshell.geometry.frames import unit
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid
 
 BEND = 0.01  # so small that beams are cubic splines
 AT = np.array([-2.5, -1.7, -0.9, 0.2, 1.0, 1.9])  # joints, unequally far apart
 PLANE = rs.HeightField(function=lambda x, y: 0 * x, domain=rs.Rectangle((20.0, 20.0)))
+
+
+def upright(points):
+    return np.tile([0.0, 0.0, 1.0], (len(points), 1))
 
 
 @pytest.mark.parametrize("tail", [0.0, 0.35])
@@ -23,7 +28,7 @@ def test_a_rod_on_a_plane_becomes_the_natural_spline_through_its_joints(tail):
     mesh = mesh_grid(grid, 0.1)
     points = mesh.flat.copy()
     points[:, 1] += BEND * points[:, 0] ** 2
-    found, on_rod = corrected_ends(PLANE, mesh, points), mesh.nodes_of(0)
+    found, on_rod = corrected_ends(PLANE, mesh, points, upright(points)), mesh.nodes_of(0)
     spline = CubicSpline(AT, BEND * AT**2, bc_type="natural")
     x = mesh.flat[on_rod, 0]
     ends = np.clip(x, AT[0], AT[-1])
@@ -42,7 +47,7 @@ def test_a_line_that_turns_far_in_its_last_span_is_left_alone():
     for turn, moves in ((0.45, True), (0.55, False)):
         points = mesh.flat.copy()
         points[:, 1] += 0.5 * turn * points[:, 0] ** 2 * (points[:, 0] < 0.6)  # of one span, from the level start on
-        moved = corrected_ends(PLANE, mesh, points) - points
+        moved = corrected_ends(PLANE, mesh, points, upright(points)) - points
         assert (np.abs(moved).max() > 1e-3) == moves
 
 
@@ -50,8 +55,9 @@ def test_a_line_that_turns_far_in_its_last_span_is_left_alone():
 def test_the_drape_starts_much_nearer_to_where_it_ends(target, monkeypatch):
     bound, seen = importlib.import_module("rodshell.formfinding.bound_drape"), list[np.ndarray]()
 
-    def listen(target, mesh, points):
-        seen.extend([points, corrected_ends(target, mesh, points)])
+    def listen(target, mesh, points, normal):
+        assert normal == pytest.approx(unit(target.level(points)[1]))
+        seen.extend([points, corrected_ends(target, mesh, points, normal)])
         return seen[-1]
 
     monkeypatch.setattr(bound, "corrected_ends", listen)
@@ -71,6 +77,6 @@ def test_it_is_but_a_guess(monkeypatch):
     target = rs.HeightField(formula="0.03*sin(20*x)*cos(17*y)", domain=rs.Disc(0.2))
     layout = rs.GridLayout.orthogonal(spacing=0.05, edge=0.0125, rotate=0.4)
     found = rs.drape(layout, rod, target, anchor=(-0.0269, -0.0448))
-    monkeypatch.setattr(bound, "corrected_ends", lambda target, mesh, points: target.retract(points))
+    monkeypatch.setattr(bound, "corrected_ends", lambda target, mesh, points, normal: target.retract(points))
     plain = rs.drape(layout, rod, target, anchor=(-0.0269, -0.0448))
     assert np.abs(found.positions - plain.positions).max() < 1e-11

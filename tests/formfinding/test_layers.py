@@ -182,7 +182,7 @@ def test_sideways_bending_of_a_lath_is_the_geodesic_curvature_of_the_spheres_net
     target, flat = TARGETS["hemisphere"], lath(4e-3)
     cut = rs.trim(rs.drape(rs.GridLayout.orthogonal(spacing=0.03, edge=0.0025), flat, target, joint=rs.Pin()))
     inner = np.abs(cut.mesh.stations[1:-1]).max() > 0  # all bends
-    bent = strong_bending(target, cut.mesh, cut.positions, np.full(len(cut.mesh.bends), inner), flat)
+    bent = strong_bending(target, cut.mesh, cut.positions, np.full(cut.mesh.node_count, inner), flat)
     exact = max(abs(rod.offset / R**2 * crossing_angle(rod.offset * rod.end / R**2)[1]) for rod in cut.mesh.grid.rods)
     assert bent.curvature == pytest.approx(exact, rel=0.1)  # rods straighten at their ends
     ratio, spacing = bent.ratio, 0.03

@@ -19,7 +19,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import directors_along, parallel_transport
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Stretch
-from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
+from rodshell.rods.isotropic import AT_ONCE, IsotropicBend, IsotropicBendTwist
 
 NODES = 7
 Z = np.array([0.0, 0.0, 1.0])
@@ -349,6 +349,23 @@ def test_rigid_motion_with_the_material_frames_changes_nothing():
         _, gradient, _ = evaluate(elements, state)
         np.testing.assert_allclose(gradient, turned_gradient, rtol=0, atol=1e-12 * norm(gradient))
     assert norm(gradient - first) > 0.1 * norm(first)  # it did turn
+
+
+def test_bends_do_not_depend_on_those_that_are_evaluated_with_them():
+    """More than are taken at once, in an order that shares no edges; each alone against all together."""
+    rng, count = np.random.default_rng(8), 2 * AT_ONCE + 5
+    state = np.cumsum(rng.uniform(0.5, 1.5, (count + 2, 3)), axis=0)
+    blocks = rng.permutation(np.arange(count)[:, None] + np.arange(3))
+    whole = IsotropicBend(blocks, rng.uniform(0.5, 2.0, count))
+    gradient, hessians = np.zeros_like(state), np.full((count, 9, 9), np.nan)
+    energy = whole.evaluate(state, gradient, hessians)
+    for row, stiffness, hessian in zip(blocks, whole.stiffness, hessians, strict=True):
+        single, alone = np.zeros_like(state), np.full((1, 9, 9), np.nan)
+        energy -= IsotropicBend(row[None], np.array([stiffness])).evaluate(state, single, alone)
+        gradient -= single
+        assert np.array_equal(alone[0], hessian)
+    assert abs(energy) < 1e-12
+    assert np.abs(gradient).max() < 1e-12
 
 
 @every_case

@@ -168,7 +168,7 @@ class Case(Table):
 
     def with_rod(self, rod: "Rod") -> "Case":
         """The same case with this rod spelled out."""
-        if self.rod.held is not None:
+        if self.rod.held is not None or not self.rod.left_open:
             return self
         return self.model_copy(update={"rod": RodTable.model_validate(rod.parameters())})
 

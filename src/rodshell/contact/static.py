@@ -11,7 +11,7 @@ from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS
-from rodshell.targets import Gap, Target
+from rodshell.targets import Target
 from rodshell.validation import brief
 
 
@@ -33,12 +33,16 @@ class BoundToTarget:
     __repr__ = brief
 
     @cached_property
-    def _latest(self) -> "_Latest":
-        return _Latest(self)
+    def _latest(self) -> list[tuple[Floats, Freedom]]:
+        """The latest state (n, 3) [m] with its free directions."""
+        return []
 
     def freedom(self, state: Floats) -> Freedom:
-        """The free directions of the nodes (n, 3) [m]."""
-        return self._latest.at(state).freedom
+        """The free directions of the nodes (n, 3) [m], which are kept: a solver asks for them several times a state."""
+        if not (self._latest and state is self._latest[0][0]):
+            gradient = self.target.level(state)[1]
+            self._latest[:] = [(state, Freedom(_tangents(gradient, self.guides), self.count))]
+        return self._latest[0][1]
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
         """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N].
@@ -48,8 +52,9 @@ class BoundToTarget:
         state : (n, 3) nodes [m].
         gradient : (n, 3) of the energy there [N].
         """
-        surface = self._latest.at(state).surface
-        return -dot(surface.normal, gradient)[:, None, None] * surface.hessian
+        _, normal, curvature = self.target.on_surface(state)
+        curvature *= -dot(normal, gradient)[:, None, None]
+        return curvature
 
     def remaining(self, state: Floats) -> Floats | None:
         """None: nothing is prescribed."""
@@ -58,30 +63,6 @@ class BoundToTarget:
     def retract(self, state: Floats) -> Floats:
         """The nodes (n, 3) put back on the surface [m]."""
         return self.target.retract(state)
-
-
-class _Latest:
-    """Free directions and curvature at the latest state: a solver needs them several times at each state."""
-
-    def __init__(self, bound: BoundToTarget) -> None:
-        self._bound, self._points = bound, np.empty((0, 3))
-
-    def at(self, points: Floats) -> "_Latest":
-        """This, at `points` (n, 3) [m]."""
-        if not np.array_equal(points, self._points):
-            self._points = points.copy()
-            self.__dict__.pop("freedom", None)
-            self.__dict__.pop("surface", None)
-        return self
-
-    @cached_property
-    def freedom(self) -> Freedom:
-        bound = self._bound
-        return Freedom(_tangents(bound.target.level(self._points)[1], bound.guides), bound.count)
-
-    @cached_property
-    def surface(self) -> Gap:
-        return self._bound.target.on_surface(self._points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,15 +121,16 @@ def _tangents(steepest, guides):  # type: ignore[no-untyped-def]
     """(n, 3, 3) two directions across `steepest` (n, 3), the first nearest to `guides` (n, 3); the third is zero."""
     directions = np.zeros((len(steepest), 3, 3))
     for i in range(len(steepest)):
-        n, g, along, across = steepest[i], guides[i], directions[i, 0], directions[i, 1]
-        length = np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-        share = (g[0] * n[0] + g[1] * n[1] + g[2] * n[2]) / length**2
+        nx, ny, nz = steepest[i, 0], steepest[i, 1], steepest[i, 2]
+        gx, gy, gz = guides[i, 0], guides[i, 1], guides[i, 2]
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        share = (gx * nx + gy * ny + gz * nz) / (length * length)
+        ax, ay, az = gx - share * nx, gy - share * ny, gz - share * nz
+        width = np.sqrt(ax * ax + ay * ay + az * az)
+        ax, ay, az = ax / width, ay / width, az / width
+        along, across = directions[i, 0], directions[i, 1]
+        along[0], along[1], along[2] = ax, ay, az
+        across[0], across[1], across[2] = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
         for k in range(3):
-            along[k] = g[k] - share * n[k]
-        width = np.sqrt(along[0] ** 2 + along[1] ** 2 + along[2] ** 2)
-        for k in range(3):
-            along[k] /= width
-        for k in range(3):
-            a, b = (k + 1) % 3, (k + 2) % 3
-            across[k] = (n[a] * along[b] - n[b] * along[a]) / length
+            across[k] /= length
     return directions

@@ -6,7 +6,7 @@ result does not depend on scale or material. The axes and the anchor are held, a
 from the net's lines with their ends corrected, close to the final rods.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from math import degrees
 
@@ -19,9 +19,9 @@ from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
 from rodshell.geometry.frames import dot, unit
 from rodshell.joints import Joint
 from rodshell.kernels import njit
-from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
+from rodshell.layout import GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import whole_rods
-from rodshell.layout.mesh import entries_along
+from rodshell.layout.mesh import spans_along
 from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.apron import with_apron
@@ -72,14 +72,16 @@ def bound_drape(
     for rod_of, piece in zip(whole.tolist(), net.rods, strict=True):
         marks[rod_of] += (piece.start, piece.end)
     mesh = mesh_grid(grid, layout.edge, marks=marks)
-    on_rods = entries_along(mesh, net.rods, whole)
+    ends = np.array([(piece.start, piece.end) for piece in net.rods])
+    spans = spans_along(mesh, ends, whole)
     start = net.node_positions(mesh)
     rod_within = _within_surface(rod)
-    shell, corrected = Shell.of(mesh, rod_within), corrected_ends(target, mesh, start)
+    shell, normal = Shell.of(mesh, rod_within), unit(target.level(start)[1])
+    corrected = corrected_ends(target, mesh, start, normal)
     problem = Problem(
         elements=shell.elements,
         stretch=_penalty(shell.stretch, rod_within, target),
-        constraint=_bind(target, mesh, start),
+        constraint=_bind(target, mesh, start, normal),
         length=target.size,
         inextensible=True,
         flat_coordinates=shell.flat_coordinates,
@@ -89,7 +91,8 @@ def bound_drape(
         progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
     touching = np.zeros(mesh.node_count, dtype=bool)
-    touching[mesh.rod_nodes[on_rods[1]]] = True
+    for first, last in spans.tolist():
+        touching[mesh.rod_nodes[first : last + 1]] = True
     on_target = np.flatnonzero(touching)
     value, gradient = target.level(found.state)
     steep = np.sqrt(dot(gradient, gradient))
@@ -98,13 +101,11 @@ def bound_drape(
     warnings = [*target.warnings, *net.warnings]
     strong = None
     if joint and joint.holds_normals:
-        bends = np.asarray(touching[mesh.bends].all(axis=1))
-        strong = strong_bending(target, mesh, found.state, bends, rod)
+        strong = strong_bending(target, mesh, found.state, touching, rod)
     if strong is not None:
         warnings += strong.warnings
     if not eccentricity:
-        edges = np.asarray(touching[mesh.edges].all(axis=1))
-        warnings += thickness_warnings(normal, mesh, found.state, edges, rod, min(layout.spacing))
+        warnings += thickness_warnings(normal, mesh, found.state, touching, rod, min(layout.spacing))
     if found.report.negative_modes:
         warnings.append(
             f"the drape is not a minimum of the bound grid's energy ({found.report.negative_modes} negative modes): "
@@ -118,12 +119,13 @@ def bound_drape(
             f"the families meet at only {degrees(net.min_angle):.1f} degrees near ({x:.4g}, {y:.4g}, {z:.4g}) m: "
             "the joints there nearly close; another anchor or heading, a smaller part or a seam may open them"
         )
+    built = [not piece.virtual for piece in net.rods]
     figures = DrapeFigures(
         max_gap=float(np.abs(value / steep)[on_target].max()),  # to first order
         contact_pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
         min_angle=net.min_angle,
         min_angle_at=net.min_angle_at,
-        net_deviation=_net_deviation(target, mesh, net.rods, whole, on_rods, found.state),
+        net_deviation=_net_deviation(target, mesh, ends[built], whole[built], spans[built], found.state),
         strong_bending=strong,
     )
     return Draped(
@@ -200,16 +202,16 @@ def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentric
     return np.asarray(mesh.edge_lengths * np.sqrt(dot(chord, chord) / dot(in_layer, in_layer)))
 
 
-def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
+def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats) -> BoundToTarget:
     """All nodes on the target; those of the two axes are held on their lines, and the anchor at its point."""
-    count = np.full(mesh.node_count, 2, dtype=np.intp)
-    guides = np.tile([1.0, 0.0, 0.0], (mesh.node_count, 1))
-    guides[np.abs(unit(target.level(start)[1])[:, 0]) > 0.7] = [0.0, 1.0, 0.0]
+    count, guides = np.full(mesh.node_count, 2, dtype=np.intp), np.zeros((mesh.node_count, 3))
+    guides[:, 1] = np.abs(normal[:, 0]) > 0.7
+    guides[:, 0] = 1.0 - guides[:, 1]
     for k, line in enumerate(mesh.grid.rods):
         if line.offset == 0.0:
             nodes = mesh.nodes_of(k)
             count[nodes] -= 1
-            guides[nodes] = np.gradient(start[nodes], axis=0)
+            guides[nodes] = start[np.append(nodes[1:], nodes[-1])] - start[np.append(nodes[0], nodes[:-1])]
     return BoundToTarget(target, count, guides)
 
 
@@ -226,28 +228,16 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
     ]
 
 
-def _net_deviation(
-    target: Target,
-    mesh: GridMesh,
-    rods: Sequence[FlatRod],
-    whole: Ints,
-    on_rods: tuple[Ints, Ints],
-    positions: Floats,
-) -> Floats:
+def _net_deviation(target: Target, mesh: GridMesh, ends: Floats, whole: Ints, spans: Ints, positions: Floats) -> Floats:
     """(k, 2) how far past both ends of each rod that is built this state crosses the target's end, along the rod [m].
 
     Parameters
     ----------
-    rods, whole : as cut by the net, and the rod of the mesh that each belongs to.
-    on_rods : see `entries_along`.
+    ends, whole : (k, 2), (k,) of rods as cut by the net [m], and the rod of the mesh that each belongs to.
+    spans : (k, 2) see `spans_along`.
     positions : (n, 3) of the mesh's nodes [m].
     """
-    rod, entry = on_rods
-    starts = np.searchsorted(rod, np.arange(len(rods) + 1))
-    nodes = entry[np.column_stack([starts[:-1], starts[1:] - 1])]  # those at both ends
-    ends = np.array([(piece.start, piece.end) for piece in rods])
-    built = np.flatnonzero([not piece.virtual for piece in rods])
-    nodes, ends, whole = nodes[built].ravel(), ends[built].ravel(), np.repeat(whole[built], 2)
+    nodes, ends, whole = spans.ravel(), ends.ravel(), np.repeat(whole, 2)
     first, last = mesh.rod_start[whole], mesh.rod_stop[whole] - 1
     window = np.maximum(np.minimum(nodes - (mesh.stations[nodes] >= ends), last - 2), first)
     three = np.minimum(window + np.arange(3)[:, None], last)
@@ -275,7 +265,7 @@ def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
     }
 
 
-def corrected_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
+def corrected_ends(target: Target, mesh: GridMesh, points: Floats, normal: Floats) -> Floats:
     """(n, 3) the nodes, moved sideways on the target to where rods would lie, to first order [m].
 
     A line of the net is curved up to its end, while a rod's bending moment vanishes there (the natural boundary
@@ -289,10 +279,10 @@ def corrected_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
     target : the surface.
     mesh : of the net's lines.
     points : (n, 3) its nodes on the net's lines [m].
+    normal : (n, 3) of the surface there.
     """
     joint = np.zeros(mesh.node_count, dtype=bool)
     joint[mesh.joint_nodes] = True
-    normal = unit(target.level(points)[1])
     result = points.copy()
     rods = np.flatnonzero([rod.offset != 0.0 for rod in mesh.grid.rods])
     _correct(points, normal, mesh.rod_nodes, mesh.rod_start[rods], mesh.rod_stop[rods], mesh.stations, joint, result)
@@ -301,79 +291,62 @@ def corrected_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
 
 @njit(error_model="numpy")
 def _correct(points, normal, rod_nodes, rod_start, rod_stop, stations, joint, result):  # type: ignore[no-untyped-def]
+    most = 0
+    for rod in range(len(rod_start)):
+        most = max(most, rod_stop[rod] - rod_start[rod])
+    at, side, curvature = np.empty(most, dtype=np.int64), np.empty((most, 3)), np.empty(most)
+    moments, share = np.empty(most), np.empty(most)
     for rod in range(len(rod_start)):
         nodes, s = rod_nodes[rod_start[rod] : rod_stop[rod]], stations[rod_start[rod] : rod_stop[rod]]
-        at = np.flatnonzero(joint[nodes])
-        if len(at) < 2 or len(nodes) < 5:
+        joints, last = 0, len(nodes) - 1
+        for k in range(len(nodes)):
+            if joint[nodes[k]]:
+                at[joints] = k
+                joints += 1
+        if joints < 2 or last < 4:
             continue
-        side = _sideways(points, normal, nodes)
-        curvature = _curvature(points, nodes, s, side)
-        first, last = curvature[at[0]], curvature[at[-1]]
-        if max(abs(first) * (s[at[1]] - s[at[0]]), abs(last) * (s[at[-1]] - s[at[-2]])) > STEEP:
+        for k in range(len(nodes)):  # unit vectors across the rod, and geodesic curvature towards them by three nodes
+            before, after, square, curvature[k] = max(k - 1, 0), min(k + 1, last), 0.0, 0.0
+            a, b, c, back, ahead = nodes[before], nodes[k], nodes[after], s[k] - s[before], s[after] - s[k]
+            for i in range(3):
+                m, p = (i + 1) % 3, (i + 2) % 3
+                across = normal[b, m] * (points[c, p] - points[a, p]) - normal[b, p] * (points[c, m] - points[a, m])
+                side[k, i] = across
+                square += across * across
+            for i in range(3):
+                side[k, i] /= np.sqrt(square)
+            if at[0] + 2 < k < at[joints - 1] - 2:  # only the first and the last joint's curvature is needed
+                continue
+            for i in range(3):
+                turn = (points[c, i] - points[b, i]) / ahead - (points[b, i] - points[a, i]) / back
+                curvature[k] += 2.0 * turn / (back + ahead) * side[k, i]
+        for end, k, step in ((0, 1, 1), (last, last - 1, -1)):  # extrapolated
+            rate = (curvature[k + step] - curvature[k]) / (s[k + step] - s[k])
+            curvature[end] = curvature[k] + rate * (s[end] - s[k])
+        # second derivatives of the cubic spline that vanishes at the joints, given those at its ends
+        moments[0], moments[joints - 1], share[0], turn = -curvature[at[0]], -curvature[at[joints - 1]], 0.0, 0.0
+        for end, inner in ((0, 1), (joints - 1, joints - 2)):
+            turn = max(turn, abs(moments[end]) * abs(s[at[inner]] - s[at[end]]))
+        if turn > STEEP:
             continue
-        moments = _moments(s[at], -first, -last)
-        for span in range(len(at) - 1):
+        for k in range(1, joints - 1):
+            back, ahead = s[at[k]] - s[at[k - 1]], s[at[k + 1]] - s[at[k]]
+            pivot = 2.0 * (back + ahead) - back * share[k - 1]
+            share[k] = ahead / pivot
+            moments[k] = -back * moments[k - 1] / pivot
+        for k in range(joints - 2, 0, -1):
+            moments[k] -= share[k] * moments[k + 1]
+        span = 0
+        for k in range(len(nodes)):
+            if k == at[span + 1] and span + 2 < joints:
+                span += 1
             a, b = at[span], at[span + 1]
             h = s[b] - s[a]
-            for k in range(a + 1, b):
-                x, y = (s[b] - s[k]) / h, (s[k] - s[a]) / h
-                shift = h * h / 6.0 * (moments[span] * (x**3 - x) + moments[span + 1] * (y**3 - y))
-                _shift(result, nodes[k], shift, side, k)
-        for end, inner, stop, step in ((0, 1, -1, -1), (len(at) - 1, len(at) - 2, len(nodes), 1)):
-            begin, h = at[end], abs(s[at[end]] - s[at[inner]])
-            slope = h / 6.0 * (2.0 * moments[end] + moments[inner])
-            for k in range(begin + step, stop, step):  # past the last joint the rod is straight
-                far = abs(s[k] - s[begin])
-                _shift(result, nodes[k], far * (slope + 0.5 * far * moments[end]), side, k)
-
-
-@njit()
-def _shift(result, node, shift, side, k):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        result[node, i] += shift * side[k, i]
-
-
-@njit(error_model="numpy")
-def _sideways(points, normal, nodes):  # type: ignore[no-untyped-def]
-    """(n, 3) unit vectors in the surface across a rod."""
-    side, last = np.empty((len(nodes), 3)), len(nodes) - 1
-    for k in range(len(nodes)):
-        a, b, n, square = points[nodes[max(k - 1, 0)]], points[nodes[min(k + 1, last)]], normal[nodes[k]], 0.0
-        for i in range(3):
-            m, p = (i + 1) % 3, (i + 2) % 3
-            side[k, i] = n[m] * (b[p] - a[p]) - n[p] * (b[m] - a[m])
-            square += side[k, i] ** 2
-        for i in range(3):
-            side[k, i] /= np.sqrt(square)
-    return side
-
-
-@njit(error_model="numpy")
-def _curvature(points, nodes, s, side):  # type: ignore[no-untyped-def]
-    """(n,) geodesic curvature towards `side` by three nodes [1/m], extrapolated to the ends."""
-    curvature = np.empty(len(nodes))
-    for k in range(1, len(nodes) - 1):
-        before, after, curvature[k] = s[k] - s[k - 1], s[k + 1] - s[k], 0.0
-        for i in range(3):
-            turn = (points[nodes[k + 1], i] - points[nodes[k], i]) / after
-            turn -= (points[nodes[k], i] - points[nodes[k - 1], i]) / before
-            curvature[k] += 2.0 * turn / (before + after) * side[k, i]
-    for end, k, step in ((0, 1, 1), (len(nodes) - 1, len(nodes) - 2, -1)):
-        rate = (curvature[k + step] - curvature[k]) / (s[k + step] - s[k])
-        curvature[end] = curvature[k] + rate * (s[end] - s[k])
-    return curvature
-
-
-@njit(error_model="numpy")
-def _moments(s, first, last):  # type: ignore[no-untyped-def]
-    """(n,) second derivatives of the cubic spline that vanishes at `s` (n,), given those at its ends."""
-    moments, share = np.zeros(len(s)), np.zeros(len(s))
-    moments[0], moments[-1] = first, last
-    for k in range(1, len(s) - 1):
-        before, after = s[k] - s[k - 1], s[k + 1] - s[k]
-        pivot = 2.0 * (before + after) - before * share[k - 1]
-        share[k] = after / pivot
-        moments[k] = -before * moments[k - 1] / pivot
-    for k in range(len(s) - 2, 0, -1):
-        moments[k] -= share[k] * moments[k + 1]
-    return moments
+            x, y = (s[b] - s[k]) / h, (s[k] - s[a]) / h
+            shift = h * h / 6.0 * (moments[span] * (x**3 - x) + moments[span + 1] * (y**3 - y))
+            if not a <= k <= b:  # past the last joint the rod is straight
+                end, inner = (span, span + 1) if k < a else (span + 1, span)
+                slope, far = h / 6.0 * (2.0 * moments[end] + moments[inner]), abs(s[k] - s[at[end]])
+                shift = far * (slope + 0.5 * far * moments[end])
+            for i in range(0 if joint[nodes[k]] else 3):
+                result[nodes[k], i] += shift * side[k, i]

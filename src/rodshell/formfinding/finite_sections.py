@@ -111,7 +111,7 @@ def rod_thickness(rod: Rod) -> float:
 
 
 def thickness_warnings(
-    normal: Floats, mesh: GridMesh, positions: Floats, edges: Bools, rod: Rod, spacing: float
+    normal: Floats, mesh: GridMesh, positions: Floats, touching: Bools, rod: Rod, spacing: float
 ) -> tuple[str, ...]:
     """A warning where thick rods, laid one above the other, would differ in length from lines on one surface.
 
@@ -119,13 +119,15 @@ def thickness_warnings(
     ----------
     normal : (n, 3) of the target at the mesh's nodes.
     positions : (n, 3) of the mesh's nodes, on the target [m].
-    edges : (e,) which edges of the mesh lie on the target.
+    touching : (n,) which of them lie on the target itself, not on its continuation.
     spacing : of the rods [m].
     """
     thick = rod_thickness(rod)
-    a, b = mesh.edges[edges].T
-    chord = positions[b] - positions[a]
-    bent = thick * dot(normal[b] - normal[a], chord) / dot(chord, chord)
+    a, b = mesh.edges.T
+    edges = touching[a] & touching[b]
+    a, b = a[edges], b[edges]
+    chord, turn = (each.take(b, axis=0) - each.take(a, axis=0) for each in (positions, normal))
+    bent = thick * dot(turn, chord) / dot(chord, chord)
     if not (np.abs(bent).max(initial=0.0) > THICK or thick > CLOSE * spacing):
         return ()
     change = 0.5 * np.bincount(mesh.edge_rods[edges], weights=bent * mesh.edge_lengths[edges])
@@ -209,17 +211,22 @@ class StrongBending:
         )
 
 
-def strong_bending(target: Target, mesh: GridMesh, positions: Floats, bends: Bools, rod: Rod) -> StrongBending | None:
+def strong_bending(
+    target: Target, mesh: GridMesh, positions: Floats, touching: Bools, rod: Rod
+) -> StrongBending | None:
     """How rods that cannot roll at their joints bend about their strong axis; None where both axes are alike.
 
     Parameters
     ----------
     positions : (n, 3) of the mesh's nodes, on the target [m].
-    bends : (b,) which bends of the mesh lie on the target.
+    touching : (n,) which of them lie on the target itself, not on its continuation.
     """
     stiffnesses = rod.bend_stiffnesses
     weak, strong = sorted(stiffnesses)
-    if weak == strong or not bends.any():
+    if weak == strong:
+        return None
+    bends = np.asarray(touching[mesh.bends].all(axis=1))
+    if not bends.any():
         return None
     flat = stiffnesses[1] == strong
     before, here, after = (positions[mesh.bends[bends, k]] for k in range(3))

@@ -25,8 +25,8 @@ from rodshell.formfinding.trim import (
     trim,
     untrimmed,
 )
-from rodshell.geometry.curves import lagrange
 from rodshell.joints import Ball, Joint, require_joint
+from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.progress import Progress, silent
@@ -92,9 +92,26 @@ def agreement(popped: PopUp, target: Target) -> Agreement:
 
 def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     """(e, 3) points of the rods halfway along each edge, on the cubic through the nearest nodes of the rod."""
-    result = np.empty((len(mesh.edges), 3))
-    for edges, near, middles in mesh.around_edges:
-        result[edges] = lagrange(mesh.stations[near], positions[mesh.rod_nodes[near]], middles)
+    return np.asarray(_edge_middles(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
+
+
+@njit(error_model="numpy")
+def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
+    result, edge = np.zeros((len(rod_nodes) - len(rod_start), 3)), 0
+    for rod in range(len(rod_start)):
+        start, stop = rod_start[rod], rod_stop[rod]
+        count = min(stop - start, 4)
+        for entry in range(start, stop - 1):
+            middle = 0.5 * (stations[entry] + stations[entry + 1])
+            first = min(max(entry + 1 - count // 2, start), stop - count)
+            for j in range(first, first + count):
+                weight = 1.0
+                for k in range(first, first + count):
+                    if j != k:
+                        weight *= (middle - stations[k]) / (stations[j] - stations[k])
+                for axis in range(3):
+                    result[edge, axis] += weight * positions[rod_nodes[j], axis]
+            edge += 1
     return result
 
 

@@ -112,7 +112,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
             f"no rod of the grid has {fewest} joints on the target: use a smaller spacing or a larger target"
         )
     mesh, nodes = cut_mesh(source, kept)
-    positions = positions[nodes]
+    positions = positions.take(nodes, axis=0)
     normals: Floats | None = None
     if draped.eccentricity:
         bound = isinstance(draped.method, Bound)

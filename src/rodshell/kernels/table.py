@@ -21,6 +21,9 @@ KERNELS: dict[str, dict[str, str]] = {
     "formfinding.bound_drape": {
         "_correct": "f2 f2 i1 i1 i1 f1 b1 f2",
     },
+    "formfinding.pipeline": {
+        "_edge_middles": "f2 i1 i1 i1 f1",
+    },
     "geometry.curves": {
         "_on_curve": "f1 f2 f1",
         "lagrange": "f2 f3 f1",
@@ -32,6 +35,15 @@ KERNELS: dict[str, dict[str, str]] = {
     },
     "joints.ties": {
         "_offset_tie": "f2 i2 i2 i1 f2 f1 f1 f3 f3 f2 f3",
+    },
+    "layout.flatgrid": {
+        "_crossings": "f2 f",
+    },
+    "layout.mesh": {
+        "_cut": "i2 i1 f1 i2 i1 i f1",
+        "_divided": "f2 i1 f1 i1 i1 i",
+        "_edges_and_bends": "i1 i1 f1",
+        "_spans": "i1 i1 f1 f2",
     },
     "model.assembly": {
         "_columns": "i1 i1 i1 i1",

@@ -12,9 +12,12 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
+from rodshell.kernels import njit
 from rodshell.layout.profile import Profile
 
 Family = Literal["u", "v", "free"]
+
+PARALLEL = 1e-9  # sine of the angle between lines that do not cross
 
 
 @dataclass(frozen=True)
@@ -184,21 +187,8 @@ class FlatGrid:
         margin : crossings closer to an end of either rod are not joined [m].
         """
         rods = tuple(rods)
-        origin = np.array([rod.origin for rod in rods])
-        direction = np.array([rod.direction for rod in rods])
-        start = np.array([rod.start for rod in rods])
-        end = np.array([rod.end for rod in rods])
-        sines = _cross(direction[:, None], direction)
-        a, b = np.nonzero(np.triu(np.abs(sines) > 1e-9, k=1))
-        sine = sines[a, b]
-        apart = origin[b] - origin[a]
-        at = np.column_stack([_cross(apart, direction[b]) / sine, _cross(apart, direction[a]) / sine])
-        slack = margin - 1e-9 * (end - start)  # a crossing exactly at an end is a joint at that end
-        met = np.ones(len(a), dtype=bool)
-        for side, rod in enumerate((a, b)):
-            met &= (at[:, side] >= start[rod] + slack[rod]) & (at[:, side] <= end[rod] - slack[rod])
-            at[:, side] = np.clip(at[:, side], start[rod], end[rod])
-        return FlatGrid(rods, Crossings(np.column_stack([a, b])[met], at[met]))
+        lines = np.array([(*rod.origin, *rod.direction, rod.start, rod.end) for rod in rods]).reshape(-1, 6)
+        return FlatGrid(rods, Crossings(*_crossings(lines, margin)))
 
     def __repr__(self) -> str:
         return f"FlatGrid({len(self.rods)} rods, {len(self.crossings)} crossings)"
@@ -314,6 +304,33 @@ def _refuse_overlaps(rods: Sequence[FlatRod]) -> None:
 
 def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+@njit(error_model="numpy")
+def _crossings(lines, margin):  # type: ignore[no-untyped-def]
+    """Pairs of rods (c, 2) that cross, and where on both (c, 2) [m]; closer to an end than `margin` [m] they do not.
+
+    Each row of `lines` (m, 6) has origin, direction, start and end of a rod.
+    """
+    count = 0
+    for a in range(len(lines)):
+        for b in range(a + 1, len(lines)):
+            count += abs(lines[a, 2] * lines[b, 3] - lines[a, 3] * lines[b, 2]) > PARALLEL
+    rods, at, count = np.empty((count, 2), dtype=np.int64), np.empty((count, 2)), 0
+    for a in range(len(lines)):
+        for b in range(a + 1, len(lines)):
+            sine = lines[a, 2] * lines[b, 3] - lines[a, 3] * lines[b, 2]
+            if abs(sine) > PARALLEL:
+                x, y, met = lines[b, 0] - lines[a, 0], lines[b, 1] - lines[a, 1], True
+                rods[count, 0], rods[count, 1] = a, b
+                for side in range(2):
+                    rod, other = rods[count, side], rods[count, 1 - side]
+                    s, start, end = (x * lines[other, 3] - y * lines[other, 2]) / sine, lines[rod, 4], lines[rod, 5]
+                    slack = margin - 1e-9 * (end - start)  # a crossing exactly at an end is a joint at that end
+                    met = met and s >= start + slack and s <= end - slack
+                    at[count, side] = min(max(s, start), end)
+                count += met
+    return rods[:count], at[:count]
 
 
 def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> Ints:

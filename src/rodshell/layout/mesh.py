@@ -6,11 +6,13 @@ Several meshed grids can be merged into one, side by side.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
+from rodshell.kernels import njit
 from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, sides, whole_rods
 from rodshell.layout.profile import Profile
 
@@ -71,54 +73,39 @@ class GridMesh:
         """(k,) rod of each entry of `rod_nodes`."""
         return np.repeat(np.arange(len(self.rod_start)), self.rod_stop - self.rod_start)
 
-    @cached_property
+    @property
     def edges(self) -> Ints:
         """(e, 2) nodes of each edge, rod by rod."""
-        return self._windows(2)
+        return self._stencils.edges
 
-    @cached_property
+    @property
     def edge_rods(self) -> Ints:
         """(e,) rod of each edge."""
-        return np.asarray(self.rod_of[:-1][self.rod_of[1:] == self.rod_of[:-1]])
+        return self._stencils.edge_rods
 
-    @cached_property
+    @property
     def edge_lengths(self) -> Floats:
         """(e,) rest lengths [m]."""
-        return np.asarray(np.diff(self.stations)[self.rod_of[1:] == self.rod_of[:-1]])
+        return self._stencils.edge_lengths
 
-    @cached_property
-    def around_edges(self) -> list[tuple[Ints, Ints, Floats]]:
-        """The nearest entries of `rod_nodes` around each edge: four on a rod that has as many.
-
-        For each number k of entries the edges (m,), their entries (m, k), and where the edges' middles are on their
-        rods (m,) [m].
-        """
-        rods = self.edge_rods
-        entry = np.arange(len(rods)) + rods  # an edge begins there
-        begin, length = self.rod_start[rods], (self.rod_stop - self.rod_start)[rods]
-        middles, result = 0.5 * (self.stations[entry] + self.stations[entry + 1]), list[tuple[Ints, Ints, Floats]]()
-        for count in range(2, 5):
-            edges = np.flatnonzero(np.minimum(length, 4) == count)
-            if len(edges):
-                first = np.clip(entry[edges] + 1 - count // 2, begin[edges], begin[edges] + length[edges] - count)
-                result.append((edges, first[:, None] + np.arange(count), middles[edges]))
-        return result
-
-    @cached_property
+    @property
     def bends(self) -> Ints:
         """(b, 3) nodes of each pair of consecutive edges of a rod."""
-        return self._windows(3)
+        return self._stencils.bends
 
-    @cached_property
+    @property
     def bend_rods(self) -> Ints:
         """(b,) rod of each bend."""
-        return np.asarray(self.rod_of[:-2][self.rod_of[2:] == self.rod_of[:-2]])
+        return self._stencils.bend_rods
 
-    @cached_property
+    @property
     def voronoi_lengths(self) -> Floats:
         """(b,) half the rest length of the two edges of each bend [m] [HQK Eq 1b, of the rest state: see ERRATA]."""
-        whole = (self.stations[2:] - self.stations[:-2])[self.rod_of[2:] == self.rod_of[:-2]]
-        return np.asarray(0.5 * whole)
+        return self._stencils.voronoi_lengths
+
+    @cached_property
+    def _stencils(self) -> "_Stencils":
+        return _Stencils(*_edges_and_bends(self.rod_nodes, self.rod_start, self.stations))
 
     @cached_property
     def ends(self) -> Ints:
@@ -200,12 +187,6 @@ class GridMesh:
         """(m,) where each rod ends in `rod_nodes`: one past its last entry."""
         return np.append(self.rod_start[1:], len(self.rod_nodes))
 
-    def _windows(self, width: int) -> Ints:
-        last = len(self.rod_nodes) - width + 1
-        inside = self.rod_of[width - 1 :] == self.rod_of[:last]
-        columns = [self.rod_nodes[k : k + last][inside] for k in range(width)]
-        return np.column_stack(columns)
-
     def with_profiles(self, profiles: Profile | Sequence[Profile | None] | None) -> "GridMesh":
         """The same mesh of rods whose sections change along them; arguments as of `FlatGrid.with_profiles`."""
         return replace(self, grid=self.grid.with_profiles(profiles))
@@ -237,6 +218,40 @@ class GridMesh:
         return result
 
 
+class _Stencils(NamedTuple):
+    """Edges and bends; see the properties of `GridMesh` of the same names."""
+
+    edges: Ints
+    edge_rods: Ints
+    edge_lengths: Floats
+    bends: Ints
+    bend_rods: Ints
+    voronoi_lengths: Floats
+
+
+@njit()
+def _edges_and_bends(rod_nodes, rod_start, stations):  # type: ignore[no-untyped-def]
+    edge_count, bend_count, stop = 0, 0, len(rod_nodes)
+    for rod in range(len(rod_start) - 1, -1, -1):
+        edge_count += stop - rod_start[rod] - 1
+        bend_count += max(stop - rod_start[rod] - 2, 0)
+        stop = rod_start[rod]
+    edges, edge_rods = np.empty((edge_count, 2), dtype=np.int64), np.empty(edge_count, dtype=np.int64)
+    bends, bend_rods = np.empty((bend_count, 3), dtype=np.int64), np.empty(bend_count, dtype=np.int64)
+    lengths, voronoi, e, b = np.empty(edge_count), np.empty(bend_count), 0, 0
+    for rod in range(len(rod_start)):
+        stop = rod_start[rod + 1] if rod + 1 < len(rod_start) else len(rod_nodes)
+        for k in range(rod_start[rod], stop - 1):
+            edges[e, 0], edges[e, 1] = rod_nodes[k], rod_nodes[k + 1]
+            edge_rods[e], lengths[e] = rod, stations[k + 1] - stations[k]
+            e += 1
+            if k + 2 < stop:
+                bends[b, 0], bends[b, 1], bends[b, 2] = rod_nodes[k], rod_nodes[k + 1], rod_nodes[k + 2]
+                bend_rods[b], voronoi[b] = rod, 0.5 * (stations[k + 2] - stations[k])
+                b += 1
+    return edges, edge_rods, lengths, bends, bend_rods, voronoi
+
+
 def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
     """Divide a flat grid into edges: each span between joints, and each end of a rod, into the fewest equal edges.
 
@@ -246,54 +261,87 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
     edge : longest edge [m].
     marks : for each rod the material coordinates of further points that must be nodes [m].
     """
-    merged = _merge_joints(grid)
-    rod_of, s, nodes, count = _fixed_points(grid, merged, marks)
-    edges = np.ones(len(s), dtype=np.intp)  # from each fixed point to the next of its rod; 1 for the last
-    spans = np.flatnonzero(rod_of[1:] == rod_of[:-1])
-    edges[spans] = edge_counts(s[spans + 1] - s[spans], edge)
-    after = np.repeat(np.arange(len(s)), edges)
-    first = np.cumsum(edges) - edges
-    step = np.arange(len(after)) - first[after]
-    following = np.minimum(after + 1, len(s) - 1)
-    stations = s[after] + (s[following] - s[after]) * step / edges[after]
-    rod_nodes = np.where(step > 0, count - 1 + np.cumsum(step > 0), nodes[after])
-    flat = np.zeros((count + int(np.count_nonzero(step)), 3))
-    origin, direction = np.array([rod.origin for rod in grid.rods]), np.array([rod.direction for rod in grid.rods])
-    line = rod_of[after]
-    flat[rod_nodes, :2] = origin[line] + stations[:, None] * direction[line]
-    starts = np.searchsorted(rod_of, np.arange(len(grid.rods)))
-    return GridMesh(grid, flat, rod_nodes, first[starts], stations, merged)
+    first, s, nodes, count, joint_nodes = _fixed_points(grid, [()] * len(grid.rods) if marks is None else marks)
+    lines = np.array([(*rod.origin, *rod.direction) for rod in grid.rods])
+    edges = edge_counts(np.diff(s), edge)
+    flat, rod_nodes, rod_start, stations = _divided(lines, first, s, nodes, edges, count)
+    return GridMesh(grid, flat, rod_nodes, rod_start, stations, joint_nodes)
 
 
-def _fixed_points(
-    grid: FlatGrid, merged: Ints, marks: Sequence[Sequence[float]] | None
-) -> tuple[Ints, Floats, Ints, int]:
-    """The points that must be nodes, along one rod after the other: rod, material coordinate [m] and node; and the
-    number of nodes.
+def _fixed_points(grid: FlatGrid, marks: Sequence[Sequence[float]]) -> tuple[Ints, Floats, Ints, int, Ints]:
+    """The points that must be nodes, along one rod after the other: of each rod where they begin; material coordinate
+    [m] and node of each; the number of nodes; and the node of each crossing.
 
-    The joints have the nodes `merged`. Ends and marks get a new node each, unless there is one already.
+    The start, the marks and the end of each rod get a new node each, unless there is a joint or an earlier one of them.
     """
-    given = [[rod.start, *(marks[k] if marks is not None else ()), rod.end] for k, rod in enumerate(grid.rods)]
-    rod_of_given = np.repeat(np.arange(len(given)), [len(stations) for stations in given])
-    added = np.array([s for stations in given for s in stations])
-    # each joint once on each of its rods: three rods make three crossings
-    rod, s, nodes = grid.crossings.rods.ravel(), grid.crossings.at.ravel(), np.repeat(merged, 2)
-    order = np.lexsort((s, nodes, rod))
-    once = order[np.diff(rod[order] * len(rod) + nodes[order], prepend=-1) > 0]
-    rod, s = np.concatenate([rod[once], rod_of_given]), np.concatenate([s[once], added])
-    nodes = np.concatenate([nodes[once], np.full(len(added), -1)])
-    rank = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(added))])  # the lowest is kept
-    order = np.lexsort((rank, s, rod))
-    rod, s, nodes, rank = rod[order], s[order], nodes[order], rank[order]
-    tiny = 1e-9 * (grid.ends[:, 1] - grid.ends[:, 0])
-    near = (rod[1:] == rod[:-1]) & (s[1:] - s[:-1] <= tiny[rod[1:]])
-    group = np.cumsum(np.append(0, ~near))  # points of a rod at one place: the first is kept, and every joint
-    first = np.full(group[-1] + 1, len(rank))
-    np.minimum.at(first, group, rank)
-    out = rank > first[group]
-    joints, fresh = int(merged.max(initial=-1)) + 1, np.flatnonzero(~out & (nodes < 0))
-    nodes[fresh[np.argsort(rank[fresh])]] = joints + np.arange(len(fresh))
-    return rod[~out], s[~out], nodes[~out], joints + len(fresh)
+    every, sides = np.arange(len(grid.rods)), 2 * len(grid.crossings)
+    given = np.array([s for rod, more in zip(grid.rods, marks, strict=True) for s in (rod.start, *more, rod.end)])
+    counts = np.array([len(more) + 2 for more in marks])
+    last = np.cumsum(counts) - 1
+    lengths = given[last] - given[last + 1 - counts]
+    rod = np.concatenate([grid.crossings.rods.ravel(), np.repeat(every, counts)])
+    s = np.concatenate([grid.crossings.at.ravel(), given])
+    order = np.lexsort((s, rod))
+    along = order[order < sides]
+    joint_nodes = _merge_joints(along // 2, rod[along], s[along], 1e-7 * lengths.max(initial=0.0))
+    node = np.append(np.repeat(joint_nodes, 2), np.full(len(s) - sides, -1))
+    again = np.flatnonzero((np.diff(rod[along]) == 0) & (np.diff(node[along]) == 0))
+    if len(again):  # each joint once on each of its rods: three rods make three crossings
+        order = order[np.isin(order, along[again + 1], invert=True)]
+    rod, s, node, rank = rod[order], s[order], node[order], np.where(order < sides, -1, order)
+    apart = (rod[1:] != rod[:-1]) | (s[1:] - s[:-1] > 1e-9 * lengths[rod[1:]])
+    begin = np.flatnonzero(np.append(True, apart))  # of points of a rod at one place the first is kept, and every joint
+    kept = rank == np.repeat(np.minimum.reduceat(rank, begin), np.diff(np.append(begin, len(rank))))
+    joints, fresh = int(joint_nodes.max(initial=-1)) + 1, np.flatnonzero(kept & (rank >= 0))
+    node[fresh[np.argsort(rank[fresh])]] = joints + np.arange(len(fresh))
+    first = np.searchsorted(rod[kept], np.append(every, len(every)))
+    return first, s[kept], node[kept], joints + len(fresh), joint_nodes
+
+
+def _merge_joints(joint: Ints, rod: Ints, at: Floats, tiny: float) -> Ints:
+    """Node of each crossing: crossings at one point (of three rods or more) share their node.
+
+    They are neighbours along each of their rods, with no more than round-off between them: less than `tiny` [m].
+
+    Parameters
+    ----------
+    joint, rod, at : (2c,) crossings along one rod after the other, the rod, and where they are on it [m].
+    """
+    node, together = np.arange(len(joint) // 2), (np.diff(rod) == 0) & (np.diff(at) < tiny)
+    if not together.any():
+        return node
+    for a, b in zip(joint[:-1][together], joint[1:][together], strict=True):
+        node[node == node[b]] = node[a]
+    return np.unique(node, return_inverse=True)[1].astype(np.intp)
+
+
+@njit(error_model="numpy")
+def _divided(lines, begin, s, nodes, edges, count):  # type: ignore[no-untyped-def]
+    """Node positions, `rod_nodes`, `rod_start` and stations of rods with origin and direction `lines` (m, 4).
+
+    The `count` nodes of their fixed points come first, see `_fixed_points`; `edges` of each is the number of edges up
+    to the next of its rod.
+    """
+    size, rods = len(s), len(lines)
+    for rod in range(rods):
+        for k in range(begin[rod], begin[rod + 1] - 1):
+            size += edges[k] - 1
+    flat, stations = np.zeros((count + size - len(s), 3)), np.empty(size)
+    rod_nodes, rod_start, entry = np.empty(size, dtype=np.int64), np.empty(rods, dtype=np.int64), 0
+    for rod in range(rods):
+        rod_start[rod] = entry
+        for k in range(begin[rod], begin[rod + 1]):
+            last = k + 1 == begin[rod + 1]
+            for step in range(1 if last else edges[k]):
+                node, at = nodes[k], s[k]
+                if step > 0:
+                    node, at = count, s[k] + (s[k + 1] - s[k]) * step / edges[k]
+                    count += 1
+                rod_nodes[entry], stations[entry] = node, at
+                for axis in range(2):
+                    flat[node, axis] = lines[rod, axis] + at * lines[rod, 2 + axis]
+                entry += 1
+    return flat, rod_nodes, rod_start, stations
 
 
 def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
@@ -318,51 +366,79 @@ def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
     order = np.argsort(known, kind="stable")
     found = order[np.minimum(np.searchsorted(known, pairs, sorter=order), len(known) - 1)]
     kept = known[found] == pairs
-    grid = FlatGrid(grid.rods, grid.crossings.select(kept))
-    _, first, joint = np.unique(mesh.joint_nodes[found[kept]], return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))  # joints keep the order of the crossings
-    joint = rank[joint]
-    shared = mesh.joint_nodes[found[kept]][np.sort(first)]
-    piece, entry = entries_along(mesh, rods, index)
-    s, node = mesh.stations[entry], mesh.rod_nodes[entry]
-    node_of = np.full(len(mesh.flat), -1)
-    node_of[shared] = np.arange(len(shared))
-    joints = np.append(np.sort((grid.crossings.rods * mesh.node_count + shared[joint][:, None]).ravel()), -1)
-    key = piece * mesh.node_count + node
-    joined = joints[np.searchsorted(joints[:-1], key)] == key
-    starts = np.searchsorted(piece, np.arange(len(rods) + 1))
-    from_end = np.minimum(s - s[starts[piece]], s[starts[piece + 1] - 1] - s)
-    crowded = ~joined & (from_end > 0.0) & (from_end < CROWDED * mesh.edge_lengths.max())
-    if crowded.any():
-        crowded &= from_end < CROWDED * _usual_edges(mesh)[index][piece]
-    single = ~joined & ~crowded
-    nodes = np.where(joined, node_of[node], len(shared) - 1 + np.cumsum(single))
-    made = joined | single
-    chosen = np.concatenate([shared, node[single]])
-    starts = np.searchsorted(piece[made], np.arange(len(rods)))
-    return GridMesh(grid, mesh.flat[chosen], nodes[made], starts, s[made], joint), chosen
+    grid = FlatGrid(rods, grid.crossings.select(kept))
+    spans, limits = spans_along(mesh, grid.ends, index), np.full(len(rods), CROWDED * mesh.edge_lengths.max())
+    source = spans, mesh.rod_nodes, mesh.stations, grid.crossings.rods, mesh.joint_nodes[found[kept]], mesh.node_count
+    nodes, *part, left_out = _cut(*source, limits)
+    if left_out:
+        nodes, *part, _ = _cut(*source, CROWDED * _usual_edges(mesh)[index])
+    return GridMesh(grid, mesh.flat.take(nodes, axis=0), *part), nodes
 
 
-def entries_along(mesh: GridMesh, rods: Sequence[FlatRod], whole: Ints) -> tuple[Ints, Ints]:
-    """Find all nodes on pieces of rods.
+@njit()
+def _cut(spans, rod_nodes, stations, crossings, crossing_nodes, node_count, limits):  # type: ignore[no-untyped-def]
+    """Nodes of the part in the mesh; its `rod_nodes`, `rod_start`, stations and joint nodes; the number of nodes that
+    are left out, because they are closer than `limits` (m,) [m] to an end and not at a joint.
+
+    The pieces have the entries `spans` (m, 2), and cross in pairs `crossings` (c, 2) at the nodes `crossing_nodes`.
+    """
+    number, joined = np.full(node_count, -1), np.full(node_count, -1)
+    last, before = np.full(len(spans), -1), np.empty(2 * len(crossings), dtype=np.int64)  # crossings of each piece
+    size = 0
+    for piece in range(len(spans)):
+        size += spans[piece, 1] + 1 - spans[piece, 0]
+    nodes, joints, count = np.empty(size, dtype=np.int64), np.empty(len(crossings), dtype=np.int64), 0
+    for k in range(2 * len(crossings)):
+        node, piece = crossing_nodes[k // 2], crossings[k // 2, k % 2]
+        if number[node] < 0:
+            number[node], nodes[count] = count, node
+            count += 1
+        joints[k // 2] = number[node]
+        before[k], last[piece] = last[piece], k
+    part, starts, s, used = np.empty(size, dtype=np.int64), np.empty(len(spans), dtype=np.int64), np.empty(size), 0
+    for piece in range(len(spans)):
+        low, high, k = spans[piece, 0], spans[piece, 1], last[piece]
+        starts[piece] = used
+        while k >= 0:
+            joined[crossing_nodes[k // 2]] = piece
+            k = before[k]
+        for entry in range(low, high + 1):
+            node, at = rod_nodes[entry], stations[entry]
+            if joined[node] == piece:
+                part[used] = number[node]
+            elif 0.0 < min(at - stations[low], stations[high] - at) < limits[piece]:
+                continue
+            else:
+                part[used], nodes[count] = count, node
+                count += 1
+            s[used] = at
+            used += 1
+    return nodes[:count], part[:used], starts, s[:used], joints, size - used
+
+
+def spans_along(mesh: GridMesh, ends: Floats, whole: Ints) -> Ints:
+    """(m, 2) the first and the last entry of a mesh's `rod_nodes` on each piece of a rod.
 
     Parameters
     ----------
     mesh : of the whole rods.
-    rods : pieces.
-    whole : (m,) the rod of the mesh that each piece belongs to.
-
-    Returns
-    -------
-    Piece (k,), and entry (k,) of the mesh's `rod_nodes` and `stations`, of each.
+    ends : (m, 2) material coordinates of start and end of each piece [m].
+    whole : (m,) the rod of the mesh that it belongs to.
     """
-    begin, length = mesh.rod_start[whole], (mesh.rod_stop - mesh.rod_start)[whole]
-    piece = np.repeat(np.arange(len(rods)), length)
-    entry = np.arange(len(piece)) + np.repeat(begin - (np.cumsum(length) - length), length)
-    start, end = np.array([(rod.start, rod.end) for rod in rods]).T
-    tiny, s = 1e-9 * (end - start), mesh.stations[entry]
-    on = (s >= (start - tiny)[piece]) & (s <= (end + tiny)[piece])
-    return piece[on], entry[on]
+    return np.asarray(_spans(mesh.rod_start[whole], mesh.rod_stop[whole] - 1, mesh.stations, ends))
+
+
+@njit()
+def _spans(first, last, stations, ends):  # type: ignore[no-untyped-def]
+    spans = np.empty((len(ends), 2), dtype=np.int64)
+    for k in range(len(ends)):
+        low, high, tiny = first[k], last[k], 1e-9 * (ends[k, 1] - ends[k, 0])
+        while low < high and stations[low] < ends[k, 0] - tiny:
+            low += 1
+        while low < high and stations[high] > ends[k, 1] + tiny:
+            high -= 1
+        spans[k, 0], spans[k, 1] = low, high
+    return spans
 
 
 def _usual_edges(mesh: GridMesh) -> Floats:
@@ -386,24 +462,6 @@ def edge_counts(lengths: Floats, edge: float) -> Ints:
     (n,) the smallest possible numbers.
     """
     return np.maximum(1, np.ceil(lengths / edge - 1e-6)).astype(np.intp)
-
-
-def _merge_joints(grid: FlatGrid) -> Ints:
-    """Node of each crossing: crossings at one point (of three rods or more) share their node.
-
-    They are neighbours along each of their rods, with no more than round-off between them.
-    """
-    rods, at = grid.crossings.rods.ravel(), grid.crossings.at.ravel()
-    order = np.lexsort((at, rods))
-    tiny = 1e-7 * (grid.ends[:, 1] - grid.ends[:, 0]).max(initial=0.0)
-    together = (np.diff(rods[order]) == 0) & (np.diff(at[order]) < tiny)
-    joint = order // 2
-    node = np.arange(len(grid.crossings))
-    if not together.any():
-        return node
-    for a, b in zip(joint[:-1][together], joint[1:][together], strict=True):
-        node[node == node[b]] = node[a]
-    return np.unique(node, return_inverse=True)[1].astype(np.intp)
 
 
 @dataclass(frozen=True, eq=False)

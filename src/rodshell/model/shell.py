@@ -153,7 +153,7 @@ class Shell:
         angles = np.empty((0, 2))
         if self.angles:
             angles = np.vstack([flat[self.mesh.edges].mean(axis=1), ghosts])[: self.angles]
-        return np.vstack([flat, ghosts, angles])[self.like]
+        return np.vstack([flat, ghosts, angles]).take(self.like, axis=0)
 
     def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
         """(N, 3) state of the shell.
@@ -306,16 +306,17 @@ class _Builder:
         mesh, parts = self.mesh, self.parts
         inner = np.ones(len(mesh.rod_nodes), dtype=bool)
         inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False
-        nodes, per_length = parts.bends, self.stiffness.compress(inner, axis=0) / mesh.voronoi_lengths[:, None]
+        stiffness = self.stiffness if self.twist else self.stiffness[:, :1]  # without twist angles all are alike
+        nodes, per_length = parts.bends, stiffness.compress(inner, axis=0) / mesh.voronoi_lengths[:, None]
         if len(self.ghosts):
             rows = np.column_stack([_inner_nodes(parts), parts.ends.ravel(), self.ghosts])
             ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
-            at_clamps = self.stiffness[ends] / (0.5 * last_edges(mesh)[:, None])
+            at_clamps = stiffness[ends] / (0.5 * last_edges(mesh)[:, None])
         if self.isotropic:
-            bends, stiffness = nodes, per_length[:, 0]
+            bends, of_bends = nodes, per_length[:, 0]
             if len(self.ghosts):
-                bends, stiffness = np.vstack([bends, rows]), np.append(stiffness, at_clamps[:, 0])
-            elements: tuple[Elements, ...] = (IsotropicBend(np.ascontiguousarray(bends), stiffness.copy()),)
+                bends, of_bends = np.vstack([bends, rows]), np.append(of_bends, at_clamps[:, 0])
+            elements: tuple[Elements, ...] = (IsotropicBend(np.ascontiguousarray(bends), of_bends.copy()),)
             if not self.twist:
                 return elements
         edge = self.first_angle + np.arange(len(mesh.edges))
