@@ -193,6 +193,10 @@ class Drawing:
 
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest x and y (2,), (2,) of all that is in the plane [mm]."""
+        return self._box
+
+    @cached_property
+    def _box(self) -> tuple[Floats, Floats]:
         parts = [np.zeros((0, 2)), *(path.points for path in self.paths if path.flat)]
         if self.marks:
             at, radius = np.array([mark.at for mark in self.marks]), np.array([[mark.radius] for mark in self.marks])

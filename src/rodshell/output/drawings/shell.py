@@ -1,6 +1,7 @@
 """Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection."""
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 import numpy as np
 
@@ -75,6 +76,8 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
 def erection_drawing(archive: Archive, text: float) -> Drawing:
     """Paths of the rod ends from flat to their supports, seen from above, and the shell's side at each stage.
 
+    A line through all ends shows where they are at each stage; a ring where they end.
+
     Parameters
     ----------
     text : usual size of the texts [mm at 1:1].
@@ -82,16 +85,18 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     pencil, history = Pencil(), archive.states["history"]
     assert archive.results.deployment is not None
     stages, mm = archive.results.deployment.stages, rounding_of(archive.results).mm
-    ends = np.concatenate([rod.nodes[[0, -1]] for rod in rods_of(archive) if len(rod.nodes) > 1])
-    ways = 1e3 * history[:, ends, :2]
+    drawn = [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
+    ends = np.concatenate([rod.nodes[[0, -1]] for rod in drawn])
+    ways, thin = 1e3 * history[:, ends, :2], Pen(SOFT, 0.05 * text)
+    loops = [loop for loop in outlines_of(drawn) if len(loop) > 1]
+    for stage, loop in product(ways[:-1], loops):
+        pencil.line(stage[loop], "DIM", closed=True, pen=thin)
     for way in ways.transpose(1, 0, 2):
-        pencil.line(way[[0, -1]], "DIM", pen=Pen("#b08a2e", 0.1 * text))
-    for k, points in enumerate(ways):
-        last = k == len(ways) - 1
-        for at in points:
-            pencil.mark(at, (0.3 if last else 0.12) * text, "MARK" if last else "DIM", pen=Pen(SOFT, 0.05 * text))
+        pencil.line(way, "DIM", pen=Pen("#b08a2e", 0.1 * text))
+        pencil.mark(way[-1], 0.3 * text, "MARK", pen=thin)
     low, high = ways.reshape(-1, 2).min(axis=0), ways.reshape(-1, 2).max(axis=0)
     pencil.write("Paths of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
+    pencil.write("Closed lines: the ends at each stage", (low[0], low[1] - 4.8 * text), text, "LABEL")
     left, top = high[0] + 8 * text, high[1]
     for k, (stage, positions) in enumerate(zip(stages, history, strict=True)):
         if k == len(stages) // 2 + 1:
@@ -115,7 +120,7 @@ def thinned(curve: Floats) -> Floats:
     ----------
     curve : (k, 2 or 3) nodes.
     """
-    return np.asarray(curve[np.unique(np.append(np.arange(0, len(curve), 3), len(curve) - 1))])
+    return np.asarray(curve[[*range(0, len(curve) - 1, 3), len(curve) - 1]])
 
 
 def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
