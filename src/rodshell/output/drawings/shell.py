@@ -298,8 +298,9 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     braces = [brace for brace in known if {brace.start, brace.end} <= joints.keys()]
     ends = 1e3 * np.array([[joints[end][:2] for end in (brace.start, brace.end)] for brace in braces])
     ends = ends.reshape(-1, 2, 2)
+    pen = Pen("#b08a2e", 0.07 * text)
     for brace, line in zip(braces, ends, strict=True):
-        pencil.line(line, "DIM", pen=Pen("#b08a2e", 0.07 * text), note=f"{brace.start} to {brace.end}")
+        pencil.line(line, "DIM", pen=pen, note=f"{brace.start} to {brace.end}")
     other = ends[_crossing(braces)]
     mm = rounding_of(archive.results).mm
     found = _numbers([mm(brace.final) for brace in braces], ends, other, text)
@@ -332,8 +333,10 @@ def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list
         half = 0.5 * size * np.column_stack([wide, np.full(len(words), LINE)])
         met = runs_through((seen - centre[:, None, None]) / half[:, None, None]).any(axis=1)
         for k in np.flatnonzero(~met).tolist():
+            if k in found:
+                continue
             at = middle[k] + off[k] * along[k] + up * size * above[k]
             written = Text(words[k], at, size, "LABEL", "middle", float(angle[k]), colour="#6b5212")
-            if k not in found and room.claim(written.box()):
+            if room.claim(written.box()):
                 found[k] = written
     return list(found.values())
