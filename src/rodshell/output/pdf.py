@@ -133,7 +133,7 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
         path = canvas.beginPath()
         for item in group:
             if isinstance(item, Mark):
-                _add_circle(path, *item.at.tolist(), item.radius)
+                _add_circle(path, *map(float, item.at), item.radius)
                 continue
             first, *others = item.points.tolist()
             path.moveTo(*first)
@@ -169,7 +169,7 @@ def _write(canvas: "Canvas", texts: Iterable[Text]) -> None:
                 written.setTextTransform(c, s, -s, c, x, y)
             else:
                 written.setTextOrigin(x, y)
-            written.textLine(text.text)  # `textOut` would measure it, to go on after it
+            written.textLine(text.text)  # `textOut` would measure it too
     canvas.drawText(written)
 
 
