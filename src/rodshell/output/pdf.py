@@ -133,7 +133,7 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
         path = canvas.beginPath()
         for item in group:
             if isinstance(item, Mark):
-                _add_circle(path, *map(float, item.at), item.radius)
+                _add_circle(path, item)
                 continue
             first, *others = item.points.tolist()
             path.moveTo(*first)
@@ -144,8 +144,9 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
         canvas.drawPath(path, stroke=int(pen.width > 0), fill=int(bool(pen.fill)))
 
 
-def _add_circle(path: "PDFPathObject", x: float, y: float, r: float) -> None:
+def _add_circle(path: "PDFPathObject", mark: Mark) -> None:
     """A circle of four curves; reportlab's own method looks up the sines of right angles again for each."""
+    (x, y), r = mark.at.tolist(), mark.radius
     k = QUARTER * r
     path.moveTo(x + r, y)
     path.curveTo(x + r, y + k, x + k, y + r, x, y + r)
