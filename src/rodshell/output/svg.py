@@ -12,7 +12,7 @@ import numpy as np
 
 from rodshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Text
 
-ZEROS = re.compile(r"\.00(?!\d)|(\.\d)0(?!\d)")
+ZEROS = re.compile(r"\.00(?!\d)|(?<=\.\d)0(?!\d)")
 MINUS_ZERO = re.compile(r"-0(?![.\d])")
 FLIP = np.array([1.0, -1.0])
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans Condensed', sans-serif"
@@ -142,7 +142,7 @@ def _data(path: Path) -> str:
 
 def _short(words: str) -> str:
     """Numbers with two decimals as `number` has them."""
-    return MINUS_ZERO.sub("0", ZEROS.sub(r"\1", words))
+    return MINUS_ZERO.sub("0", ZEROS.sub("", words))
 
 
 def _look(pen: Pen) -> dict[str, Any]:
