@@ -18,7 +18,7 @@ from rodshell.output import export
 from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
-from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan
+from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan, strips_drawing
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, laid_out, room, tiled
 from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing, erection_drawing
 from rodshell.output.grid import joint_places, rods_of
@@ -262,6 +262,13 @@ def test_rod_ends_of_each_stage_are_joined_and_each_path_leads_through_its_stage
     paths = [line.points for line in drawing.paths if line.layer == "DIM" and not line.closed]
     np.testing.assert_array_equal(paths, places.transpose(1, 0, 2))
     np.testing.assert_array_equal([mark.at for mark in drawing.marks], places[-1])
+
+
+def test_strips_tell_each_distance_with_the_rod_that_is_met_there() -> None:
+    plan = flat_plan(wished())
+    texts = [text.text for text in strips_drawing(plan, plan.text).texts]
+    told = [f"{plan.rounding.mm(at + 0.012)}  {other}" for rod in plan.rods for other, at in rod.joints]
+    assert sorted(text for text in texts if text[-3:-2] in "UV") == sorted(told)
 
 
 def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -> None:

@@ -331,11 +331,11 @@ def end_paths_table(archive: Archive) -> Table:
     columns = ["share", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"u{a}_mm" for a in "xyz")]
     ends = [(rod.id, end) for rod in rods_of(archive) for end in "01"]
     nodes = np.concatenate([rod.nodes[[0, -1]] for rod in rods_of(archive)])
-    places = history[:, nodes]
+    points = history[:, nodes]
     rows = [
-        [f"{share:.6f}", *end, *map(mm, place), *map(mm, way)]
-        for share, here, moved in zip(shares.tolist(), places.tolist(), (places - places[0]).tolist(), strict=True)
-        for end, place, way in zip(ends, here, moved, strict=True)
+        [f"{share:.6f}", *end, *map(mm, point), *map(mm, way)]
+        for share, here, moved in zip(shares.tolist(), points.tolist(), (points - points[0]).tolist(), strict=True)
+        for end, point, way in zip(ends, here, moved, strict=True)
     ]
     return columns, rows
 
