@@ -247,7 +247,7 @@ def rod_type(rod: RodModel) -> RodType:
 
 def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
     """What every result begins with."""
-    versions = {package: version(package) for package in ("numpy", "scipy")}
+    versions = {"numpy": np.__version__, "scipy": version("scipy")}  # without its import, which most forms do not need
     return {
         **{key: Results.model_fields[key].default for key in ("format", "version", "units")},
         "version_rodshell": version("rodshell"),
