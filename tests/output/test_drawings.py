@@ -20,7 +20,7 @@ from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
 from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan, strips_drawing
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, laid_out, room, tiled
-from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing, erection_drawing
+from rodshell.output.drawings.shell import SAME, bracing_drawing, elevations_drawing, erection_drawing, rod_curves
 from rodshell.output.grid import joint_places, rods_of
 from rodshell.output.labels import boxes_meet, lines_meet, spread
 from rodshell.output.options import DrawingStyle, OutputOptions
@@ -262,6 +262,18 @@ def test_rod_ends_of_each_stage_are_joined_and_each_path_leads_through_its_stage
     paths = [line.points for line in drawing.paths if line.layer == "DIM" and not line.closed]
     np.testing.assert_array_equal(paths, places.transpose(1, 0, 2))
     np.testing.assert_array_equal([mark.at for mark in drawing.marks], places[-1])
+
+
+def test_rods_that_cover_each_other_in_an_elevation_are_drawn_once() -> None:
+    given = archive("dome")
+    drawn = [line.points for line in elevations_drawing(given, 10.0).paths if line.layer == "CUT"]
+    assert len(drawn) < 2 * len(rods_of(given))
+    ends = np.array([line[[0, -1]].ravel() for line in drawn])
+    apart = np.abs(ends[:, None] - ends).max(axis=2)
+    assert apart[~np.eye(len(ends), dtype=bool)].min() > SAME
+    for curve in rod_curves(given, given.states[given.final]):  # the front elevation stands at the bottom
+        seen = np.append(*(curve[[0, -1]][:, [0, 2]] - (0.0, given.states[given.final][:, 2].min() * 1e3)))
+        assert np.abs(ends - seen).max(axis=1).min() < SAME
 
 
 def test_strips_tell_each_distance_with_the_rod_that_is_met_there() -> None:

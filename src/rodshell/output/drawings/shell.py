@@ -1,6 +1,6 @@
 """Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -34,6 +34,7 @@ SUPPORTS_LEGEND = (
 )
 RADIUS, TICK = 0.3, 0.8  # radius of a support's mark, and how far its rod's direction is drawn, in text sizes
 NUMBER_SIZES = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
+SAME = 0.01  # mm: lines as near as this to each other are drawn once
 CLEAR = 0.2  # of its size, between a number and the middle of its cell
 SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, and its baseline off it in its sizes
 
@@ -62,8 +63,9 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
     tall, rounding = float(np.ptp(heights)) + 10 * text, rounding_of(archive.results)
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
         flat = [np.column_stack([curve[:, axis], curve[:, 2] - heights.min() + k * tall]) for curve in curves]
-        for curve in flat:
-            pencil.line(thinned(curve), "CUT", pen=Pen(INK, 0.08 * text))
+        pen = Pen(INK, 0.08 * text)
+        for curve in apart(map(thinned, flat)):
+            pencil.line(curve, "CUT", pen=pen)
         cloud = np.concatenate(flat)
         low, high = cloud.min(axis=0), cloud.max(axis=0)
         _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, rounding)
@@ -85,6 +87,7 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     pencil, history = Pencil(), archive.states["history"]
     assert archive.results.deployment is not None
     stages, mm = archive.results.deployment.stages, rounding_of(archive.results).mm
+    pen = Pen(INK, 0.04 * text)
     drawn = [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
     ends = np.concatenate([rod.nodes[[0, -1]] for rod in drawn])
     ways, thin = 1e3 * history[:, ends, :2], Pen(SOFT, 0.05 * text)
@@ -105,8 +108,8 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
         cloud = np.concatenate(curves)
         tall = float(np.ptp(cloud[:, 1]))
         shift = np.array([left - low[0], top - tall - cloud[:, 1].min()])
-        for curve in curves:
-            pencil.line(thinned(curve) + shift, "CUT", pen=Pen(INK, 0.04 * text))
+        for curve in apart(map(thinned, curves)):
+            pencil.line(curve + shift, "CUT", pen=pen)
         words = f"{k}: deployment {100 * stage.share:.0f} %, {mm(stage.height)} mm high"
         pencil.write(words, (left, top - tall - 1.8 * text), text, "LABEL")
         top -= tall + 5 * text
@@ -121,6 +124,16 @@ def thinned(curve: Floats) -> Floats:
     curve : (k, 2 or 3) nodes.
     """
     return np.asarray(curve[[*range(0, len(curve) - 1, 3), len(curve) - 1]])
+
+
+def apart(curves: Iterable[Floats]) -> list[Floats]:
+    """Each curve once: in an elevation a rod covers its mirror image.
+
+    Parameters
+    ----------
+    curves : (k, 2) points of each [mm].
+    """
+    return list({(np.rint(curve / SAME) + 0.0).tobytes(): curve for curve in curves}.values())
 
 
 def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
