@@ -720,6 +720,33 @@ def test_help_and_version_import_nothing_heavy(argument: str, heavy: set[str]) -
     assert heavy.isdisjoint(ended.stdout.split())
 
 
+LEFT = """
+import os, sys
+from rodshell.cli import entry
+ended, sys.argv = os._exit, ["rodshell", "--version"]
+
+def end(code):
+    import numpy
+    from threadpoolctl import threadpool_info
+    print(*(pool["num_threads"] for pool in threadpool_info()), flush=True)
+    ended(code)
+
+os._exit = end
+entry()
+"""
+
+
+@pytest.mark.parametrize(("asked", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_the_blas_has_one_thread_or_as_many_as_are_asked_for(asked: dict[str, str], threads: str) -> None:
+    if (os.cpu_count() or 1) < 2:
+        pytest.skip("one processor: the BLAS has one thread in any case")
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    ended = subprocess.run(
+        [sys.executable, "-c", LEFT], capture_output=True, text=True, check=True, env=environment | asked
+    )
+    assert ended.stdout.split()[-1] == threads
+
+
 @pytest.mark.parametrize(
     ("option", "values"),
     [("--rod.section.radius", "VALUE|auto"), ("--spacing", "VALUE|auto"), ("--joint.shear", "VALUE|rigid"),

@@ -18,9 +18,9 @@ from rodshell.output import export
 from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
-from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan
+from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan, strips_drawing
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, laid_out, room, tiled
-from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing
+from rodshell.output.drawings.shell import SAME, bracing_drawing, elevations_drawing, erection_drawing, rod_curves
 from rodshell.output.grid import joint_places, rods_of
 from rodshell.output.labels import boxes_meet, lines_meet, spread
 from rodshell.output.options import DrawingStyle, OutputOptions
@@ -261,6 +261,41 @@ def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[st
 
 
 @pytest.mark.slow
+def test_rod_ends_of_each_stage_are_joined_and_each_path_leads_through_its_stages() -> None:
+    given, text = archive("dome"), 10.0
+    drawing, history = erection_drawing(given, text), given.states["history"]
+    ends = np.array([rod.nodes[[0, -1]] for rod in rods_of(given)]).ravel()
+    places = 1e3 * history[:, ends, :2]
+    joined = [line.points for line in drawing.paths if line.layer == "DIM" and line.closed]
+    assert len(joined) == len(history) - 1
+    for line, stage in zip(joined, places, strict=False):
+        np.testing.assert_array_equal(np.unique(line, axis=0), np.unique(stage, axis=0))
+        ways = np.linalg.norm(np.diff(line, axis=0, append=line[:1]), axis=1)
+        assert ways.max() < 0.25 * np.ptp(stage)  # from end to end around the dome, not across it
+    paths = [line.points for line in drawing.paths if line.layer == "DIM" and not line.closed]
+    np.testing.assert_array_equal(paths, places.transpose(1, 0, 2))
+    np.testing.assert_array_equal([mark.at for mark in drawing.marks], places[-1])
+
+
+def test_rods_that_cover_each_other_in_an_elevation_are_drawn_once() -> None:
+    given = archive("dome")
+    drawn = [line.points for line in elevations_drawing(given, 10.0).paths if line.layer == "CUT"]
+    assert len(drawn) < 2 * len(rods_of(given))
+    ends = np.array([line[[0, -1]].ravel() for line in drawn])
+    apart = np.abs(ends[:, None] - ends).max(axis=2)
+    assert apart[~np.eye(len(ends), dtype=bool)].min() > SAME
+    for curve in rod_curves(given, given.states[given.final]):  # the front elevation stands at the bottom
+        seen = np.append(*(curve[[0, -1]][:, [0, 2]] - (0.0, given.states[given.final][:, 2].min() * 1e3)))
+        assert np.abs(ends - seen).max(axis=1).min() < SAME
+
+
+def test_strips_tell_each_distance_with_the_rod_that_is_met_there() -> None:
+    plan = flat_plan(wished())
+    texts = [text.text for text in strips_drawing(plan, plan.text).texts]
+    told = [f"{plan.rounding.mm(at + 0.012)}  {other}" for rod in plan.rods for other, at in rod.joints]
+    assert sorted(text for text in texts if text[-3:-2] in "UV") == sorted(told)
+
+
 def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -> None:
     """Strips, both schedules, the PDF's tables and the pieces of stock: 12 mm of allowance before the rod's start."""
     made = wished()

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags, triu
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
@@ -18,11 +17,11 @@ from rodshell.checks.deployment import SAME, Deployment
 from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.geometry.frames import parallel_transport, signed_angle, unit
 from rodshell.layout import GridMesh
-from rodshell.model import Shell
+from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.problem import half_width
-from rodshell.solve.sparse_ldl import Qdldl
+from rodshell.solve.sparse_ldl import Multifrontal
 from rodshell.validation import brief
 
 MODES = 4
@@ -232,17 +231,19 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     """
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]
-    ends = np.unique(joined[mesh.ends])
-    inner = np.setdiff1d(joined, ends)
-    stiffness, (i, j) = 1 / mesh.edge_lengths, joined[mesh.edges].T
-    size = (mesh.node_count, mesh.node_count)
-    pulls = coo_matrix((np.tile(stiffness, 2), (np.append(i, j), np.append(j, i))), shape=size).tocsr()
-    whole = (diags(np.asarray(pulls.sum(axis=1)).ravel()) - pulls).tocsr()
-    upper = triu(whole[inner][:, inner], format="csc")
-    factors = Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data)
-    right = np.asarray(-(whole[inner][:, ends] @ positions[ends]))
+    springs, inner = joined[mesh.edges], np.setdiff1d(joined, joined[mesh.ends])
+    count = np.zeros(mesh.node_count, dtype=np.intp)
+    count[inner] = 1  # x, y and z alike: one unknown a node
+    free = Freedom(Freedom.free(mesh.node_count).directions, count)
+    stiffness = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3)) / mesh.edge_lengths[:, None, None]
+    assembly = Assembly.of([springs], free)
+    values = assembly.assemble([stiffness], [springs], free)
+    factors = Multifrontal(assembly.indptr, assembly.indices, mesh.flat[inner, :2]).factor(values)
+    pulls = np.diff(positions[springs], axis=1)[:, 0] / mesh.edge_lengths[:, None]
+    forces = np.zeros_like(positions)
+    np.add.at(forces, springs, np.stack([pulls, -pulls], axis=1))
     result = positions.copy()
-    result[inner] = np.array([factors.solve(column) for column in right.T]).T
+    result[inner] += np.array([factors.solve(column) for column in forces[inner].T]).T
     return np.asarray(result[joined])
 
 

@@ -37,10 +37,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 def entry() -> None:
     """The console script: `main`, then an end without Python's teardown, which costs a fifth of a short run.
 
-    Cycles of garbage are rarely looked for: a form leaves a few hundred small objects in them, and no arrays.
+    Cycles of garbage are rarely looked for: a form leaves a few hundred small objects in them, and no arrays. The BLAS
+    has one thread, unless the environment says otherwise: large matrices are the work of our own threads, and those of
+    a BLAS take 0.1 s of processor time to wait for the small ones.
     """
     end_at_once()
     gc.set_threshold(RARELY)
+    for blas in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(blas, "1")
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # which it looks for in every installed package
     code = main()
     sys.stdout.flush()

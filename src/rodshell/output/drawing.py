@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import cos, sin
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -58,8 +58,7 @@ LAYERS = {
 }
 
 
-@dataclass(frozen=True)
-class Pen:
+class Pen(NamedTuple):
     """How a path or mark looks that does not look like its layer.
 
     Parameters
@@ -106,8 +105,7 @@ class Path:
         return min(x), min(y), max(x), max(y)
 
 
-@dataclass(frozen=True)
-class Mark:
+class Mark(NamedTuple):
     """A circle.
 
     Parameters
@@ -181,10 +179,16 @@ class Drawing:
 
     def pen(self, item: Path | Mark) -> Pen:
         """The item's own pen, or that of its layer."""
-        if item.pen is not None:
-            return item.pen
-        layer, wide = LAYERS[item.layer], self.pen_scale
-        return Pen(layer.colour, wide * layer.pen, tuple(wide * dash for dash in layer.dash))
+        return self._pens[item.layer] if item.pen is None else item.pen
+
+    @cached_property
+    def _pens(self) -> dict[str, Pen]:
+        """The pen of each layer."""
+        wide = self.pen_scale
+        return {
+            name: Pen(layer.colour, wide * layer.pen, tuple(wide * dash for dash in layer.dash))
+            for name, layer in LAYERS.items()
+        }
 
     @property
     def pen_scale(self) -> float:
@@ -193,6 +197,10 @@ class Drawing:
 
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest x and y (2,), (2,) of all that is in the plane [mm]."""
+        return self._box
+
+    @cached_property
+    def _box(self) -> tuple[Floats, Floats]:
         parts = [np.zeros((0, 2)), *(path.points for path in self.paths if path.flat)]
         if self.marks:
             at, radius = np.array([mark.at for mark in self.marks]), np.array([[mark.radius] for mark in self.marks])

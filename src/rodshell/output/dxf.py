@@ -6,6 +6,8 @@ from itertools import chain, count
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rodshell.output.drawing import LAYERS, Drawing, Path, Text
 from rodshell.results.records import printable
 
@@ -105,21 +107,24 @@ def _set_up(document: "Document", layers: Mapping[str, str], drawing: Drawing) -
 
 
 def _add_path(space: "Modelspace", path: Path, layer: str) -> None:
-    points, look = path.points.tolist(), {"layer": layer}
+    look = {"layer": layer}
     if not path.flat:
-        space.add_polyline3d(points, close=path.closed, dxfattribs=look)
-    elif len(points) == 2:
-        space.add_line(*points, dxfattribs=look)
-    else:
-        space.add_lwpolyline(points, close=path.closed, dxfattribs=look)
+        space.add_polyline3d(path.points.tolist(), close=path.closed, dxfattribs=look)
+    elif len(path.points) == 2:
+        space.add_line(*path.points.tolist(), dxfattribs=look)
+    else:  # all points at once: ezdxf adds points that it is given one by one to a copy of those before
+        rows = np.zeros((len(path.points), 5))  # x, y, and neither widths nor bulge
+        rows[:, :2] = path.points
+        space.add_lwpolyline([], close=path.closed, dxfattribs=look).lwpoints.extend(rows)
 
 
 def _add_text(space: "Modelspace", text: Text, layer: str) -> None:
     at = text.at.tolist()
     look = {
-        "layer": layer, "style": STYLES[text.bold][0], "height": CAPITAL * text.size, "rotation": degrees(text.angle),
-        "insert": at,
+        "layer": layer, "style": STYLES[text.bold][0], "height": CAPITAL * text.size, "insert": at,
     }  # fmt: skip
+    if text.angle:
+        look["rotation"] = degrees(text.angle)
     if text.anchor != "start":  # on its baseline; the second point counts [DXF reference]
         look |= {"halign": {"middle": 1, "end": 2}[text.anchor], "align_point": at}
     space.add_text(_plain(text.text), dxfattribs=look)

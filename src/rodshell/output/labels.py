@@ -97,8 +97,9 @@ class Room:
             self.take(box)
 
     def _squares(self, extent: Extent) -> list[tuple[int, int]]:
-        left, low, right, high = (int(value // self._square) for value in extent)
-        return [(x, y) for x in range(left, right + 1) for y in range(low, high + 1)]
+        (left, low, right, high), square = extent, self._square
+        rows = range(int(low // square), int(high // square) + 1)
+        return [(x, y) for x in range(int(left // square), int(right // square) + 1) for y in rows]
 
 
 def _extent(box: Floats) -> Extent:

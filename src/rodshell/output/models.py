@@ -42,7 +42,7 @@ def obj_text(archive: Archive, state: str) -> str:
     """
     lines = [
         f"# rodshell, {state}, metres",
-        *(f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in archive.states[state]),
+        *(f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in archive.states[state].tolist()),
     ]
     for rod in rods_of(archive):
         if len(rod.nodes) > 1:

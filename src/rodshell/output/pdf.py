@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from functools import cache
 from io import BytesIO
 from itertools import groupby
-from math import cos, sin
+from math import cos, sin, sqrt
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -19,8 +19,10 @@ from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Mark, Path, 
 if TYPE_CHECKING:
     from reportlab.lib.colors import Color
     from reportlab.pdfgen.canvas import Canvas
+    from reportlab.pdfgen.pathobject import PDFPathObject
 
 POINTS = 72 / 25.4  # of a millimetre
+QUARTER = 4 / 3 * (sqrt(2) - 1)  # length of the handles of a quarter circle's Bezier curve over the radius
 SANS = {False: "rodshell-sans", True: "rodshell-sans-bold"}
 ONE_AT_A_TIME = Lock()
 MOST_NAMED = 10  # characters without a glyph that a warning shows
@@ -131,7 +133,7 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
         path = canvas.beginPath()
         for item in group:
             if isinstance(item, Mark):
-                path.circle(*item.at.tolist(), item.radius)
+                _add_circle(path, item)
                 continue
             first, *others = item.points.tolist()
             path.moveTo(*first)
@@ -140,6 +142,17 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
             if item.closed:
                 path.close()
         canvas.drawPath(path, stroke=int(pen.width > 0), fill=int(bool(pen.fill)))
+
+
+def _add_circle(path: "PDFPathObject", mark: Mark) -> None:
+    """A circle of four curves; reportlab's own method looks up the sines of right angles again for each."""
+    (x, y), r = mark.at.tolist(), mark.radius
+    k = QUARTER * r
+    path.moveTo(x + r, y)
+    path.curveTo(x + r, y + k, x + k, y + r, x, y + r)
+    path.curveTo(x - k, y + r, x - r, y + k, x - r, y)
+    path.curveTo(x - r, y - k, x - k, y - r, x, y - r)
+    path.curveTo(x + k, y - r, x + r, y - k, x + r, y)
 
 
 def _write(canvas: "Canvas", texts: Iterable[Text]) -> None:
@@ -157,7 +170,7 @@ def _write(canvas: "Canvas", texts: Iterable[Text]) -> None:
                 written.setTextTransform(c, s, -s, c, x, y)
             else:
                 written.setTextOrigin(x, y)
-            written.textOut(text.text)
+            written.textLine(text.text)  # `textOut` would measure it too
     canvas.drawText(written)
 
 

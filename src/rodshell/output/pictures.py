@@ -243,13 +243,15 @@ def deployment_picture(archive: Archive) -> Drawing:
     share = (width - 2 * GUTTER) / COLUMNS / WIDTH
     cell = np.array([share * WIDTH, -share * float(view.size[1]) - CAPTION])
     for k, name in enumerate(names[entry] for entry in chosen):
-        shape, pencil = shape_of(archive, name), Pencil()
+        shape, ground = shape_of(archive, name), Pencil()
         scale = scale_of(archive, shape, "stress")
         last = scale or last
-        _ground_curves(pencil, view, shape, rods)
-        _Rods.of(archive, view, shape, scale).draw(pencil, range(DEPTHS), halos=False)
+        _ground_curves(ground, view, shape, rods)
         corner = cell * (k % COLUMNS, k // COLUMNS) + (GUTTER - SIDE, 0.0)
-        whole.paths += pencil.done("", "", 12.5).placed(share, corner).paths
+        whole.paths += ground.done("", "", 12.5).placed(share, corner).paths
+        drawn = _Rods.of(archive, view, shape, scale)
+        drawn = replace(drawn, plane=share * drawn.plane + corner, pen=share * drawn.pen)
+        drawn.draw(whole, range(DEPTHS), halos=False)
         middle = corner[0] + share * float(view.project(shape.positions)[:, 0].mean())
         words = shape.caption.partition(",")[0]
         whole.write(words, (middle, corner[1] + cell[1] + 0.6 * CAPTION), 12.5, "TITLE", anchor="middle")
@@ -435,8 +437,8 @@ def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
     low, high = drawing.box()
     scale = width / float(high[0] - low[0])
     corner = np.array([low[0], high[1]])
-    image = Image.new("RGB", (width, round(scale * float(high[1] - low[1]))), "white")
-    canvas = Draw(image)
+    size = (width, round(scale * float(high[1] - low[1])))
+    canvas = Draw("RGB", size, "white")
     last, stroke = None, None
     for path, points in zip(drawing.paths, _lines(drawing.paths, corner, scale), strict=True):
         pen = drawing.pen(path)
@@ -446,7 +448,7 @@ def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
             if pen is not last:
                 last, stroke = pen, Stroke(pen.colour, scale * pen.width)
             canvas.line(points + points[:2] if path.closed else points, stroke)
-    canvas.flush()
+    image = Image.frombytes("RGB", size, canvas.tobytes())
     letters = ImageDraw.Draw(image)
     for text in drawing.texts:
         _write(letters, text, _pixels(text.at, corner, scale), scale)
@@ -462,10 +464,11 @@ def _lines(paths: Sequence[Path], corner: Floats, scale: float) -> list[list[flo
 
     Open lines are CAP longer at both ends: where two meet, their soft ends would show as a seam.
     """
-    count = np.array([len(path.points) for path in paths])
-    points = _pixels(np.concatenate([np.empty((0, 2)), *(path.points for path in paths)]), corner, scale)
+    pieces = [path.points for path in paths]
+    count = np.array([*map(len, pieces)], dtype=np.intp)
+    points = _pixels(np.concatenate([np.empty((0, 2)), *pieces]), corner, scale)
     stop = np.cumsum(count)
-    still_open = np.array([not path.closed and len(path.points) > 1 for path in paths])
+    still_open = (count > 1) & ~np.array([path.closed for path in paths], dtype=bool)
     first, last = (stop - count)[still_open], stop[still_open] - 1
     for end, inside in ((first, first + 1), (last, last - 1)):
         along = points[end] - points[inside]

@@ -329,12 +329,14 @@ def end_paths_table(archive: Archive) -> Table:
     mm = Rounding(FINEST).mm
     history, shares = archive.states["history"], archive.states["history_share"]
     columns = ["share", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"u{a}_mm" for a in "xyz")]
-    rows = []
-    for share, positions in zip(shares, history, strict=True):
-        for rod in rods_of(archive):
-            for end, node in zip((0, 1), rod.nodes[[0, -1]], strict=True):
-                row = [f"{share:.6f}", rod.id, str(end), *map(mm, positions[node])]
-                rows.append([*row, *map(mm, positions[node] - history[0][node])])
+    ends = [(rod.id, end) for rod in rods_of(archive) for end in "01"]
+    nodes = np.concatenate([rod.nodes[[0, -1]] for rod in rods_of(archive)])
+    points = history[:, nodes]
+    rows = [
+        [f"{share:.6f}", *end, *map(mm, point), *map(mm, way)]
+        for share, here, moved in zip(shares.tolist(), points.tolist(), (points - points[0]).tolist(), strict=True)
+        for end, point, way in zip(ends, here, moved, strict=True)
+    ]
     return columns, rows
 
 

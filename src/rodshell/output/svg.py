@@ -5,13 +5,14 @@ from collections.abc import Iterator
 from functools import cache
 from html import escape
 from itertools import groupby
+from math import degrees
 from typing import Any
 
 import numpy as np
 
 from rodshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Text
 
-ZEROS = re.compile(r"\.00(?!\d)|(\.\d)0(?!\d)")
+ZEROS = re.compile(r"\.00(?!\d)|(?<=\.\d)0(?!\d)")
 MINUS_ZERO = re.compile(r"-0(?![.\d])")
 FLIP = np.array([1.0, -1.0])
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans Condensed', sans-serif"
@@ -141,7 +142,7 @@ def _data(path: Path) -> str:
 
 def _short(words: str) -> str:
     """Numbers with two decimals as `number` has them."""
-    return MINUS_ZERO.sub("0", ZEROS.sub(r"\1", words))
+    return MINUS_ZERO.sub("0", ZEROS.sub("", words))
 
 
 def _look(pen: Pen) -> dict[str, Any]:
@@ -158,7 +159,7 @@ def _path(path: Path) -> str:
     named = {"data_rod": path.name} if path.name else {}
     inside = [tag("title", escape(path.note))] if path.note else []
     if len(path.points) == 2:
-        (x1, y1), (x2, y2) = path.points
+        (x1, y1), (x2, y2) = path.points.tolist()
         return tag("line", *inside, x1=x1, y1=-y1, x2=x2, y2=-y2, **named)
     shape = " ".join(f"{number(x, 3)},{number(-y, 3)}" for x, y in path.points.tolist())
     return tag("polygon" if path.closed else "polyline", *inside, points=shape, **named)
@@ -166,7 +167,8 @@ def _path(path: Path) -> str:
 
 def _mark(mark: Mark) -> str:
     inside = [tag("title", escape(mark.note))] if mark.note else []
-    return tag("circle", *inside, cx=mark.at[0], cy=-mark.at[1], r=mark.radius)
+    x, y = mark.at.tolist()
+    return tag("circle", *inside, cx=x, cy=-y, r=mark.radius)
 
 
 def _text(text: Text) -> str:
@@ -177,7 +179,7 @@ def _text(text: Text) -> str:
         look["font_weight"] = "600"
     if text.halo:
         look |= {"stroke": text.halo, "stroke_width": "4", "stroke_linejoin": "round", "paint_order": "stroke"}
-    x, y = text.at[0], -text.at[1]
+    x, y = text.at.tolist()
     if text.angle:
-        look["transform"] = f"rotate({number(-np.degrees(text.angle), 3)} {number(x, 3)} {number(y, 3)})"
-    return label(text.text, x, y, text.size, **look)
+        look["transform"] = f"rotate({number(-degrees(text.angle), 3)} {number(x, 3)} {number(-y, 3)})"
+    return label(text.text, x, -y, text.size, **look)

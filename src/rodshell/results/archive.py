@@ -15,6 +15,7 @@ from functools import wraps
 from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ LARGEST = 20_000_000  # bytes of a file that is copied
 FOLDER = "inputs"
 NAMED = re.compile(r'^(file|boundary) = (".*")$', re.MULTILINE)  # in the text of a resolved case
 PARTS = ".gltf"
+COMPRESSION = 3  # of states.npz: half the time of NumPy's 6, for files that are 6 % longer
 
 
 def read_inputs(case_toml: str, where: Callable[[str], Path] = Path) -> dict[str, bytes]:
@@ -247,7 +249,10 @@ def put_archive(archive: Archive, place: ResultFolder) -> None:
     if archive.case_toml:
         place.put("case.toml", kept_case(archive.case_toml, archive.inputs, place.path)[0])
     stream = BytesIO()
-    np.savez_compressed(stream, allow_pickle=False, **archive.states)
+    with ZipFile(stream, "w", ZIP_DEFLATED, compresslevel=COMPRESSION) as states:
+        for name, values in archive.states.items():
+            with states.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                np.lib.format.write_array(entry, values, allow_pickle=False)
     place.put("states.npz", stream.getvalue())
     for name, content in kept_case(archive.case_toml, archive.inputs, Path())[1].items():
         place.put(name, content)

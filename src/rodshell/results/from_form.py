@@ -11,7 +11,6 @@ from platform import python_version
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
@@ -248,7 +247,7 @@ def rod_type(rod: RodModel) -> RodType:
 
 def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
     """What every result begins with."""
-    versions = {module.__name__: module.__version__ for module in (np, scipy)}
+    versions = {"numpy": np.__version__, "scipy": version("scipy")}  # without its import, which most forms do not need
     return {
         **{key: Results.model_fields[key].default for key in ("format", "version", "units")},
         "version_rodshell": version("rodshell"),

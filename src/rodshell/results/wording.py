@@ -30,7 +30,7 @@ class Rounding:
         """A length [m] in mm, without its unit and without a minus before a zero; "" where it is not known."""
         if metres is None or not isfinite(metres):
             return ""
-        return f"{round(1e3 * metres, self.digits) + 0.0:.{self.digits}f}"
+        return f"{round(1e3 * float(metres), self.digits) + 0.0:.{self.digits}f}"  # NumPy's numbers round slowly
 
     @property
     def words(self) -> str:

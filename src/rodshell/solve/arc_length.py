@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
-from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
@@ -346,9 +345,10 @@ class ArcLength:
         values, modes = self._lowest_modes(tangent, start)
         step = min(PROBE * self.length / max(self.reach(here.motion), TINY), PROBE_FACTOR / abs(here.rate))
         ahead = self._values_near(here, step)
-        change = _between(modes, tangent.pattern.upper((ahead - tangent.values) / step))
+        change = (ahead - tangent.values) / step
+        between = _products(modes, np.array([tangent.pattern.product(change, mode) for mode in modes]))
         root = 1.0 / np.sqrt(values)
-        loss = np.linalg.eigvalsh(-change * root[:, None] * root)  # 1/m: the modes' stiffness vanishes at 1/loss
+        loss = np.linalg.eigvalsh(-between * root[:, None] * root)  # 1/m: the modes' stiffness vanishes at 1/loss
         return replace(
             here, modes=modes,
             ahead=1.0 / float(loss[-1]) if loss[-1] > 0 else np.inf,
@@ -381,12 +381,6 @@ class ArcLength:
     def _generic(size: int, count: int) -> Floats:
         """(count, size) rows, or fewer, to begin an iteration with: no symmetry of the shell is one of them."""
         return np.asarray(np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None]))
-
-
-def _between(modes: Floats, upper: csc_matrix) -> Floats:
-    """(k, k) x' A y between modes (k, dofs), of a symmetric matrix given by its upper triangle."""
-    half = _products(modes, np.array([upper @ mode for mode in modes]))
-    return half + half.T - _products(modes, upper.diagonal() * modes)
 
 
 def _products(a: Sequence[Floats] | Floats, b: Floats) -> Floats:

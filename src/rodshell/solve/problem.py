@@ -7,18 +7,20 @@ enters Newton's matrix. Forces on a twist angle are moments [N m] in the first c
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats, Ints, Longs
 from rodshell.errors import InputError
 from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.elements import Elements, Stretch
-from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl
+from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl, product, upper_triangle
 from rodshell.validation import finite
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 NO_CURVATURE = np.empty((0, 3, 3))
 
@@ -132,10 +134,13 @@ class Pattern:
         here, there = (*self.blocks, self.count), (*blocks, count)
         return len(here) == len(there) and all(map(np.array_equal, here, there))
 
-    def upper(self, values: Floats) -> csc_matrix:
+    def upper(self, values: Floats) -> "csc_matrix":
         """The upper triangle (dofs, dofs) of a matrix with these `values` (nnz,)."""
-        size = len(self.assembly.indptr) - 1
-        return csc_matrix((values, self.assembly.indices, self.assembly.indptr), shape=(size, size))
+        return upper_triangle(self.assembly.indptr, self.assembly.indices, values)
+
+    def product(self, values: Floats, x: Floats) -> Floats:
+        """(dofs,) product A x of the symmetric matrix whose upper triangle has these `values` (nnz,)."""
+        return product(self.assembly.indptr, self.assembly.indices, values, x)
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,9 @@ once per pattern (`symbolic`).
 """
 
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
-import qdldl
-from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
@@ -33,6 +31,10 @@ from rodshell.solve.dense import (
 )
 from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
 from rodshell.threads import in_threads, threads
+
+if TYPE_CHECKING:  # imported where they are used: most forms need neither, and they take longer than the forms
+    import qdldl
+    from scipy.sparse import csc_matrix
 
 ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
 
@@ -95,8 +97,9 @@ class Qdldl:
         self._indptr, self._indices = indptr, indices
 
     def factor(self, data: Floats, *, reuse: Factors | None = None) -> "QdldlFactors":
-        size = len(self._indptr) - 1
-        matrix = csc_matrix((data, self._indices, self._indptr), shape=(size, size))
+        import qdldl
+
+        matrix = upper_triangle(self._indptr, self._indices, data)
         solver = reuse.given_away() if isinstance(reuse, QdldlFactors) else None
         try:
             if solver is None:
@@ -116,7 +119,7 @@ class Qdldl:
 class QdldlFactors:
     """Factors by QDLDL (see `Factors`)."""
 
-    def __init__(self, matrix: csc_matrix, solver: qdldl.Solver, negative: int) -> None:
+    def __init__(self, matrix: "csc_matrix", solver: "qdldl.Solver", negative: int) -> None:
         self._matrix, self.negative = matrix, negative
         self._solver: qdldl.Solver | None = solver
 
@@ -256,6 +259,32 @@ class MultifrontalFactors:
         return result
 
 
+def upper_triangle(indptr: Longs, indices: Longs, data: Floats) -> "csc_matrix":
+    """The upper triangle of a matrix, in SciPy's form.
+
+    Parameters
+    ----------
+    indptr, indices : the pattern, upper triangle in compressed columns.
+    data : (nnz,) its values.
+    """
+    from scipy.sparse import csc_matrix
+
+    return csc_matrix((data, indices, indptr), shape=(len(indptr) - 1, len(indptr) - 1))
+
+
+def product(indptr: Longs, indices: Longs, data: Floats, x: Floats) -> Floats:
+    """(n,) product A x of a symmetric matrix that is given by its upper triangle.
+
+    Parameters
+    ----------
+    indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
+    data : (nnz,) its values.
+    x : (n,) vector.
+    """
+    residual, _ = _residual(indptr, indices, data, np.ascontiguousarray(x), np.zeros(len(x)))
+    return np.asarray(-residual)
+
+
 def _eliminate_all(
     plan: Plan, levels: list[list[Longs]], data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats
 ) -> bool:
@@ -295,10 +324,12 @@ def _block_begins(coordinates: Floats) -> Longs:
 
 def _minimum_degree(indptr: Longs, indices: Longs) -> Longs:
     """The AMD order, as QDLDL finds it."""
+    import qdldl
+
     size = len(indptr) - 1
     data = np.full(len(indices), 1e-3 / max(1, size))
     data[indptr[1:] - 1] = 1.0
-    solver = qdldl.Solver(csc_matrix((data, indices, indptr), shape=(size, size)), upper=True)
+    solver = qdldl.Solver(upper_triangle(indptr, indices, data), upper=True)
     return np.asarray(solver.factors()[2], dtype=np.int64)
 
 

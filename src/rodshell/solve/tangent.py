@@ -88,9 +88,7 @@ class Tangent:
         ----------
         motions : (N, 3) displacements [m, rad], or (k, N, 3) of k cases; their part in the free directions counts.
         """
-        upper = self.pattern.upper(self.values)
-        diagonal = upper.diagonal()
-        return self._each("displacements", motions, lambda x: upper @ x + upper.T @ x - diagonal * x)
+        return self._each("displacements", motions, lambda x: self.pattern.product(self.values, x))
 
     def lowest_modes(
         self,

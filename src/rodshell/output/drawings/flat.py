@@ -319,7 +319,7 @@ def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None =
     for k, rod in enumerate(chosen):
         _strip(pencil, rod, -k * TALL * text, text, layer, plan.rounding.mm)
     for row, line in enumerate(STRIPS_LEGEND):
-        pencil.write(line, (0.0, -len(chosen) * TALL * text + (5.7 - 1.4 * row) * text), text, "DIM")
+        pencil.write(line, (0.0, -len(chosen) * TALL * text + (9.0 - 1.4 * row) * text), text, "DIM")
     return pencil.done("strips", STRIPS_TITLE, text)
 
 
@@ -335,13 +335,13 @@ def per_sheet(height: float, text: float) -> int:
 
 
 def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str, int | None], mm: Show) -> None:
-    """One rod: above it the distances, below it the rods that are met."""
+    """One rod: above it the distances and the rods that are met there, below it what it is."""
     cut, start = 1e3 * rod.cut_length, 1e3 * rod.from_cut_end(0.0)
     pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=f"{rod.id}: {mm(rod.cut_length)} mm")
     words = [rod.id, f"cut {mm(rod.cut_length)}", f"layer {rod.record.layer}" if rod.record.layer is not None else ""]
     if start > 0:
         words.append(f"with {mm(rod.allowance)} at each end for the supports")
-    pencil.write("   ".join(filter(None, words)), (0.0, y + 7.2 * text), 1.1 * text, "LABEL", bold=True)
+    pencil.write("   ".join(filter(None, words)), (0.0, y - 2.2 * text), 1.1 * text, "LABEL", bold=True)
     joints = ((1e3 * rod.from_cut_end(at), other, "joint") for other, at in rod.joints)
     along = rod.record.stiffness
     first, last = _end_sizes(along) if along is not None else ("", "")
@@ -379,15 +379,11 @@ def _stop(
     pencil: Pencil, rod: GridRod, at: float, x: float, y: float, text: float, name: str, kind: str,
     layer: dict[str, int | None], mm: Show,
 ) -> None:  # fmt: skip
-    """A mark at `at`, its texts at `x`, and a line from text to text through the middle of the mark."""
-    shift = 0.35 * text
-    way = [(x, y + 1.87 * text), (at, y + 0.7 * text), (at, y - 0.7 * text), (x, y - 1.36 * text)]
-    if not name:
-        way[2:] = [(at, y)]
+    """A mark at `at`, its text at `x`, and a line from the text through the middle of the mark."""
+    way = [(x, y + 1.87 * text), (at, y + 0.7 * text), (at, y - 0.7 * text if name else y)]
     pencil.line(way if abs(x - at) > 1e-6 else [way[0], way[-1]], "DIM")
-    pencil.write(mm(1e-3 * at), (x + shift, y + 2.0 * text), text, "LABEL", angle=np.pi / 2)
-    if name:
-        pencil.write(name, (x + shift, y - 1.6 * text), text, "LABEL", anchor="end", angle=np.pi / 2)
+    words = f"{mm(1e-3 * at)}  {name}".rstrip()
+    pencil.write(words, (x + 0.35 * text, y + 2.0 * text), text, "LABEL", angle=np.pi / 2)
     if kind == "joint":
         here, other = rod.record.layer, layer.get(name)
         below = here is not None and other is not None and other > here

@@ -1,6 +1,7 @@
 """Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
 
 import numpy as np
 
@@ -33,6 +34,7 @@ SUPPORTS_LEGEND = (
 )
 RADIUS, TICK = 0.3, 0.8  # radius of a support's mark, and how far its rod's direction is drawn, in text sizes
 NUMBER_SIZES = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
+SAME = 0.01  # mm: lines as near as this to each other are drawn once
 CLEAR = 0.2  # of its size, between a number and the middle of its cell
 SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, and its baseline off it in its sizes
 
@@ -61,8 +63,9 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
     tall, rounding = float(np.ptp(heights)) + 10 * text, rounding_of(archive.results)
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
         flat = [np.column_stack([curve[:, axis], curve[:, 2] - heights.min() + k * tall]) for curve in curves]
-        for curve in flat:
-            pencil.line(thinned(curve), "CUT", pen=Pen(INK, 0.08 * text))
+        pen = Pen(INK, 0.08 * text)
+        for curve in apart(map(thinned, flat)):
+            pencil.line(curve, "CUT", pen=pen)
         cloud = np.concatenate(flat)
         low, high = cloud.min(axis=0), cloud.max(axis=0)
         _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, rounding)
@@ -75,6 +78,8 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
 def erection_drawing(archive: Archive, text: float) -> Drawing:
     """Paths of the rod ends from flat to their supports, seen from above, and the shell's side at each stage.
 
+    A line through all ends shows where they are at each stage; a ring where they end.
+
     Parameters
     ----------
     text : usual size of the texts [mm at 1:1].
@@ -82,16 +87,19 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     pencil, history = Pencil(), archive.states["history"]
     assert archive.results.deployment is not None
     stages, mm = archive.results.deployment.stages, rounding_of(archive.results).mm
-    ends = np.concatenate([rod.nodes[[0, -1]] for rod in rods_of(archive) if len(rod.nodes) > 1])
-    ways = 1e3 * history[:, ends, :2]
+    pen = Pen(INK, 0.04 * text)
+    drawn = [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
+    ends = np.concatenate([rod.nodes[[0, -1]] for rod in drawn])
+    ways, thin = 1e3 * history[:, ends, :2], Pen(SOFT, 0.05 * text)
+    loops = [loop for loop in outlines_of(drawn) if len(loop) > 1]
+    for stage, loop in product(ways[:-1], loops):
+        pencil.line(stage[loop], "DIM", closed=True, pen=thin)
     for way in ways.transpose(1, 0, 2):
-        pencil.line(way[[0, -1]], "DIM", pen=Pen("#b08a2e", 0.1 * text))
-    for k, points in enumerate(ways):
-        last = k == len(ways) - 1
-        for at in points:
-            pencil.mark(at, (0.3 if last else 0.12) * text, "MARK" if last else "DIM", pen=Pen(SOFT, 0.05 * text))
+        pencil.line(way, "DIM", pen=Pen("#b08a2e", 0.1 * text))
+        pencil.mark(way[-1], 0.3 * text, "MARK", pen=thin)
     low, high = ways.reshape(-1, 2).min(axis=0), ways.reshape(-1, 2).max(axis=0)
     pencil.write("Paths of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
+    pencil.write("Closed lines: the ends at each stage", (low[0], low[1] - 4.8 * text), text, "LABEL")
     left, top = high[0] + 8 * text, high[1]
     for k, (stage, positions) in enumerate(zip(stages, history, strict=True)):
         if k == len(stages) // 2 + 1:
@@ -100,8 +108,8 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
         cloud = np.concatenate(curves)
         tall = float(np.ptp(cloud[:, 1]))
         shift = np.array([left - low[0], top - tall - cloud[:, 1].min()])
-        for curve in curves:
-            pencil.line(thinned(curve) + shift, "CUT", pen=Pen(INK, 0.04 * text))
+        for curve in apart(map(thinned, curves)):
+            pencil.line(curve + shift, "CUT", pen=pen)
         words = f"{k}: deployment {100 * stage.share:.0f} %, {mm(stage.height)} mm high"
         pencil.write(words, (left, top - tall - 1.8 * text), text, "LABEL")
         top -= tall + 5 * text
@@ -115,7 +123,17 @@ def thinned(curve: Floats) -> Floats:
     ----------
     curve : (k, 2 or 3) nodes.
     """
-    return np.asarray(curve[np.unique(np.append(np.arange(0, len(curve), 3), len(curve) - 1))])
+    return np.asarray(curve[[*range(0, len(curve) - 1, 3), len(curve) - 1]])
+
+
+def apart(curves: Iterable[Floats]) -> list[Floats]:
+    """Each curve once: in an elevation a rod covers its mirror image.
+
+    Parameters
+    ----------
+    curves : (k, 2) points of each [mm].
+    """
+    return list({(np.rint(curve / SAME) + 0.0).tobytes(): curve for curve in curves}.values())
 
 
 def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
@@ -293,8 +311,9 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     braces = [brace for brace in known if {brace.start, brace.end} <= joints.keys()]
     ends = 1e3 * np.array([[joints[end][:2] for end in (brace.start, brace.end)] for brace in braces])
     ends = ends.reshape(-1, 2, 2)
+    pen = Pen("#b08a2e", 0.07 * text)
     for brace, line in zip(braces, ends, strict=True):
-        pencil.line(line, "DIM", pen=Pen("#b08a2e", 0.07 * text), note=f"{brace.start} to {brace.end}")
+        pencil.line(line, "DIM", pen=pen, note=f"{brace.start} to {brace.end}")
     other = ends[_crossing(braces)]
     mm = rounding_of(archive.results).mm
     found = _numbers([mm(brace.final) for brace in braces], ends, other, text)
@@ -327,8 +346,10 @@ def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list
         half = 0.5 * size * np.column_stack([wide, np.full(len(words), LINE)])
         met = runs_through((seen - centre[:, None, None]) / half[:, None, None]).any(axis=1)
         for k in np.flatnonzero(~met).tolist():
+            if k in found:
+                continue
             at = middle[k] + off[k] * along[k] + up * size * above[k]
             written = Text(words[k], at, size, "LABEL", "middle", float(angle[k]), colour="#6b5212")
-            if k not in found and room.claim(written.box()):
+            if room.claim(written.box()):
                 found[k] = written
     return list(found.values())
