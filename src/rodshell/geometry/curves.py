@@ -76,107 +76,65 @@ def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
 
 
 @njit()  # type: ignore[untyped-decorator, unused-ignore]
-def resampled(
-    u_knots: Floats, v_knots: Floats, points: Floats, i0: int, j0: int, u: Floats, v: Floats, beyond: float
-) -> Floats:
-    """Interpolate a net as `on_curve` does, along u and then along v.
+def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: float) -> Floats:
+    """Interpolate m lines with common knots, as `on_curve` does.
 
     Parameters
     ----------
-    u_knots, v_knots : (ku,), (kv,) ascending parameters of the lines [m].
-    points : (ku, 3 kv) points of the net, row by row [m]; NaN where it is not known. Of each line the run of known
-        points around the origin is used.
-    i0, j0 : indices of the knots of the origin.
-    u, v : (nu,), (nv,) requested parameters [m].
+    knots : (k,) ascending parameters of all lines [m].
+    points : (k, m, 3) points of the lines [m]; NaN where a line is not known. Of each line the run of known points
+        around `origin` is used.
+    origin : index of the knot around which the lines are known.
+    s : (n,) requested parameters [m].
     beyond : the cubics are continued past the known points by this many steps of the knots.
 
     Returns
     -------
-    (nu, nv, 3) points [m]; NaN further away from the known points.
+    (m, n, 3) points [m]; NaN further away from the known points.
     """
-    ku, kv, nu, nv = len(u_knots), len(v_knots), len(u), len(v)
-    between, result = np.empty((nu, 3 * kv)), np.empty((nu, nv, 3))
-    most, (shares, windows) = min(4, ku), _windows(u_knots, u)
-    for i in range(nu):
-        k0 = windows[i]
-        k1, k2, k3 = min(k0 + 1, ku - 1), min(k0 + 2, ku - 1), min(k0 + 3, ku - 1)  # of fewer knots the shares are 0
-        s0, s1, s2, s3 = shares[i, 0], shares[i, 1], shares[i, 2], shares[i, 3]
-        for c in range(3 * kv):
-            between[i, c] = s0 * points[k0, c] + s1 * points[k1, c] + s2 * points[k2, c] + s3 * points[k3, c]
-    for m in range(0, 3 * kv, 3):
-        first, last = i0, i0
-        while first > 0 and not np.isnan(points[first - 1, m]):
+    count, lines, spare, most = len(knots), points.shape[1], len(s), min(4, len(knots))
+    result = np.empty((lines, len(s), 3))
+    right, windows = np.empty(len(s), dtype=np.int64), np.empty(len(s), dtype=np.int64)
+    shares = np.empty((spare + 1, 4))
+    for n in range(len(s)):
+        right[n] = _right_of(knots, s[n])
+        windows[n] = _window(knots, s[n], right[n], 0, count - 1, shares, n)
+    for m in range(lines):
+        first, last = origin, origin
+        while first > 0 and not np.isnan(points[first - 1, m, 0]):
             first -= 1
-        while last < ku - 1 and not np.isnan(points[last + 1, m]):
+        while last < count - 1 and not np.isnan(points[last + 1, m, 0]):
             last += 1
-        near, (low, high), begin, end = min(4, last - first + 1), _reach(u_knots, first, last, beyond), 0, nu
-        while begin < nu and (windows[begin] < first or u[begin] < low):
-            begin += 1
-        while end > begin and (windows[end - 1] + most - 1 > last or u[end - 1] > high):
-            end -= 1
-        for i in range(nu):
-            if begin <= i < end:
+        near = min(4, last - first + 1)
+        low = knots[first] - beyond * (knots[min(first + 1, last)] - knots[first])
+        high = knots[last] + beyond * (knots[last] - knots[max(first, last - 1)])
+        for n in range(len(s)):
+            if not low <= s[n] <= high:
+                result[m, n, 0] = result[m, n, 1] = result[m, n, 2] = np.nan
                 continue
-            between[i, m] = between[i, m + 1] = between[i, m + 2] = np.nan
-            if low <= u[i] <= high:
-                window = min(max(windows[i], first), last + 1 - near)
-                _weigh(u_knots, u[i], window, near, shares, nu)
-                for c in range(m, m + 3):
-                    between[i, c] = 0.0
-                    for k in range(near):
-                        between[i, c] += shares[nu, k] * points[window + k, c]
-    most, (shares, windows) = min(4, kv), _windows(v_knots, v)
-    for i in range(nu):
-        first, last = j0, j0
-        while first > 0 and not np.isnan(between[i, 3 * first - 3]):
-            first -= 1
-        while last < kv - 1 and not np.isnan(between[i, 3 * last + 3]):
-            last += 1
-        near, (low, high) = min(4, last - first + 1), _reach(v_knots, first, last, beyond)
-        for j in range(nv):
-            row, window, x, y, z = j, windows[j], 0.0, 0.0, 0.0
-            if not low <= v[j] <= high:
-                x = y = z = np.nan
-            else:
-                if window < first or window + most - 1 > last:
-                    row, window = nv, min(max(window, first), last + 1 - near)
-                    _weigh(v_knots, v[j], window, near, shares, nv)
-                for k in range(near):
-                    c = 3 * (window + k)
-                    x += shares[row, k] * between[i, c]
-                    y += shares[row, k] * between[i, c + 1]
-                    z += shares[row, k] * between[i, c + 2]
-            result[i, j, 0], result[i, j, 1], result[i, j, 2] = x, y, z
+            row, window, x, y, z = n, windows[n], 0.0, 0.0, 0.0
+            if window < first or window + most - 1 > last:
+                row, window = spare, _window(knots, s[n], right[n], first, last, shares, spare)
+            for k in range(near):
+                x += shares[row, k] * points[window + k, m, 0]
+                y += shares[row, k] * points[window + k, m, 1]
+                z += shares[row, k] * points[window + k, m, 2]
+            result[m, n, 0], result[m, n, 1], result[m, n, 2] = x, y, z
     return result
 
 
-@njit()
-def _windows(knots, s):  # type: ignore[no-untyped-def]
-    """For each of `s` (n,) the first of the four nearest knots, and their weights (n + 1, 4); the last row is spare."""
-    near, shares, windows = min(4, len(knots)), np.zeros((len(s) + 1, 4)), np.empty(len(s), dtype=np.int64)
-    for n in range(len(s)):
-        windows[n] = min(max(_right_of(knots, s[n]) - near // 2, 0), len(knots) - near)
-        _weigh(knots, s[n], windows[n], near, shares, n)
-    return shares, windows
-
-
 @njit(error_model="numpy")
-def _weigh(knots, at, window, near, shares, row):  # type: ignore[no-untyped-def]
-    """The weights of `near` knots from the `window` on, for the cubic at `at`, in `shares[row]`."""
+def _window(knots, at, right, first, last, shares, row):  # type: ignore[no-untyped-def]
+    """Of the knots from the `first` to the `last`: the first of the four nearest to `at`, and their weights in
+    `shares[row]` (4,)."""
+    near = min(4, last - first + 1)
+    window = min(max(right - near // 2, first), last + 1 - near)
     for j in range(near):
         shares[row, j] = 1.0
         for k in range(near):
             if j != k:
                 shares[row, j] *= (at - knots[window + k]) / (knots[window + j] - knots[window + k])
-
-
-@njit()
-def _reach(knots, first, last, beyond):  # type: ignore[no-untyped-def]
-    """The range that ends `beyond` steps before the `first` and after the `last` knot."""
-    return (
-        knots[first] - beyond * (knots[min(first + 1, last)] - knots[first]),
-        knots[last] + beyond * (knots[last] - knots[max(first, last - 1)]),
-    )
+    return window
 
 
 @njit()

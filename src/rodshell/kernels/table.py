@@ -27,7 +27,7 @@ KERNELS: dict[str, dict[str, str]] = {
     "geometry.curves": {
         "_on_curve": "f1 f2 f1",
         "lagrange": "f2 f3 f1",
-        "resampled": "f1 f1 f2 i i f1 f1 f",
+        "resampled": "f1 f3 i f1 f",
     },
     "joints.relative_rotation": {
         "_relative_rotation": "f2 i2 i2 f2 f3 c2 f1 f3 f3 f2 f3",
@@ -71,7 +71,7 @@ KERNELS: dict[str, dict[str, str]] = {
     "nets.net_ends": {
         "_around_ends": "f1 f3 i2 f2 f3 f1 f1",
         "_by_squares": "f3 i2 f1 f1",
-        "_connected": "b2 i i",
+        "_connect": "b2 i2 i i b1 b2",
         "_extrapolate": "i1 f2 i1 f2 f f2 f1",
         "_narrow": "f1 f2 f3 f1 i1 f2 f2 b",
         "_runs": "b2",

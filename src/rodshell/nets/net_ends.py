@@ -47,43 +47,38 @@ def inside_nodes(target: Target, net: Net) -> Bools:
     -------
     (nu, nv) booleans.
     """
-    return np.asarray(_connected(_region(target, net), *net.origin))
+    region = _region(target, net)
+    runs, reached = _runs(region), np.zeros_like(region)
+    _connect(region, runs, *net.origin, np.zeros(len(runs), dtype=bool), reached)
+    return reached
 
 
 @njit()
-def _connected(region, i0, j0):  # type: ignore[no-untyped-def]
-    """The nodes (nu, nv) of the `region` (nu, nv) that are connected with node (i0, j0), or with the first along the
-    axes. A run of nodes is reached from any of them, or from a run next to it."""
-    reached, runs = np.zeros(region.shape, dtype=np.bool_), _runs(region)
-    for i_side, j_side in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        i, j = i0, j0
-        while 0 <= i < region.shape[0] and 0 <= j < region.shape[1] and not region[i, j]:
-            i, j = i + i_side, j + j_side
-        if 0 <= i < region.shape[0] and 0 <= j < region.shape[1]:
-            reached[i, j] = True
-    found, pairs = np.zeros(len(runs), dtype=np.bool_), np.empty((2 * len(runs), 2), dtype=np.intp)
-    first, count, changed = 0, 0, True
-    for r in range(len(runs)):
-        i = runs[r, 0]
-        for j in range(runs[r, 1], runs[r, 2] + 1):
-            found[r] |= reached[i, j]
-        while first < r and (runs[first, 0] < i - 1 or (runs[first, 0] == i - 1 and runs[first, 2] < runs[r, 1])):
-            first += 1
-        s = first
-        while runs[s, 0] == i - 1 and runs[s, 1] <= runs[r, 2]:
-            pairs[count, 0], pairs[count, 1] = s, r
-            count, s = count + 1, s + 1
+def _connect(region, runs, i0, j0, found, reached):  # type: ignore[no-untyped-def]
+    """The nodes `reached` (nu, nv) of the `region` (nu, nv) that are connected with node (i0, j0), or with the first
+    along the axes. A run of nodes, see `_runs`, is found from any of them, or from a run next to it."""
+    changed, (nu, nv) = True, region.shape
+    for axis in range(4):
+        side, i, j = 1 - 2 * (axis % 2), i0, j0
+        while 0 <= i < nu and 0 <= j < nv and not region[i, j]:
+            i, j = (i + side, j) if axis < 2 else (i, j + side)
+        for r in range(len(runs)):
+            found[r] |= runs[r, 0] == i and runs[r, 1] <= j <= runs[r, 2]
     while changed:
-        changed = False
-        for n in range(2 * count):  # there and back
-            r, s = pairs[min(n, 2 * count - 1 - n)]
-            if found[r] != found[s]:
-                found[r] = found[s] = changed = True
+        changed, first = False, 0
+        for r in range(len(runs)):
+            before = runs[r, 0] - 1
+            while runs[first, 0] < before or (runs[first, 0] == before and runs[first, 2] < runs[r, 1]):
+                first += 1
+            s = first
+            while runs[s, 0] == before and runs[s, 1] <= runs[r, 2]:
+                if found[r] != found[s]:
+                    found[r] = found[s] = changed = True
+                s += 1
     for r in range(len(runs)):
         if found[r]:
             for j in range(runs[r, 1], runs[r, 2] + 1):
                 reached[runs[r, 0], j] = True
-    return reached
 
 
 def _region(target: Target, net: Net) -> Bools:

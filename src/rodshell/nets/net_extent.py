@@ -91,7 +91,7 @@ def march_covering(
     net = march_near(target, u, v, start, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged)
     while True:
         found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
-        if not _want(found.inside, u, v, 0, u, v, *(SURELY * margin), wanted):
+        if not want_nodes(found, 0, u, v, SURELY * margin, wanted):
             return found
         fill_quadrants(target, net, wanted, tolerance=converged**1.5)
 
@@ -111,8 +111,17 @@ def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats
     (nu, nv) booleans.
     """
     wanted = np.zeros((len(u), len(v)), dtype=bool)
-    _want(near.inside, near.u, near.v, past, u, v, *margin, wanted)
+    want_nodes(near, past, u, v, margin, wanted)
     return wanted
+
+
+def want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats, wanted: Bools) -> bool:
+    """Add to the nodes `wanted` (nu, nv) those of `wanted_nodes`; return whether any was not wanted before."""
+    if near.inside.any():
+        return bool(_want(near.inside, near.u, near.v, past, u, v, *margin, wanted))
+    added = not wanted.all()
+    wanted[:] = True
+    return added
 
 
 @njit()
@@ -120,7 +129,7 @@ def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # 
     """Add to the `wanted` nodes, see `wanted_nodes`; return whether any was not wanted before. In each quadrant they
     are below a staircase that only descends, away from the axis."""
     i_axis, j_axis, (nu, nv) = np.argmin(np.abs(u)), np.argmin(np.abs(v)), inside.shape
-    added, nothing = False, not inside.any()
+    added = False
     for quadrant in range(4):
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
         ends, height = np.full(nu + 1, np.inf), np.full(nu + 1, -np.inf)  # end and height of each step
@@ -138,11 +147,8 @@ def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # 
                 k += 1
             while ends[shifted] + margin_u < abs(u[i]):
                 shifted += 1
-            while (
-                not nothing
-                and count > 0
-                and abs(v[j_axis + j_side * (count - 1)]) > max(height[shifted], height[k] + margin_v)
-            ):
+            highest = max(height[shifted], height[k] + margin_v)
+            while count > 0 and abs(v[j_axis + j_side * (count - 1)]) > highest:
                 count -= 1
             first = j_axis if j_side > 0 else j_axis + 1 - count
             for j in range(first, first + count):

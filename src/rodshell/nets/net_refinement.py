@@ -98,7 +98,7 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
     (nu, nv, 3) points [m]; NaN further away.
     """
     i0, j0 = net.origin
-    return np.asarray(resampled(net.u, net.v, net.points.reshape(len(net.u), -1), i0, j0, u, v, BEYOND))
+    return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
 
 
 def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> bool:
@@ -221,7 +221,7 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
     """
     i0, j0 = net.origin
     row, moved, new = np.empty(wanted.shape, dtype=np.intp), np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
-    models, guessed = _chosen(net.points, wanted, i0, j0, row)
+    models, whole = _chosen(net.points, wanted, i0, j0, row)
     value, gradient, hessian = target.implicit(models)
     layered, limit = net.heights != ON_SURFACE, converged * target.size
     tolerance = converged**1.5 if layered else converged
@@ -229,16 +229,17 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
     if layered:
         normals[row >= 0] = unit(gradient[row[row >= 0]])  # exact on the axes, which stay; others follow in order
     for _ in range(ROUNDS):
-        _sweep(
+        furthest, found = _sweep(
             net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved,
             tolerance,
         )  # fmt: skip
-        rows, found = _rows_to_renew(net.points, row, moved, limit, new, models)
-        if len(rows) == 0:
-            return bool(guessed and found)
+        whole &= found
+        if furthest < limit:
+            return bool(whole)
+        rows = _rows_to_renew(net.points, row, moved, limit, new, models)
         now = target.implicit(models[rows])
         if not layered and np.abs(now.value).max() <= converged**3 * target.size:
-            return bool(guessed and found)  # models with F = 0 there were exact, as those of quadrics are
+            return bool(whole)  # models with F = 0 there were exact, as those of quadrics are
         value[rows], gradient[rows], hessian[rows] = now
     _forget(net.points, moved >= limit, i0, j0)
     return False
@@ -267,22 +268,21 @@ def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
 @njit()
 def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-untyped-def]
     """The rows (n,) of nodes that have `moved` by more than the `limit`, whose `models` are put where they are now and
-    which alone are `new`; and whether no node was lost."""
-    count, whole = 0, True
+    which alone are `new`."""
+    count = 0
     for i in range(row.shape[0]):
         for j in range(row.shape[1]):
             new[i, j] = moved[i, j] >= limit
             count += new[i, j]
-            whole &= row[i, j] < 0 or not np.isnan(moved[i, j])
     rows, filled = np.empty(count, dtype=np.intp), 0
-    for i in range(row.shape[0] if count > 0 else 0):
+    for i in range(row.shape[0]):
         for j in range(row.shape[1]):
             if new[i, j]:
                 rows[filled] = row[i, j]
                 filled += 1
                 for k in range(3):
                     models[row[i, j], k] = points[i, j, k]
-    return rows, whole
+    return rows
 
 
 @njit(error_model="numpy")
@@ -291,11 +291,12 @@ def _sweep(  # type: ignore[no-untyped-def]
 ):
     """March the `points` (nu, nv, 3) on second order models at `models` (n, 3); `row` (nu, nv) is the model of each, -1
     where there is none, and `moved` (nu, nv) returns the distance from it. Nodes whose models and neighbours are not
-    `new` (nu, nv) do not move. `tolerance` : of the last change of a node, relative to its step.
+    `new` (nu, nv) do not move. `tolerance` : of the last change of a node, relative to its step. Returns the largest
+    distance, and whether no node was lost.
 
     `normals` (nu, nv, 3) of the surface at the points are updated if rods are at `heights` above it; empty otherwise.
     """
-    layered = len(normals) > 0
+    layered, furthest, whole = len(normals) > 0, 0.0, True
     for i_side in (1, -1):
         for i in range(i0 + i_side, len(u) if i_side > 0 else -1, i_side):
             p = i - i_side
@@ -312,6 +313,7 @@ def _sweep(  # type: ignore[no-untyped-def]
                 if r < 0:
                     continue
                 if min(row[i, q], row[p, j], row[p, q]) < 0:
+                    whole = False
                     points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
                     continue
                 a, b, d = _at(points, i, q), _at(points, p, j), _at(points, p, q)
@@ -338,6 +340,7 @@ def _sweep(  # type: ignore[no-untyped-def]
                 sine = i_side * j_side * sine_of(volume, slope, from_a, from_b)
                 if change <= tolerance * step_size and sine > SMALLEST_SINE:
                     moved[i, j] = max(abs(away[0]), abs(away[1]), abs(away[2]))
+                    furthest = max(furthest, moved[i, j])
                     points[i, j, 0], points[i, j, 1], points[i, j, 2] = _plus(here, away)
                     if layered:
                         _, g = _model(r, away, value, gradient, hessian)
@@ -345,7 +348,9 @@ def _sweep(  # type: ignore[no-untyped-def]
                         for k in range(3):
                             normals[i, j, k] = g[k] / steep
                 else:
+                    whole = False
                     points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
+    return furthest, whole
 
 
 @njit(error_model="numpy")
