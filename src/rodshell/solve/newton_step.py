@@ -30,8 +30,8 @@ LONGER = 2.0  # growth of the longest step after one that was not
 NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand, be it a saddle,
 NEARER = 0.5  # and at most so much of the last ones: past a limit point nothing is near, and steps do not shrink
 STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
-SQUARED = 5e-3  # of their last change is the next one of the forces at most, after a step of Newton's;
-AGAIN = 3.0  # times as little as the last change was of the one before it, after a chord step
+ELASTIC = 1 / 3  # of their last change: the next one of elastic forces after a step of Newton's, at most
+AGAIN = 3.0  # times as much of the last change as that was of the one before: the next one after a chord step, at most
 CHORD = 5e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
@@ -220,12 +220,12 @@ class NewtonStep:
         size = max(float(np.abs(after).max(initial=0.0)), self._least_force)
         changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
         shrunk = moved / max(self._last[0], TINY), changed / max(self._last[1], TINY)
-        left = MULTIPLIERS if self._problem.inextensible else changed
-        rates = shrunk if self._chord else (max(CURVED * moved, changed), left)
+        multipliers = self._problem.inextensible
+        rates = shrunk if self._chord else (max(CURVED * moved, changed), MULTIPLIERS if multipliers else changed)
         self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
+        foreseen = AGAIN * shrunk[1] if self._chord else MULTIPLIERS if multipliers else ELASTIC
+        count_again = since >= STALE > foreseen * changed
         self._was_chord, self._last = self._chord, (moved, changed)
-        foreseen = changed * (AGAIN * shrunk[1] if self._was_chord else SQUARED)
-        count_again = since >= STALE > foreseen
         self._chord = moved < CHORD and not count_again and not self.negative_modes
 
     def _times(self, motion: Floats) -> Floats:
