@@ -1,8 +1,9 @@
-"""Kernels compiled by Numba when they are first called, and kept on disk where a folder can be written."""
+"""Kernels compiled by Numba when they are first called; those of the table are kept where a folder can be written."""
 
 from rodshell.errors import RodshellError
-from rodshell.kernels import Kernel
+from rodshell.kernels import Kernel, name_of
 from rodshell.kernels.cache import kernels_are_kept
+from rodshell.kernels.table import KERNELS
 
 try:
     from numba import njit, types
@@ -17,9 +18,12 @@ def dispatcher(function: Kernel, options: dict[str, object]) -> Kernel:
 
     Divisions are those of NumPy, and floating-point numbers are rounded as written, unless it has an option for that.
     By Numba's defaults a kernel takes such options from the kernel that calls it first, and its bits would depend on
-    the order of calls. Numba refuses to declare a kernel that is to be kept where no folder can be written.
+    the order of calls. Numba refuses to declare a kernel that is to be kept where no folder can be written. Those that
+    only kernels call are not kept: they are part of these, and to write them takes a twentieth of the time.
     """
-    of_its_own: dict[str, object] = {"error_model": "numpy", "fastmath": False, "cache": kernels_are_kept()}
+    module, _, name = name_of(function).rpartition(".")
+    kept = name in KERNELS.get(module, {}) and kernels_are_kept()
+    of_its_own: dict[str, object] = {"error_model": "numpy", "fastmath": False, "cache": kept}
     kernel: Kernel = njit(**of_its_own | options)(function)
     return kernel
 
