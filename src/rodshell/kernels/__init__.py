@@ -5,7 +5,8 @@ the processor, and `njit` returns the compiled function of the highest level tha
 needed. Elsewhere Numba compiles a kernel when it is first called. RODSHELL_KERNELS=jit chooses Numba in any case, and
 RODSHELL_KERNELS=FOLDER compiled libraries that are elsewhere.
 
-Kernels that are called from Python have a row in `table`; the others are part of those.
+Kernels that are called from Python have a row in `table`; the others are part of those. One that a single kernel calls
+is declared with inline="always": Numba then compiles it there only, and not on its own as well.
 """
 
 import os

@@ -353,7 +353,7 @@ def _sweep(  # type: ignore[no-untyped-def]
     return furthest, whole
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _quadratic_step(x, y, slope, r, hessian, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """As `compass_step`, of third order (Chebyshev's method): on a second order model all three equations are
     quadratic, so that what a step leaves of them is known: half its square, twice, and half its product with F''."""

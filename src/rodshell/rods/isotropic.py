@@ -164,7 +164,7 @@ def _to_units(x, y, z, per_length, size):  # type: ignore[no-untyped-def]
         x[m], y[m], z[m], per_length[m] = x[m] / length, y[m] / length, z[m] / length, 1.0 / length
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _bend_hessians(s, t, ge, gf, c, first, second, per_e, per_f, start, size, hessians):  # type: ignore[no-untyped-def]
     """Of the bends from `start` on; arguments as in `_isotropic_bend`."""
     hee, hef, hff = np.empty((3, 3, AT_ONCE)), np.empty((3, 3, AT_ONCE)), np.empty((3, 3, AT_ONCE))

@@ -53,7 +53,7 @@ def _place(matrix, row, column):  # type: ignore[no-untyped-def]
     return matrix.ctypes.data + row * matrix.strides[0] + column * BYTES
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
     """Eliminate the pivots of a front: D L^T in `rows` (width, stride), which holds the front's upper triangle before;
     L^T in `panel` (width, stride), D in `pivots` (width,). False where a pivot vanishes or is not finite.
@@ -80,7 +80,7 @@ def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _find_factors(rows, panel, begin, k, count, pivots, work):  # type: ignore[no-untyped-def]
     """The `count` pivots from k on, and in the workspace the factors that the kernel asks for."""
     left, stride = k // LANES * LANES, rows.shape[1]
@@ -107,7 +107,7 @@ def _find_factors(rows, panel, begin, k, count, pivots, work):  # type: ignore[n
     return True
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-untyped-def]
     """The rows of `count` pivots from k on, whose factors are known, after those of the pivots from `begin` on."""
     stride, depth = rows.shape[1], k - begin
@@ -157,7 +157,7 @@ def subtract_product(panel, rows, first, kept, target, work):  # type: ignore[no
         kept = KEPT
 
 
-@njit()
+@njit(inline="always")
 def _pack(panel, start, depth, first, n, work):  # type: ignore[no-untyped-def]
     """`n` columns of the panel into the workspace, packed `ROWS` at a time."""
     at = _PACKED
@@ -212,7 +212,7 @@ def add_rows(target, update, runs, end):  # type: ignore[no-untyped-def]
                 _add(_place(target, i + shift, runs[high, 1] - begin), _place(update, i, first), stop - first)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def forward(panel, values, aside):  # type: ignore[no-untyped-def]
     """Solve L y = b for the pivots of a front, b being the first of `values` (stride,), and subtract from the others
     what that takes. `aside` (width,) is scratch.
@@ -240,7 +240,7 @@ def forward(panel, values, aside):  # type: ignore[no-untyped-def]
         values[k] = aside[k]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
     """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x; the padding
     of the panel itself is 0. `aside` (2 width,) is scratch.

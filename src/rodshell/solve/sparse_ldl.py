@@ -492,7 +492,7 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
     return along[0]
 
 
-@njit()
+@njit(inline="always")
 def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
     """The coordinate in which a segment is longest."""
     axis, longest = 0, -1.0
@@ -503,7 +503,7 @@ def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
     return axis
 
 
-@njit()
+@njit(inline="always")
 def _best_cut(blocks, segment, here, rank, start, neighbours, first, last, touching):  # type: ignore[no-untyped-def]
     """Rank of the last block before the cut that the fewest blocks join, near the middle of the sorted `blocks` of a
     segment; and the side that these are on. `first` and `last` (n,) return the lowest and the highest rank to which

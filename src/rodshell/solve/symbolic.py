@@ -171,7 +171,7 @@ def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
     return order, parent, weight, count
 
 
-@njit()
+@njit(inline="always")
 def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyped-def]
     """Parent of each permuted block (Liu 1990), -1 for roots."""
     n = len(order)
@@ -190,7 +190,7 @@ def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyp
     return parent
 
 
-@njit()
+@njit(inline="always")
 def _postorder(parent):  # type: ignore[no-untyped-def]
     """Nodes of the forest, children before parents and every subtree in a row."""
     n = len(parent)
@@ -381,7 +381,7 @@ def _maps(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit()
+@njit(inline="always")
 def _by_front(indptr, indices, place, owner, supers):  # type: ignore[no-untyped-def]
     """The values of the matrix front by front: which value, and its permuted column and row, column <= row."""
     start, filled = np.empty(supers + 1, dtype=np.int64), np.zeros(supers, dtype=np.int64)
@@ -406,7 +406,7 @@ SHARE = 1 / 12  # of all work: no part that is eliminated by itself holds more
 WORTHWHILE = 1e8  # multiplications from which on work is shared
 
 
-@njit()
+@njit(inline="always")
 def parts_of(up, width, below):  # type: ignore[no-untyped-def]
     """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them.
 
@@ -446,7 +446,7 @@ def parts_of(up, width, below):  # type: ignore[no-untyped-def]
     return start[: count + 1], parts
 
 
-@njit()
+@njit(inline="always")
 def stacks_of(up, below, child_start, children, part_start, parts):  # type: ignore[no-untyped-def]
     """Where update matrices (rows `below`) lie, and room for all.
 
