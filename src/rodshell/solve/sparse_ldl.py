@@ -471,18 +471,20 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
             joins = last[b] > cut if joining == 0 else first[b] <= cut
             part[b] = 2 if side == joining and joins else side
         for d in range(len(along)):
-            row, none, one, two = along[d], 0, 0, 0
+            row, lower, upper, joined = along[d], 0, 0, 0
             for k in range(begin, end):
                 b = row[k]
-                kept[0, none] = kept[1, one] = kept[2, two] = b
-                none, one, two = none + (part[b] == 0), one + (part[b] == 1), two + (part[b] == 2)
-            for k in range(none):
+                kept[0, lower] = kept[1, upper] = kept[2, joined] = b
+                lower += part[b] == 0
+                upper += part[b] == 1
+                joined += part[b] == 2
+            for k in range(lower):
                 row[begin + k] = kept[0, k]
-            for k in range(one):
-                row[begin + none + k] = kept[1, k]
-            for k in range(two):
-                row[begin + none + one + k] = kept[2, k]
-        middle, stop = begin + none, begin + none + one
+            for k in range(upper):
+                row[begin + lower + k] = kept[1, k]
+            for k in range(joined):
+                row[begin + lower + upper + k] = kept[2, k]
+        middle, stop = begin + lower, begin + lower + upper
         for k in range(begin, end):
             segment[along[0, k]] = newest + 1 if k < middle else (newest + 2 if k < stop else -1)
         newest += 2
