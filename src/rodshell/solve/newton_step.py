@@ -245,13 +245,13 @@ class NewtonStep:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
         where the step that led there was too long."""
         if self._chord:
-            return self._step(right)
+            return self._solve(right)
         self._data = self._assembly.assemble([*self._hessians, self._curvature], self._blocks, self._free)
         regular = self._count_negative_modes()
         if self.factorizations == 1 and self._most_modes is not None and self.negative_modes > self._most_modes:
             raise TooManyModesError
         if self.negative_modes and regular and not descend:
-            step = self._step(right)
+            step = self._solve(right)
             if self._near(float(np.abs(step).max()) / self._problem.length):
                 self._shifted = False
                 return step
@@ -261,7 +261,7 @@ class NewtonStep:
         self._shifted = self.negative_modes > 0
         if self.negative_modes:
             self._shift_until_definite()
-        return self._step(right)
+        return self._solve(right)
 
     def _count_negative_modes(self) -> bool:
         """Factorise the Hessian; whether that can be done. A mode without stiffness counts as a negative one."""
@@ -303,18 +303,15 @@ class NewtonStep:
         self._factors = self._solver.factor(data, reuse=self._factors)
         return self._factors.negative
 
-    def _step(self, right: Floats) -> Floats:
+    def _solve(self, right: Floats) -> Floats:
         """By the last factors."""
         assert self._factors is not None
-        return self._factors.solve(right, refine=False)
+        return self._factors.solve(right)
 
     def _inverse_iteration(self, steps: int) -> tuple[Floats, float]:
         """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue."""
         start = np.sin(1.0 + np.arange(self._free.size) ** 2)[None]  # no symmetry of the shell is one of this start
-        assert self._factors is not None
-        values, (row, *_), _ = subspace_iteration(
-            self._factors.solve, start, settled=1, tolerance=0.0, most_sweeps=steps
-        )
+        values, (row, *_), _ = subspace_iteration(self._solve, start, settled=1, tolerance=0.0, most_sweeps=steps)
         return row, 1.0 / float(values[0])
 
 

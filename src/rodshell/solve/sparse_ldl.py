@@ -54,15 +54,8 @@ class Factors(Protocol):
         """Number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia)."""
         ...
 
-    def solve(self, right: Floats, *, refine: bool = True) -> Floats:
-        """Solution (n,) for a right-hand side.
-
-        Parameters
-        ----------
-        right : (n,).
-        refine : with one step of iterative refinement where it is not accurate; not needed for the steps of Newton's
-            method, each of which corrects the one before.
-        """
+    def solve(self, right: Floats) -> Floats:
+        """Solution (n,) for a right-hand side (n,), with one step of iterative refinement where it is not accurate."""
         ...
 
 
@@ -128,11 +121,9 @@ class QdldlFactors:
         solver, self._solver = self._solver, None
         return solver
 
-    def solve(self, right: Floats, *, refine: bool = True) -> Floats:
+    def solve(self, right: Floats) -> Floats:
         assert self._solver is not None, GIVEN_AWAY
         x = np.asarray(self._solver.solve(right))
-        if not refine:
-            return x
         residual = right - self._matrix @ x - self._matrix.T @ x + self._matrix.diagonal() * x
         return np.asarray(x + self._solver.solve(residual))
 
@@ -223,11 +214,9 @@ class MultifrontalFactors:
         memory, self._memory = self._memory, None
         return memory
 
-    def solve(self, right: Floats, *, refine: bool = True) -> Floats:
+    def solve(self, right: Floats) -> Floats:
         right = np.ascontiguousarray(right, dtype=np.float64)
         x = self._substitute(right)
-        if not refine:
-            return x
         residual, size = _residual(self._solver.indptr, self._solver.indices, self._data, x, right)
         if np.abs(residual).max(initial=0.0) > ACCURATE * size:
             x += self._substitute(residual)
