@@ -99,6 +99,15 @@ def test_a_drape_is_where_newtons_steps_alone_lead_to_round_off(name, monkeypatc
     assert np.abs(draped.positions - newton.positions).max() < 2e-14 * draped.target.size
 
 
+def test_a_drape_does_not_end_before_its_axial_forces_are_found(monkeypatch):
+    """They converge linearly, as multipliers of a penalty: ended after Newton's step, nodes are 2e-12 off."""
+    saddle = rs.HeightField(formula="(x**2 - y**2)/0.8", domain=rs.Disc(0.2))
+    draped = rs.drape(layout_of(spacing=0.03), ROD, saddle)
+    monkeypatch.setattr(newton_step, "MULTIPLIERS", 1.0)
+    further = rs.drape(layout_of(spacing=0.03), ROD, saddle)
+    assert np.abs(draped.positions - further.positions).max() < 1e-13 * saddle.size
+
+
 @every_case
 def test_no_rod_is_stretched_and_every_node_lies_on_the_surface(name):
     draped = drape_case(name)
