@@ -62,23 +62,29 @@ class Plan(NamedTuple):
 
 class Blocks(NamedTuple):
     """Unknowns in blocks of consecutive ones, `begin` (b + 1,), and the blocks that each is coupled to:
-    neighbours[start[k] : start[k + 1]]."""
+    neighbours[start[k] : start[k + 1]]. Two blocks are coupled wholly or not at all; in the upper triangle the columns
+    of block k have above[k] rows before the block's own, and `source` says where the values of each pair begin."""
 
     begin: Longs
     start: Longs
     neighbours: Longs
+    source: Longs
+    above: Longs
 
 
 def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> Blocks:
-    """The graph of blocks of a pattern (upper triangle, compressed columns).
+    """The graph of blocks of a pattern (upper triangle, compressed columns); of single unknowns, where some unknown of
+    a block is not coupled as the others are.
 
     Parameters
     ----------
     indptr, indices : the pattern of the upper triangle, in compressed columns.
     begin : (b + 1,) first unknown of each block, and the number of unknowns.
     """
-    begin = np.asarray(begin, dtype=np.int64)
-    return Blocks(begin, *_coupled(indptr.astype(np.int64), indices.astype(np.int64), begin))
+    whole, *graph = _coupled(indptr, indices, begin)
+    if whole:
+        return Blocks(begin, *graph)
+    return blocks_of(indptr, indices, np.arange(begin[-1] + 1))
 
 
 def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan:
@@ -94,7 +100,7 @@ def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan
     first = _supernodes(tree, count, weight)
     up, child_start, children = _children(tree, first)
     row_start, rows = _fronts(first, order, blocks.start, blocks.neighbours, up)
-    maps = _maps(indptr, indices, blocks.begin, order, weight, first, up, row_start, rows, child_start, children)
+    maps = _maps(indptr, *blocks, order, weight, first, up, row_start, rows, child_start, children)
     return Plan(*maps)
 
 
@@ -108,36 +114,46 @@ def start_after(count, start):  # type: ignore[no-untyped-def]
 
 @njit()
 def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
-    """The other blocks to which each block of unknowns is coupled, as start and neighbours."""
+    """The other blocks to which each block of unknowns is coupled (see `Blocks`); first, whether these are blocks."""
     n = len(begin) - 1
     block = np.empty(begin[n], dtype=np.int64)
     for b in range(n):
         for k in range(begin[b], begin[b + 1]):
             block[k] = b
-    mark, count, start = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64)
-    neighbours, place = np.empty(0, dtype=np.int64), count
-    for sweep in range(2):  # count, then fill
-        for b in range(n):
-            mark[b] = -1
-        for b in range(n):
-            for j in range(begin[b], begin[b + 1]):
-                for e in range(indptr[j], indptr[j + 1]):
-                    a = block[indices[e]]
-                    if a != b and mark[a] != b:
-                        mark[a] = b
-                        if sweep == 0:
-                            count[a] += 1
-                            count[b] += 1
-                        else:
-                            neighbours[place[a]], neighbours[place[b]] = b, a
-                            place[a] += 1
-                            place[b] += 1
-        if sweep == 0:
-            start_after(count, start)
-            for b in range(n):
-                place[b] = start[b]
-            neighbours = np.empty(start[n], dtype=np.int64)
-    return start, neighbours
+    count, start, above = np.zeros(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
+    whole = True
+    for b in range(n):
+        j, last = begin[b], begin[b + 1] - 1
+        above[b] = indptr[last + 1] - indptr[last] - (last + 1 - j)
+        for k in range(j, last + 1):  # every column has the rows of the first, and the block's own
+            whole = whole and indptr[k + 1] - indptr[k] == above[b] + k - j + 1
+        if not whole:
+            break
+        for k in range(j + 1, last + 1):
+            for e in range(above[b]):
+                whole = whole and indices[indptr[k] + e] == indices[indptr[j] + e]
+        e = indptr[j]
+        while e < indptr[j] + above[b]:
+            a = block[indices[e]]
+            for k in range(begin[a], begin[a + 1]):
+                whole = whole and e < indptr[j + 1] - 1 and indices[e] == k
+                e += 1
+            count[a] += 1
+            count[b] += 1
+    start_after(count, start)
+    neighbours, source, place = np.empty(start[n], dtype=np.int64), np.empty(start[n], dtype=np.int64), count
+    for b in range(n):
+        place[b] = start[b]
+    for b in range(n if whole else 0):
+        e = indptr[begin[b]]
+        while e < indptr[begin[b]] + above[b]:
+            a = block[indices[e]]
+            neighbours[place[a]], neighbours[place[b]] = b, a
+            source[place[a]] = source[place[b]] = e
+            place[a] += 1
+            place[b] += 1
+            e += begin[a + 1] - begin[a]
+    return whole, start, neighbours, source, above
 
 
 @njit()
@@ -321,28 +337,25 @@ def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def
 
 @njit()
 def _maps(  # type: ignore[no-untyped-def]
-    indptr, indices, begin, order, weight, first, up, row_start, rows, child_start, children
+    indptr, begin, start, neighbours, source, above, order, weight, first, up, row_start, rows, child_start, children
 ):
     """From blocks to unknowns: all that `Plan` holds."""
-    supers, n, unknowns = len(first) - 1, len(order), begin[len(begin) - 1]
-    column = np.empty(n + 1, dtype=np.int64)  # first permuted unknown of each block
-    start_after(weight, column)
+    supers, n, unknowns, values = len(first) - 1, len(order), begin[len(begin) - 1], indptr[len(indptr) - 1]
+    column, place = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
+    start_after(weight, column)  # first permuted unknown of each block
     first_column, width_of = np.empty(supers + 1, dtype=np.int64), np.empty(supers, dtype=np.int64)
-    original, place = np.empty(unknowns, dtype=np.int64), np.empty(unknowns, dtype=np.int64)
-    block, owner = np.empty(unknowns, dtype=np.int64), np.empty(unknowns, dtype=np.int64)
-    for s in range(supers):
-        for k in range(first[s], first[s + 1]):
-            for d in range(weight[k]):
-                at = column[k] + d
-                original[at], block[at], owner[at] = begin[order[k]] + d, k, s
-                place[original[at]] = at
-    entry_start, by_front = _by_front(indptr, indices, place, owner, supers)
+    original = np.empty(unknowns, dtype=np.int64)
+    for k in range(n):
+        place[order[k]] = k
+        for d in range(weight[k]):
+            original[column[k] + d] = begin[order[k]] + d
     total = 0
     for k in rows:
         total += weight[k]
     all_rows = np.empty(total, dtype=np.int64)
     all_start, panel_start = np.zeros(supers + 1, dtype=np.int64), np.zeros(supers + 1, dtype=np.int64)
-    entry_source, entry_place = np.empty(len(indices), dtype=np.int64), np.empty(len(indices), dtype=np.int64)
+    entry_start, entry = np.zeros(supers + 1, dtype=np.int64), 0
+    entry_source, entry_place = np.empty(values, dtype=np.int64), np.empty(values, dtype=np.int64)
     local = np.empty(n, dtype=np.int64)
     below = np.empty(supers, dtype=np.int64)
     run_start, runs = np.zeros(len(children) + 1, dtype=np.int64), np.empty((len(rows), 2), dtype=np.int64)
@@ -368,10 +381,22 @@ def _maps(  # type: ignore[no-untyped-def]
                     count += 1
                 at, past = at + weight[k], local[k] + weight[k]
             run_start[e + 1] = count
-        for e in range(entry_start[s], entry_start[s + 1]):
-            low, high = by_front[e, 1], by_front[e, 2]
-            entry_source[e] = by_front[e, 0]
-            entry_place[e] = (low - column[first[s]]) * stride + local[block[high]] + high - column[block[high]]
+        for k in range(first[s], first[s + 1]):  # the values in the rows of its pivots, pair by pair of blocks
+            b = order[k]
+            for e in range(start[b] - 1, start[b + 1]):  # first the block itself
+                a = neighbours[e] if e >= start[b] else b
+                if place[a] < k:
+                    continue
+                right = max(a, b)
+                at = source[e] if a != b else indptr[begin[b]] + above[b]
+                for c in range(begin[right + 1] - begin[right]):
+                    for r in range(begin[min(a, b) + 1] - begin[min(a, b)] if a != b else c + 1):
+                        i, j = (r, c) if b < a or a == b else (c, r)
+                        entry_source[entry] = at + r
+                        entry_place[entry] = (local[k] + i) * stride + local[place[a]] + j
+                        entry += 1
+                    at += above[right] + c + 1
+        entry_start[s + 1] = entry
     first_column[supers] = column[n]
     part_start, parts = parts_of(up, width_of, below)
     update_start, deepest = stacks_of(up, below, child_start, children, part_start, parts)
@@ -379,27 +404,6 @@ def _maps(  # type: ignore[no-untyped-def]
         original, first_column, all_start, all_rows, child_start, children, run_start, runs, entry_start,
         entry_source, entry_place, panel_start, update_start, part_start, parts, deepest, largest, widest,
     )  # fmt: skip
-
-
-@njit(inline="always")
-def _by_front(indptr, indices, place, owner, supers):  # type: ignore[no-untyped-def]
-    """The values of the matrix front by front: which value, and its permuted column and row, column <= row."""
-    start, filled = np.empty(supers + 1, dtype=np.int64), np.zeros(supers, dtype=np.int64)
-    for j in range(len(indptr) - 1):
-        for e in range(indptr[j], indptr[j + 1]):
-            filled[owner[min(place[j], place[indices[e]])]] += 1
-    start_after(filled, start)
-    for s in range(supers):
-        filled[s] = start[s]
-    sorted_values = np.empty((len(indices), 3), dtype=np.int64)
-    for j in range(len(indptr) - 1):
-        for e in range(indptr[j], indptr[j + 1]):
-            a, b = place[j], place[indices[e]]
-            low, high = min(a, b), max(a, b)
-            k = filled[owner[low]]
-            filled[owner[low]] += 1
-            sorted_values[k, 0], sorted_values[k, 1], sorted_values[k, 2] = e, low, high
-    return start, sorted_values
 
 
 SHARE = 1 / 12  # of all work: no part that is eliminated by itself holds more
