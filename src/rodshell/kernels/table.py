@@ -46,14 +46,10 @@ KERNELS: dict[str, dict[str, str]] = {
         "_spans": "i1 i1 f1 f2",
     },
     "model.assembly": {
-        "_columns": "i1 i1 i1 i1",
-        "_count_pairs": "i2 i1 i1",
         "_expand": "f1 f3 i1",
-        "_fill_pairs": "i2 i1 i1 i1",
-        "_find_slots": "i2 i1 i1 i1 i1",
+        "_pattern": "i1 i1 i1 i1",
         "_reduce": "f2 f3 i1 i",
         "_scatter": "f3 i2 i3 i1 i1 f3 i i f1",
-        "_unique_rows": "i1 i1",
     },
     "nets.chebyshev": {
         "_interpolate": "f1 f1 f3 i1 b1 i1 f1 f2",

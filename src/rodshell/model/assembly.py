@@ -151,12 +151,14 @@ class Assembly:
         element_blocks : of each element set, (m, k) blocks of its elements.
         freedom : free directions of all blocks.
         """
-        count = freedom.count
-        everywhere = np.arange(len(count))[:, None]
-        start, rows = _pattern([*element_blocks, everywhere], count)
-        indptr, indices, above, slot = _columns(start, rows, freedom.first, count)
-        slots = tuple(_find_slots(blocks, count, start, rows, slot) for blocks in element_blocks)
-        return Assembly(indptr, indices, count, above, slots)
+        widths = np.array([blocks.shape[1] for blocks in element_blocks], dtype=np.int64)
+        numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
+        flat = np.concatenate([np.arange(0), *(blocks.ravel() for blocks in element_blocks)])
+        indptr, indices, above, every = _pattern(flat, numbers, widths, freedom.count)
+        stops = np.cumsum(numbers * widths**2)[:-1]
+        each = zip(np.split(every, stops), element_blocks, strict=True) if len(widths) else ()
+        slots = tuple(slots.reshape(len(blocks), blocks.shape[1], blocks.shape[1]) for slots, blocks in each)
+        return Assembly(indptr, indices, freedom.count, above, slots)
 
     def has_pattern_of(self, other: "Assembly") -> bool:
         """Whether the matrices of another assembly have the same pattern, whatever elements they are summed from."""
@@ -211,108 +213,81 @@ class Assembly:
         return np.asarray(self.indptr[1:] - 1)
 
 
-def _pattern(element_blocks: Sequence[Ints], count: Ints) -> tuple[Ints, Ints]:
-    """The stored blocks, above and on the diagonal: rows[start[j] : start[j + 1]] of block column j, ascending."""
-    total = np.zeros(len(count) + 1, dtype=np.int64)
-    for blocks in element_blocks:
-        _count_pairs(blocks, count, total)
-    start = np.cumsum(total)
-    rows, end = np.empty(start[-1], dtype=np.int64), start[:-1].copy()
-    for blocks in element_blocks:
-        _fill_pairs(blocks, count, end, rows)
-    kept, unique = _unique_rows(start, rows)
-    return kept, unique
-
-
 @njit()
-def _count_pairs(blocks, count, total):  # type: ignore[no-untyped-def]
-    for m in range(blocks.shape[0]):
-        for b in range(blocks.shape[1]):
-            for a in range(blocks.shape[1]):
-                i, j = blocks[m, a], blocks[m, b]
-                if (i < j or a == b) and count[i] > 0 and count[j] > 0:
-                    total[j + 1] += 1
+def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
+    """The pattern by unknowns, every diagonal present; rows above each diagonal block; and where the values of each pair
+    of an element's blocks begin, those of all elements in a row, (k, k) of each, -1 if they are not stored.
 
-
-@njit()
-def _fill_pairs(blocks, count, end, rows):  # type: ignore[no-untyped-def]
-    for m in range(blocks.shape[0]):
-        for b in range(blocks.shape[1]):
-            for a in range(blocks.shape[1]):
-                i, j = blocks[m, a], blocks[m, b]
-                if (i < j or a == b) and count[i] > 0 and count[j] > 0:
-                    rows[end[j]] = i
-                    end[j] += 1
-
-
-@njit()
-def _unique_rows(start, rows):  # type: ignore[no-untyped-def]
-    """Each column's rows ascending, once each; a few dozen at most, so by insertion."""
-    n = len(start) - 1
-    kept, used = np.zeros(n + 1, dtype=np.int64), 0
+    The blocks of all elements lie in a row in `flat`, of each set `numbers` of elements with `widths` of blocks.
+    """
+    n, sets = len(count), len(widths)
+    touching = np.zeros(n, dtype=np.int64)
+    for at in flat:
+        touching[at] += 1
+    start, filled, pairs = np.zeros(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), 0
     for j in range(n):
-        begin = used
-        for e in range(start[j], start[j + 1]):
-            i, k = rows[e], used
-            while k > begin and rows[k - 1] > i:
-                k -= 1
-            if k > begin and rows[k - 1] == i:
-                continue
-            for back in range(used, k, -1):
-                rows[back] = rows[back - 1]
-            rows[k] = i
-            used += 1
-        kept[j + 1] = used
-    return kept, rows[:used].copy()
-
-
-@njit()
-def _columns(start, rows, first, count):  # type: ignore[no-untyped-def]
-    """The pattern by unknowns; rows above each diagonal block; and where each stored block begins in the values."""
-    n, unknowns = len(start) - 1, 0
-    for j in range(n):
-        unknowns += count[j]
-    indptr, above = np.zeros(unknowns + 1, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    slot = np.empty(len(rows), dtype=np.int64)
+        start[j + 1], filled[j] = start[j] + touching[j], start[j]
+    elements = np.empty((len(flat), 4), dtype=np.int64)  # that touch each block: its place there, blocks, width, slots
     begin = 0
+    for s in range(sets):
+        k = widths[s]
+        for _ in range(numbers[s]):
+            for b in range(k):
+                e = filled[flat[begin + b]]
+                elements[e, 0], elements[e, 1], elements[e, 2], elements[e, 3] = b, begin, k, pairs
+                filled[flat[begin + b]] += 1
+            begin, pairs = begin + k, pairs + k * k
+    slots = np.empty(pairs, dtype=np.int64)
+    for e in range(pairs):
+        slots[e] = -1
+    rows, kept, above = np.empty(pairs + n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
+    mark, place = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     for j in range(n):
-        height = 0
+        mark[j] = -1
+    used, values, unknowns = 0, 0, 0
+    for j in range(n):  # block column by block column: its rows ascending, once each, a few dozen at most
+        kept[j], above[j] = used, 0
+        if count[j] == 0:
+            continue
         for e in range(start[j], start[j + 1]):
-            slot[e] = begin + height
-            if rows[e] < j:
-                height += count[rows[e]]
-        above[j] = height
-        for c in range(count[j]):
-            begin += height + c + 1
-            indptr[first[j] + c + 1] = begin
-    indices = np.empty(begin, dtype=np.int64)
+            for a in range(elements[e, 2]):
+                i = flat[elements[e, 1] + a]
+                if i < j and mark[i] != j and count[i] > 0:
+                    mark[i], k = j, used
+                    while k > kept[j] and rows[k - 1] > i:
+                        rows[k] = rows[k - 1]
+                        k -= 1
+                    rows[k] = i
+                    used += 1
+        for e in range(kept[j], used):
+            place[rows[e]] = values + above[j]
+            above[j] += count[rows[e]]
+        place[j], mark[j] = values + above[j], j
+        for e in range(start[j], start[j + 1]):
+            b, k = elements[e, 0], elements[e, 2]
+            for a in range(k):
+                i = flat[elements[e, 1] + a]
+                if (i < j or a == b) and count[i] > 0:
+                    slots[elements[e, 3] + a * k + b] = place[i]
+        values += count[j] * above[j] + count[j] * (count[j] + 1) // 2
+        unknowns += count[j]
+    kept[n] = used
+    indptr, indices = np.zeros(unknowns + 1, dtype=np.int64), np.empty(values, dtype=np.int64)
+    for j in range(n):
+        filled[j] = 0 if j == 0 else filled[j - 1] + count[j - 1]
+    value, unknown = 0, 0
     for j in range(n):
         for c in range(count[j]):
-            k = indptr[first[j] + c]
-            for e in range(start[j], start[j + 1]):
-                i = rows[e]
-                for r in range(count[i] if i != j else c + 1):
-                    indices[k] = first[i] + r
-                    k += 1
-    return indptr, indices, above, slot
-
-
-@njit()
-def _find_slots(blocks, count, start, rows, slot):  # type: ignore[no-untyped-def]
-    """(m, k, k) where each pair of an element's blocks begins in the values, -1 if it is not stored."""
-    k = blocks.shape[1]
-    slots = np.empty((blocks.shape[0], k, k), dtype=np.int64)
-    for m in range(blocks.shape[0]):
-        for b in range(k):
-            for a in range(k):
-                slots[m, a, b] = -1
-                i, j = blocks[m, a], blocks[m, b]
-                if (i < j or a == b) and count[i] > 0 and count[j] > 0:
-                    e = start[j]
-                    while rows[e] != i:
-                        e += 1
-                    slots[m, a, b] = slot[e]
-    return slots
+            for e in range(kept[j], kept[j + 1]):
+                for r in range(count[rows[e]]):
+                    indices[value] = filled[rows[e]] + r
+                    value += 1
+            for r in range(c + 1):
+                indices[value] = filled[j] + r
+                value += 1
+            unknown += 1
+            indptr[unknown] = value
+    return indptr, indices, above, slots
 
 
 @njit(error_model="numpy", nogil=True)
