@@ -247,6 +247,57 @@ def test_dissection_orders_every_block_once_and_separators_last():
     assert np.ptp(last, axis=0).min() == 1.0
 
 
+def rods_graph(count, inner):
+    """Graph of `count` rods across as many others, with `inner` nodes in each span and past the last joints, and where
+    the nodes lie: each is coupled to two on each side, along its rods. Joints are numbered with the first rods."""
+    step, numbers = inner + 1, {}
+    stations = range(-inner, (count - 1) * step + inner + 1)
+    rods = [[(x, y * step) for x in stations] for y in range(count)]
+    rods += [[(x * step, y) for y in stations] for x in range(count)]
+    for rod in rods:
+        for node in rod:
+            numbers.setdefault(node, len(numbers))
+    graph = np.zeros((len(numbers), len(numbers)), dtype=bool)
+    for rod in rods:
+        nodes = [numbers[node] for node in rod]
+        for apart in (1, 2):
+            graph[nodes[apart:], nodes[:-apart]] = graph[nodes[:-apart], nodes[apart:]] = True
+    return graph, np.array(list(numbers))
+
+
+@pytest.mark.parametrize("inner", [1, 4, 5])
+def test_inner_nodes_of_spans_are_eliminated_first(inner):
+    """Against elimination by its definition: whoever is eliminated leaves all that it was coupled to coupled."""
+    graph, places = rods_graph(5, inner)
+    coupled = sparse.csr_matrix(graph)
+    first, kept, start, neighbours = sparse_ldl._without_spans(
+        coupled.indptr.astype(np.int64), coupled.indices.astype(np.int64)
+    )
+    assert len(first) == (0 if inner == 1 else 2 * 5 * 6 * (inner - 1))
+    assert sorted([*first, *kept]) == list(range(len(places)))
+    for b in first:
+        left = np.flatnonzero(graph[b])
+        graph[np.ix_(left, left)] = True
+        graph[b] = graph[:, b] = False
+    np.fill_diagonal(graph, False)
+    found = sparse.csr_matrix((np.ones(len(neighbours)), neighbours, start), shape=(len(kept), len(kept))).toarray()
+    assert np.array_equal(found, graph[np.ix_(kept, kept)])
+
+
+def test_blocks_that_are_not_coupled_as_wholes_are_taken_apart():
+    """Nodes of two unknowns, of which only the first of each is coupled to the next node."""
+    size = 20
+    matrix = sparse.lil_matrix(4.0 * sparse.identity(size))
+    for k in range(0, size - 2, 2):
+        matrix[k, k + 2] = matrix[k + 2, k] = 1.0
+        matrix[k, k + 1] = matrix[k + 1, k] = 0.5
+    triangle, right = upper(matrix.tocsr()), RANDOM.standard_normal(size)
+    factors = Multifrontal(triangle.indptr, triangle.indices, np.repeat(np.arange(10.0), 2)[:, None]).factor(
+        triangle.data
+    )
+    assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-14
+
+
 def test_what_memory_held_before_does_not_matter(monkeypatch):
     """Kernels read some numbers past what is theirs; nothing of it may get into the solution."""
     matrix, places = grid_matrix(23)

@@ -119,6 +119,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_dissect": "f2 i2 i1 i1",
         "_numeric": "i1 f1 i1 i1 i1 i1 i1 i2 i1 i1 i1 i1 i1 f1 f1 f1 f1 f1",
         "_residual": "i1 i1 f1 f1 f1",
+        "_without_spans": "i1 i1",
     },
     "solve.symbolic": {
         "_children": "i1 i1",

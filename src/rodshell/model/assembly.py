@@ -215,8 +215,8 @@ class Assembly:
 
 @njit()
 def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
-    """The pattern by unknowns, every diagonal present; rows above each diagonal block; and where the values of each pair
-    of an element's blocks begin, those of all elements in a row, (k, k) of each, -1 if they are not stored.
+    """The pattern by unknowns, every diagonal present; rows above each diagonal block; and where the values of each
+    pair of an element's blocks begin, those of all elements in a row, (k, k) of each, -1 if they are not stored.
 
     The blocks of all elements lie in a row in `flat`, of each set `numbers` of elements with `widths` of blocks.
     """
@@ -240,7 +240,11 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
     slots = np.empty(pairs, dtype=np.int64)
     for e in range(pairs):
         slots[e] = -1
-    rows, kept, above = np.empty(pairs + n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
+    rows, kept, above = (
+        np.empty(pairs + n, dtype=np.int64),
+        np.empty(n + 1, dtype=np.int64),
+        np.empty(n, dtype=np.int64),
+    )
     mark, place = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     for j in range(n):
         mark[j] = -1

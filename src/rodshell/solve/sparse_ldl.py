@@ -414,10 +414,15 @@ def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, loca
 
 LEAF = 12  # blocks that are not divided further
 UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
+NEAREST = 4  # blocks to which one within a span is coupled, two on each side
+SHORT = 3  # blocks within a span that are not worth to be taken together
 
 
 def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     """Order blocks so that separators come last: first both parts of a cut, each dissected, then what joins them.
+
+    The inner nodes of a span come before all others: what is cut is a graph of joints and a single node of each span,
+    coupled as they are after that elimination.
 
     Parameters
     ----------
@@ -428,8 +433,61 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     -------
     (n,) blocks in the order of their elimination.
     """
-    along = np.argsort(coordinates.T, axis=1, kind="stable").astype(np.int64)
-    return np.asarray(_dissect(np.ascontiguousarray(coordinates, dtype=np.float64), along, start, neighbours))
+    inner, kept, start, neighbours = _without_spans(start, neighbours)
+    points = np.ascontiguousarray(coordinates[kept], dtype=np.float64)
+    along = np.argsort(points.T, axis=1, kind="stable").astype(np.int64)
+    return np.concatenate([inner, kept[_dissect(points, along, start, neighbours)]])
+
+
+@njit()
+def _without_spans(start, neighbours):  # type: ignore[no-untyped-def]
+    """Blocks within spans, without the first of each, so that those of two spans are not coupled; all others; and the
+    graph of these after the elimination of the first. Blocks within a span follow one after the other."""
+    n, b = len(start) - 1, 0
+    first_of = np.empty(n, dtype=np.int64)  # of its span, or -1
+    while b < n:
+        first, inside = b, True
+        while inside and b < n:
+            coupled = 0
+            for e in range(start[b], start[b + 1]):
+                coupled += first <= neighbours[e] < b
+            inside = start[b + 1] - start[b] <= NEAREST and coupled >= min(2, b - first)
+            b += inside
+        for k in range(first, b):
+            first_of[k] = first + 1 if b - first > SHORT and k > first else -1
+        if b == first:
+            first_of[b] = -1
+            b += 1
+    inner, kept, place = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    count = 0
+    for b in range(n):
+        place[b] = count
+        inner[b - count] = kept[count] = b
+        count += first_of[b] < 0
+    mark, used = np.empty(n, dtype=np.int64), 0
+    graph_start, graph = np.zeros(count + 1, dtype=np.int64), np.empty(NEAREST * len(neighbours), dtype=np.int64)
+    for b in range(n):
+        mark[b] = -1
+    for k in range(count):
+        mark[kept[k]] = k
+        for e in range(start[kept[k]], start[kept[k] + 1]):
+            a = neighbours[e]
+            if first_of[a] < 0:
+                if mark[a] != k:
+                    mark[a], graph[used] = k, place[a]
+                    used += 1
+                continue
+            a = first_of[a]
+            while a < n and mark[a] != k and first_of[a] == first_of[neighbours[e]]:  # all that its span is coupled to
+                mark[a] = k
+                for i in range(start[a], start[a + 1]):
+                    c = neighbours[i]
+                    if first_of[c] < 0 and mark[c] != k:
+                        mark[c], graph[used] = k, place[c]
+                        used += 1
+                a += 1
+        graph_start[k + 1] = used
+    return inner[: n - count].copy(), kept[:count].copy(), graph_start, graph[:used].copy()
 
 
 @njit()

@@ -62,8 +62,9 @@ class Plan(NamedTuple):
 
 class Blocks(NamedTuple):
     """Unknowns in blocks of consecutive ones, `begin` (b + 1,), and the blocks that each is coupled to:
-    neighbours[start[k] : start[k + 1]]. Two blocks are coupled wholly or not at all; in the upper triangle the columns
-    of block k have above[k] rows before the block's own, and `source` says where the values of each pair begin."""
+    neighbours[start[k] : start[k + 1]]. All unknowns of two blocks are coupled, or none. In the upper triangle the
+    columns of block k have above[k] rows before the block's own; `source` says where the values of each pair begin.
+    """
 
     begin: Longs
     start: Longs
