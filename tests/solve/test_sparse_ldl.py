@@ -229,6 +229,20 @@ def test_digits_lost_to_a_small_pivot_are_won_back():
     assert np.abs(factors.solve(matrix @ exact) - exact).max() < 1e-14
 
 
+@pytest.mark.parametrize(("pivot", "looked_at"), [(4.0, 1), (1e-8, 3)])
+def test_solutions_are_looked_at_until_they_are_accurate(monkeypatch, pivot, looked_at):
+    matrix, found = np.array([[pivot, 1.0, 0.3], [1.0, pivot, 0.7], [0.3, 0.7, 2.0]]), []
+    residual = sparse_ldl._residual
+    monkeypatch.setattr(sparse_ldl, "_residual", lambda *given: found.append(1) or residual(*given))
+    triangle = upper(matrix)
+    factors = Multifrontal(triangle.indptr, triangle.indices, np.arange(3.0)[:, None]).factor(triangle.data)
+    assert not factors.solve(np.zeros(3)).any()  # which says nothing of the factors
+    found.clear()
+    for right in np.eye(3):
+        assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-14
+    assert len(found) == looked_at
+
+
 @pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
 def test_vanishing_pivot_is_refused(bad):
     triangle = upper(np.diag([1.0, 2.0, 3.0]))
