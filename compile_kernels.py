@@ -111,6 +111,7 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
 
     compiler.compile_extra = with_its_options
     pythonapi._unboxers.functions[types.Array] = checked_array
+    pythonapi._boxers.functions[types.Array] = returned_array
     pythonapi.PythonAPI.get_c_object = c_object
     jit.kernels_are_kept = lambda: False
     optimise_once()
@@ -218,6 +219,23 @@ def checked_array(kind, given, code):  # type: ignore[no-untyped-def]
         )
         code.pyapi.err_set_string("PyExc_TypeError", said)
     return NativeValue(build.load(native._getpointer()), is_error=build.load(failed))
+
+
+def returned_array(kind, value, code):  # type: ignore[no-untyped-def]
+    """An array that a kernel returns, as a Python object. pycc has pickle look up NumPy's class of arrays each time: a
+    microsecond, as long as a short kernel.
+
+    Parameters
+    ----------
+    kind : Numba's type of it.
+    value : what the kernel returns.
+    code : what writes the LLVM code of the call.
+    """
+    from numba.core.boxing import box_array
+
+    constants = code.env_manager
+    code.pyapi.unserialize = lambda _: constants.read_const(constants.add_const(kind.box_type))
+    return box_array(kind, value, code)
 
 
 # Where NumPy keeps them: in an array, behind its head, data, number of dimensions, shape, strides, base, dtype, flags

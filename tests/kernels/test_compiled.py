@@ -108,9 +108,9 @@ def test_arrays_that_lie_otherwise_are_copied(x: np.ndarray, edges: np.ndarray) 
 def test_what_a_kernel_writes_reaches_an_array_that_lies_otherwise() -> None:
     random = np.random.default_rng(0)
     at, values = random.standard_normal((4, 3)), [random.standard_normal(shape) for shape in ((4,), (4, 3), (4, 3, 3))]
-    plain, turned = (np.empty((4, 3)), np.empty(4, dtype=bool)), (np.empty((3, 4)).T, np.empty(8, dtype=bool)[::2])
-    for step, convex in (plain, turned):
-        newton_to_closest(at, at + 0.1, *values, np.zeros(4), step, convex)
+    plain, turned = (np.empty((4, 3)), np.empty(4)), (np.empty((3, 4)).T, np.empty(8)[::2])
+    for slope, length in (plain, turned):
+        newton_to_closest(at, at + 0.1, np.arange(4), *values, np.zeros(4), np.inf, slope, length)
     np.testing.assert_array_equal(turned[0], plain[0])
     np.testing.assert_array_equal(turned[1], plain[1])
 

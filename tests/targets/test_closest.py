@@ -21,9 +21,11 @@ def states(seed: int = 0) -> tuple[Floats, Floats, Floats, Floats, Floats, Float
 def test_a_newton_step_solves_the_bordered_system():
     """(1 + damping) s + t F'' s + dt F' = x - y - t F', F' s = -F, with t the best for y alone."""
     x, y, value, gradient, hessian, damping = states()
-    step, convex = np.empty_like(x), np.empty(COUNT, dtype=bool)
-    newton_to_closest(x, y, value, gradient, hessian, damping, step, convex)
-    kinds = set()
+    moved, slope, length = y.copy(), np.empty_like(x), np.empty(COUNT)
+    newton_to_closest(x, moved, np.arange(COUNT), value, gradient, hessian, damping, np.inf, slope, length)
+    step, convex, kinds = moved - y, np.isfinite(length), set()
+    assert np.array_equal(slope, gradient)
+    assert length[convex] == pytest.approx(np.linalg.norm(step[convex], axis=1))
     for k in range(COUNT):
         g, t = gradient[k], (x[k] - y[k]) @ gradient[k] / (gradient[k] @ gradient[k])
         bent = (1 + damping[k]) * np.eye(3) + t * hessian[k]
@@ -37,13 +39,32 @@ def test_a_newton_step_solves_the_bordered_system():
     assert kinds == {0, 1, 2}
 
 
+def test_only_the_rows_that_are_asked_for_move_and_no_further_than_they_may():
+    x, y, value, gradient, hessian, damping = states()
+    whole, slope, length = y.copy(), np.empty_like(x), np.empty(COUNT)
+    newton_to_closest(x, whole, np.arange(COUNT), value, gradient, hessian, damping, np.inf, slope, length)
+    rows = np.arange(COUNT)[::-3].copy()
+    given = [np.ascontiguousarray(array[rows]) for array in (value, gradient, hessian, damping)]
+    moved, slope, length = y.copy(), np.zeros_like(x), np.empty(len(rows))
+    newton_to_closest(x, moved, rows, *given, 0.5, slope, length)
+    others = np.setdiff1d(np.arange(COUNT), rows)
+    assert np.array_equal(moved[others], y[others])
+    assert not slope[others].any()
+    full, step = (whole - y)[rows], (moved - y)[rows]
+    size = np.linalg.norm(full, axis=1)
+    assert size.min() < 0.5 < size.max()
+    assert step == pytest.approx(np.minimum(1.0, 0.5 / size)[:, None] * full)
+
+
 def test_at_a_centre_of_curvature_the_step_keeps_to_the_normal():
     """On the sphere's centre every point is closest, and none is preferred."""
     y, x = np.array([[0.0, 0.0, 1.0]]), np.zeros((1, 3))
-    step, convex = np.empty_like(x), np.empty(1, dtype=bool)
-    newton_to_closest(x, y, np.array([0.02]), 2 * y, 2 * np.eye(3)[None], np.zeros(1), step, convex)
-    assert step[0] == pytest.approx([0.0, 0.0, -0.01])
-    assert not convex[0]
+    gradient, slope, length = 2 * y, np.empty_like(x), np.empty(1)
+    newton_to_closest(
+        x, y, np.arange(1), np.array([0.02]), gradient, 2 * np.eye(3)[None], np.zeros(1), np.inf, slope, length
+    )
+    assert y[0] == pytest.approx([0.0, 0.0, 0.99])
+    assert np.isinf(length[0])
 
 
 def test_shape_operators_are_projected_hessians():

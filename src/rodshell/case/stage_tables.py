@@ -122,19 +122,20 @@ class DrapeTable(Table):
 
     @model_validator(mode="after")
     def _uses_all(self) -> Self:
-        for name in IDLE[self.method]:
-            methods = " or ".join(f'"{method}"' for method in IDLE if name not in IDLE[method])
-            self._refuse(name, f'method "{self.method}" has no {name}: leave it out, or set drape.method to {methods}')
-        if self.coupling == "shared":
-            for name in ("C1", "C2"):
-                springs = 'leave it out, or set drape.coupling to "implicit" or "explicit"'
-                self._refuse(name, f'coupling "shared" has no springs: {springs}')
+        defaults = type(self).model_fields
+        idle = [*IDLE[self.method], *(("C1", "C2") if self.coupling == "shared" else ())]
+        for name in idle:
+            value = getattr(self, name)
+            if value != defaults[name].default:
+                raise ValueError(f"drape.{name} = {shown(value)}: {self._why_idle(name)}")
         return self
 
-    def _refuse(self, name: str, why: str) -> None:
-        """ValueError where a key that does nothing is set."""
-        if getattr(self, name) != type(self).model_fields[name].default:
-            raise ValueError(f"drape.{name} = {shown(getattr(self, name))}: {why}")
+    def _why_idle(self, name: str) -> str:
+        """Why a key does nothing here, and what to do."""
+        if name in IDLE[self.method]:
+            methods = " or ".join(f'"{method}"' for method in IDLE if name not in IDLE[method])
+            return f'method "{self.method}" has no {name}: leave it out, or set drape.method to {methods}'
+        return 'coupling "shared" has no springs: leave it out, or set drape.coupling to "implicit" or "explicit"'
 
     def build(self) -> "Method":
         """The method with its options."""

@@ -119,18 +119,17 @@ class UnilateralContact:
 @njit(error_model="numpy")
 def _tangents(steepest, guides):  # type: ignore[no-untyped-def]
     """(n, 3, 3) two directions across `steepest` (n, 3), the first nearest to `guides` (n, 3); the third is zero."""
-    directions = np.zeros((len(steepest), 3, 3))
+    directions = np.empty((len(steepest), 3, 3))
     for i in range(len(steepest)):
         nx, ny, nz = steepest[i, 0], steepest[i, 1], steepest[i, 2]
         gx, gy, gz = guides[i, 0], guides[i, 1], guides[i, 2]
-        length = np.sqrt(nx * nx + ny * ny + nz * nz)
-        share = (gx * nx + gy * ny + gz * nz) / (length * length)
+        square = nx * nx + ny * ny + nz * nz
+        share = (gx * nx + gy * ny + gz * nz) / square
         ax, ay, az = gx - share * nx, gy - share * ny, gz - share * nz
-        width = np.sqrt(ax * ax + ay * ay + az * az)
-        ax, ay, az = ax / width, ay / width, az / width
-        along, across = directions[i, 0], directions[i, 1]
-        along[0], along[1], along[2] = ax, ay, az
-        across[0], across[1], across[2] = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
-        for k in range(3):
-            across[k] /= length
+        bx, by, bz = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
+        to_a = 1.0 / np.sqrt(ax * ax + ay * ay + az * az)
+        to_b = to_a / np.sqrt(square)
+        directions[i, 0, 0], directions[i, 0, 1], directions[i, 0, 2] = to_a * ax, to_a * ay, to_a * az
+        directions[i, 1, 0], directions[i, 1, 1], directions[i, 1, 2] = to_b * bx, to_b * by, to_b * bz
+        directions[i, 2, 0] = directions[i, 2, 1] = directions[i, 2, 2] = 0.0
     return directions

@@ -115,16 +115,16 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
     on_line = defaultdict[tuple[object, ...], list[tuple[int, float, float]]](list)
     for k, rod in enumerate(rods):
         tiny = 1e-9 * (rod.end - rod.start)
-        on_line[rod.family, rod.offset, rod.origin, rod.direction] += [(k, rod.start - tiny, rod.end + tiny)]
-    found = np.empty(len(pieces), dtype=np.intp)
-    for row, piece in enumerate(pieces):
-        for k, start, end in on_line[piece.family, piece.offset, piece.origin, piece.direction]:
+        on_line[rod.origin, rod.direction].append((k, rod.start - tiny, rod.end + tiny))
+    found = list[int]()
+    for piece in pieces:
+        for k, start, end in on_line[piece.origin, piece.direction]:
             if start <= piece.start and piece.end <= end:
-                found[row] = k
+                found.append(k)
                 break
         else:
             raise ValueError(f"{piece.name} is not a piece of any rod")
-    return found
+    return np.array(found, dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Two families of parallel rods, orthogonal in the flat grid, before they are cut to a target."""
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from math import degrees, pi
 from numbers import Real
 from reprlib import repr as short
@@ -173,7 +173,8 @@ class GridLayout:
 
     def parameters(self) -> dict[str, object]:
         """The layout in SI, as it is written in a case file."""
-        return {key: value for key, value in asdict(self).items() if key not in ("lines", "left_out")}
+        keys = (key.name for key in fields(self) if key.name not in ("lines", "left_out"))
+        return {key: getattr(self, key) for key in keys}
 
     def flat_grid(self, counts: tuple[int, int], length: float) -> FlatGrid:
         """The rectangular grid before trimming.

@@ -68,7 +68,9 @@ class Shell:
     angles : number of twist angles, or 0.
     spinning : (s,) block of one twist angle of each rod that could otherwise spin about itself.
     like : (N,) the block of the shared form that each block copies: with shared DOFs the block itself.
-    mass : (N, 3) lumped mass of each block's components [kg; of twist angles kg m2].
+    edge_mass : (e,) mass of each edge [kg].
+    edge_inertia : (e,) moment of inertia of each edge about its tangent [kg m2].
+    joint_mass : (c,) mass of each crossing's joint [kg].
     """
 
     mesh: GridMesh
@@ -82,7 +84,9 @@ class Shell:
     angles: int
     spinning: Ints
     like: Ints
-    mass: Floats
+    edge_mass: Floats
+    edge_inertia: Floats
+    joint_mass: Floats
 
     def __repr__(self) -> str:
         ends = "clamped" if len(self.ghosts) else "pinned"
@@ -154,6 +158,22 @@ class Shell:
         if self.angles:
             angles = np.vstack([flat[self.mesh.edges].mean(axis=1), ghosts])[: self.angles]
         return np.vstack([flat, ghosts, angles]).take(self.like, axis=0)
+
+    @cached_property
+    def mass(self) -> Floats:
+        """(N, 3) lumped mass of each block's components [kg; of twist angles kg m2]."""
+        mesh, (start, end), (first, second) = self.mesh, self.mesh.edges.T, self.mesh.joint_pairs.T
+        half, of_joints = 0.5 * self.edge_mass, 0.5 * self.joint_mass  # half of a joint's mass on either rod
+        of_nodes = np.zeros(mesh.node_count)
+        for nodes, share in ((start, half), (end, half), (first, of_joints), (second, of_joints)):
+            of_nodes += np.bincount(nodes, share, minlength=mesh.node_count)
+        shared = np.zeros((int(self.like.max()) + 1, 3))
+        shared[: mesh.node_count] = of_nodes[:, None]
+        if self.angles:
+            angles = mesh.node_count + len(self.ghosts)
+            shared[angles : angles + len(mesh.edges), 0] = self.edge_inertia
+        copies = np.bincount(self.like)
+        return np.asarray(shared[self.like] / copies[self.like][:, None])
 
     def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
         """(N, 3) state of the shell.
@@ -283,13 +303,12 @@ class _Builder:
         stretch = Stretch.elastic(parts.edges, mesh.edge_lengths, self.sections.stretch)
         bends = self._bends()
         linkers, linker_ties = self._linkers()
-        mass = self._shared_mass()
-        if self.apart:
-            mass = mass[self.like] / np.bincount(self.like)[self.like][:, None]
         within, between = (*bends, *linkers), (*self._elastic(), *self._ties(), *linker_ties)
         return Shell(
             mesh, self.coupling, parts.node_count, within, between, stretch,
-            parts.ends.ravel(), self.ghosts, self.angles, self._spinning(), self.like, mass,
+            parts.ends.ravel(), self.ghosts, self.angles, self._spinning(), self.like,
+            mesh.edge_lengths * self.sections.mass, mesh.edge_lengths * self.sections.rotary_inertia,
+            self._of_joints(lambda joint: joint.mass),
         )  # fmt: skip
 
     def _spinning(self) -> Ints:
@@ -415,22 +434,6 @@ class _Builder:
         edge = float(np.median(self.mesh.edge_lengths))
         values = [coupling.with_defaults(rod, edge) for rod in set(self.rods)]
         return min(float(value.C1 or 0.0) for value in values), min(float(value.C2 or 0.0) for value in values)
-
-    def _shared_mass(self) -> Floats:
-        """Lumped mass of the blocks of the shared form."""
-        mesh = self.mesh
-        of_nodes = np.zeros(mesh.node_count)
-        half = 0.5 * mesh.edge_lengths * self.sections.mass
-        of_joints = 0.5 * self._of_joints(lambda joint: joint.mass)
-        pairs = mesh.joint_pairs  # half of a joint's mass on either rod
-        for nodes, share in (*((end, half) for end in mesh.edges.T), *((joint, of_joints) for joint in pairs.T)):
-            of_nodes += np.bincount(nodes, share, minlength=mesh.node_count)
-        mass = np.zeros((int(self.like.max()) + 1, 3))
-        mass[: mesh.node_count] = of_nodes[:, None]
-        if self.twist:
-            first = mesh.node_count + len(self.ghosts)
-            mass[first : first + len(mesh.edges), 0] = mesh.edge_lengths * self.sections.rotary_inertia
-        return mass
 
 
 def _per_item(value: Item | Sequence[Item], count: int, items: str) -> tuple[Item, ...]:

@@ -31,7 +31,8 @@ def with_apron(rods: Sequence[FlatRod], net: Net, lines: tuple[Floats, Floats], 
     clearance : distance of the first joint past an end from that end, at least [m].
     """
     u, v = lines
-    alive = np.isfinite(net.points[np.searchsorted(net.u, u - 1e-12)][:, np.searchsorted(net.v, v - 1e-12), 0])
+    rows, columns = np.searchsorted(net.u, u - 1e-12), np.searchsorted(net.v, v - 1e-12)
+    alive = np.isfinite(net.points[rows[:, None], columns, 0])
     families = [
         _Family(name, stations, offsets, live, [rod for rod in rods if rod.family == name])
         for name, stations, offsets, live in (("u", u, v, alive.T), ("v", v, u, alive))

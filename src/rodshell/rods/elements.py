@@ -220,7 +220,8 @@ class Stretch:
         forces : (e,) axial forces of the geometric stiffness [N]; None: those of the strains.
         multipliers : (e,) N0 [N]; None: unchanged.
         """
-        return replace(self, forces=forces, multipliers=self.multipliers if multipliers is None else multipliers)
+        multipliers = self.multipliers if multipliers is None else multipliers
+        return Stretch(self.blocks, self.rest_lengths, self.stiffness, multipliers, forces)
 
     def strains(self, state: Floats) -> Floats:
         """(e,) axial strains [-] at `state` (N, 3)."""

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
+from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
 
 NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
@@ -156,53 +157,49 @@ class Target(ABC):
     def _closest(self, x: Floats) -> tuple[Floats, Floats]:
         """Closest points (n, 3), and the gradient there, as accurate as they were before the last step."""
         with np.errstate(all="ignore"):  # NaN far away, where the surface has no continuation
-            y, gradient = self.retract(x, 1), np.empty_like(x)
-            left, here, near = np.arange(len(x)), x, y.copy()
+            y, gradient, left = self.retract(x, 1), np.empty_like(x), np.arange(len(x))
             for _ in range(12):
-                step, convex, gradient[left] = self._newton_to_closest(here, near)
-                length = np.sqrt(np.einsum("ij,ij->i", step, step))
-                step *= np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
-                near += step
-                y[left] = near
-                far = ~(convex & (length <= NEARLY * self.size))
-                if not far.any():
+                length = self._newton_to_closest(x, y, gradient, left, longest=0.3 * self.size)
+                left = left[~(length <= NEARLY * self.size)]
+                if len(left) == 0:
                     return y, gradient
-                left, here, near = left[far], here[far], near[far]
             y[left] = self._descend_to_closest(x[left])
             gradient[left] = self.level(y[left])[1]
             return y, gradient
 
-    def _newton_to_closest(self, x: Floats, y: Floats, damping: Floats | None = None) -> tuple[Floats, Bools, Floats]:
-        """One step (n, 3) of Newton from y towards the points closest to x; whether the distance is convex at y, and
-        the gradient there."""
-        step, convex = np.empty_like(x), np.empty(len(x), dtype=bool)
-        at = self.implicit(y)
-        newton_to_closest(x, y, *at, np.zeros(len(x)) if damping is None else damping, step, convex)
-        return step, convex, at.gradient
+    def _newton_to_closest(
+        self, x: Floats, y: Floats, gradient: Floats, rows: Ints, damping: Floats | None = None, longest: float = np.inf
+    ) -> Floats:
+        """One step of Newton from the points y[rows] towards those closest to x[rows]: see `newton_to_closest`."""
+        length = np.empty(len(rows))
+        damping = np.zeros(len(rows)) if damping is None else damping
+        newton_to_closest(x, y, rows, *self.implicit(y.take(rows, axis=0)), damping, longest, gradient, length)
+        return length
 
     def _descend_to_closest(self, x: Floats) -> Floats:
         """Closest points by damped steps that only decrease the distance: for points beyond a centre of curvature."""
-        y = self.retract(x, 20)
+        y, gradient, every = self.retract(x, 20), np.empty_like(x), np.arange(len(x))
         damping = np.ones(len(x))
         for _ in range(60):
-            step, convex, _ = self._newton_to_closest(x, y, damping)
-            trial = self.retract(y + step)
-            nearer = convex & (np.linalg.norm(x - trial, axis=1) < np.linalg.norm(x - y, axis=1))
+            trial = y.copy()
+            length = self._newton_to_closest(x, trial, gradient, every, damping)
+            trial = self.retract(trial)
+            nearer = np.isfinite(length) & (np.linalg.norm(x - trial, axis=1) < np.linalg.norm(x - y, axis=1))
             y[nearer] = trial[nearer]
             damping = np.where(nearer, 0.1 * damping, 4.0 * damping + 0.1)
             if np.all(~nearer & (damping > 1e3)):
                 break
         for _ in range(2):  # a comparison of distances finds a minimum only to half the digits
-            step, convex, _ = self._newton_to_closest(x, y)
-            near = convex & (np.linalg.norm(step, axis=1) < 1e-3 * self.size)
-            y[near] += step[near]
+            trial = y.copy()
+            near = self._newton_to_closest(x, trial, gradient, every) < 1e-3 * self.size
+            y[near] = trial[near]
         return y
 
     def distance(self, x: Floats) -> Floats:
         """Signed distance (n,) [m] of the points `x` (n, 3) [m] to the continued surface, positive outside."""
         y, gradient = self._closest(x)
         away = x - y
-        return np.asarray(np.copysign(np.linalg.norm(away, axis=1), np.einsum("ij,ij->i", away, gradient)))
+        return np.copysign(np.sqrt(dot(away, away)), dot(away, gradient))
 
     def gap(self, x: Floats) -> Gap:
         """Signed distance of the points `x` (n, 3) [m] to the continued surface, with gradient and Hessian."""
@@ -286,7 +283,7 @@ def offset_shape(shape: Floats, distance: Floats) -> Floats:
 
 
 @njit(error_model="numpy")
-def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  # type: ignore[no-untyped-def]
+def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, slope, length):  # type: ignore[no-untyped-def]
     """One step of Newton towards the closest points: y + t F'(y) = x, F(y) = 0.
 
     Across the tangent plane the step leads to F = 0; within it, it solves B step = x - y, B = (1 + damping) + t F''.
@@ -294,18 +291,21 @@ def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  #
 
     Parameters
     ----------
-    x, y : (n, 3) points, and estimates of the points closest to them [m].
-    value, gradient, hessian : F at y, see `Implicit`.
-    damping : (n,) 0 for Newton's step, larger for shorter steps.
-    step : (n, 3) output, the steps [m].
-    convex : (n,) output, whether the distance is convex at y.
+    x, y : (n, 3) points, and estimates of the points closest to them, which are moved [m].
+    rows : (m,) of the points that are moved.
+    value, gradient, hessian : (m,), (m, 3), (m, 3, 3) F there, see `Implicit`.
+    damping : (m,) 0 for Newton's step, larger for shorter steps.
+    longest : longer steps are shortened [m].
+    slope : (n, 3) output in these rows, F' before the step.
+    length : (m,) output, of Newton's step [m]; infinite where the distance is not convex.
     """
-    for m in range(len(x)):
-        gx, gy, gz = gradient[m]
-        steep = np.sqrt(gx * gx + gy * gy + gz * gz)
-        nx, ny, nz = gx / steep, gy / steep, gz / steep
-        dx, dy, dz = x[m, 0] - y[m, 0], x[m, 1] - y[m, 1], x[m, 2] - y[m, 2]
-        t = (dx * nx + dy * ny + dz * nz) / steep
+    for m in range(len(rows)):
+        row, gx, gy, gz = rows[m], gradient[m, 0], gradient[m, 1], gradient[m, 2]
+        slope[row, 0], slope[row, 1], slope[row, 2] = gx, gy, gz
+        scale = 1.0 / np.sqrt(gx * gx + gy * gy + gz * gz)
+        nx, ny, nz = scale * gx, scale * gy, scale * gz
+        dx, dy, dz = x[row, 0] - y[row, 0], x[row, 1] - y[row, 1], x[row, 2] - y[row, 2]
+        t = scale * (dx * nx + dy * ny + dz * nz)
         # two tangents [Duff et al. 2017, Building an orthonormal basis, revisited]
         sign = 1.0 if nz >= 0.0 else -1.0
         a = -1.0 / (sign + nz)
@@ -319,17 +319,19 @@ def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  #
         pp = stiff + t * (px * hpx + py * hpy + pz * hpz)
         pq = t * (px * hqx + py * hqy + pz * hqz)
         qq = stiff + t * (qx * hqx + qy * hqy + qz * hqz)
-        out = -value[m] / steep
+        out = -scale * value[m]
         right_p = px * dx + py * dy + pz * dz - out * t * (nx * hpx + ny * hpy + nz * hpz)
         right_q = qx * dx + qy * dy + qz * dz - out * t * (nx * hqx + ny * hqy + nz * hqz)
         det = pp * qq - pq * pq
-        convex[m] = det > 0.0 and pp + qq > 0.0
         along_p, along_q = (qq * right_p - pq * right_q) / det, (pp * right_q - pq * right_p) / det
         if det == 0.0:
             along_p = along_q = 0.0
-        step[m, 0] = out * nx + along_p * px + along_q * qx
-        step[m, 1] = out * ny + along_p * py + along_q * qy
-        step[m, 2] = out * nz + along_p * pz + along_q * qz
+        size = np.sqrt(out * out + along_p * along_p + along_q * along_q)
+        length[m] = size if det > 0.0 and pp + qq > 0.0 else np.inf
+        shortened = longest / size if size > longest else 1.0
+        y[row, 0] += shortened * (out * nx + along_p * px + along_q * qx)
+        y[row, 1] += shortened * (out * ny + along_p * py + along_q * qy)
+        y[row, 2] += shortened * (out * nz + along_p * pz + along_q * qz)
 
 
 @njit(error_model="numpy")
@@ -370,12 +372,12 @@ def shape_operators(gradient, hessian, normal, shape):  # type: ignore[no-untype
     """
     for m in range(len(gradient)):
         gx, gy, gz = gradient[m]
-        steep = np.sqrt(gx * gx + gy * gy + gz * gz)
-        n, h = normal[m], hessian[m]
-        n[0], n[1], n[2] = gx / steep, gy / steep, gz / steep
+        scale = 1.0 / np.sqrt(gx * gx + gy * gy + gz * gz)
+        n, h = (scale * gx, scale * gy, scale * gz), hessian[m]
+        normal[m, 0], normal[m, 1], normal[m, 2] = n
         hx, hy, hz = _times(h, n[0], n[1], n[2])
         twice = n[0] * hx + n[1] * hy + n[2] * hz
         hn = hx - 0.5 * twice * n[0], hy - 0.5 * twice * n[1], hz - 0.5 * twice * n[2]
         for i in range(3):
             for j in range(3):
-                shape[m, i, j] = (h[i, j] - hn[i] * n[j] - n[i] * hn[j]) / steep
+                shape[m, i, j] = scale * (h[i, j] - hn[i] * n[j] - n[i] * hn[j])
