@@ -7,9 +7,10 @@ not checked, and then the result is not good.
 from collections.abc import Iterable, Iterator, Mapping
 
 from rodshell.results.records import Agreement, Ends, PopUp
-from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
+from rodshell.results.results import Clearance, Deployment, Level, Results, SelfWeight, Verdict, WorstBent
 from rodshell.results.wording import (
     millimetres,
+    part_of_weight,
     percent,
     place,
     rounded,
@@ -44,6 +45,10 @@ def verdict(results: Results) -> Verdict:
     An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
     enough for their bends. Without one that can be used, or far off the target, the result is unbuildable.
 
+    The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
+    under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
+    then the warnings.
+
     Parameters
     ----------
     results : with checks; a figure that is missing counts as not checked.
@@ -67,11 +72,14 @@ def verdict(results: Results) -> Verdict:
     best = _best(results, usable)
     off = 0.0 if best is None else best[1].max_relative or 0.0
     far = [_off_words(results, *best)] if best is not None and off > OFF else []
-    open_points = [*_open_points(results, usable), *results.warnings]
+    there = [ends for ends in shells if _status(shells[ends]) == CONVERGED and shells[ends].stable is not False]
+    weight, stands = _weight(results, usable or there)
+    lead = weight if there and not stands else []
+    gravest = [*lead, *far, *grave] if off > FAR_OFF else [*lead, *grave, *far]
+    to_check = [*gravest, *weight, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings]
     if not usable or deployment or off > FAR_OFF:
-        gravest = [*far, *grave] if off > FAR_OFF else [*grave, *far]
-        return _verdict("unbuildable", [*gravest, *open_points])
-    if to_check := [*grave, *far, *open_points]:
+        return _verdict("unbuildable", to_check)
+    if to_check:
         return _verdict("check", to_check)
     return _verdict("good", _merits(results, usable))
 
@@ -271,22 +279,45 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
         yield f"the job is not complete: {status}"
     if any(shells[ends].stable is None for ends in usable):
         yield "whether the shell is stable was not checked"
-    yield from _weight(results, usable or [*results.self_weight])
-    for name, by_ends in results.loads.items():
-        for ends in usable:
-            if ends not in by_ends:
-                yield f"{name} with {ends} ends was not checked"
-            elif by_ends[ends].imperfect_factor is not None and (by_ends[ends].imperfect_factor or 0.0) < 1:
-                yield (
-                    f"with {ends} ends and imperfections the shell falls under {name} at "
-                    f"{rounded_down(by_ends[ends].imperfect_factor or 0.0)} times these loads"
-                )
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
     yield from _erection(results)
     yield from _rods(results, usable)
     if results.target and not set(usable) <= set(results.agreement):
         yield "the gap to the target was not checked"
+
+
+def _loads(results: Results, ends: list[Ends]) -> Iterator[str]:
+    """How far shells are known under loads where they could not be followed, and where imperfect ones fall.
+
+    Parameters
+    ----------
+    ends : whose shells are meant.
+    """
+    for name, by_ends in results.loads.items():
+        for end in ends:
+            if end not in by_ends:
+                yield f"{name} with {end} ends was not checked"
+                continue
+            found = by_ends[end]
+            limit, imperfect = found.limit_factor or 0.0, found.imperfect_factor
+            if found.limit_kind == "not followed" and limit < 1:
+                yield (
+                    f"whether the shell stands under {name} with {end} ends is not known: it could be followed only up "
+                    f"to {rounded_down(limit)} times these loads"
+                )
+            elif found.limit_kind == "not followed":
+                yield (
+                    f"under {name} with {end} ends the shell could not be followed beyond {rounded_down(limit)} times "
+                    "the loads, and nothing is known above"
+                )
+            imperfectly = f"under {name} with {end} ends and imperfections"
+            if found.imperfect_kind == "not followed" and imperfect is None:
+                yield f"{imperfectly} no equilibrium was found, and nothing is known of it"
+            elif found.imperfect_kind == "not followed":
+                yield f"{imperfectly} nothing is known above {rounded_down(imperfect or 0.0)} times the loads"
+            elif imperfect is not None and imperfect < 1:
+                yield f"{imperfectly} the shell falls at {rounded_down(imperfect)} times these loads"
 
 
 def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
@@ -312,19 +343,97 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
         )
 
 
-def _weight(results: Results, usable: list[Ends]) -> Iterator[str]:
-    """Shells that cannot stand; what is not known of them is among a result's warnings."""
-    borne = {ends: found for ends, found in results.self_weight.items() if ends in usable}
-    if set(borne) != set(usable):
-        yield "whether it carries its own weight was not checked"
-    factors = {ends: found.load_factor for ends, found in borne.items() if found.limit != "not followed"}
-    weak = {ends: factor for ends, factor in factors.items() if factor is not None and factor < 1}
-    if weak:
-        each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
-        if any(shell.bracing for supported in results.loads.values() for shell in supported.values()):
-            yield f"without its bracing it carries only {each}: support it until its bracing is in place"
-        else:
-            yield f"it carries only {each}: it does not stand unless it is supported, braced or made of stiffer rods"
+def _weight(results: Results, ends: list[Ends]) -> tuple[list[str], bool]:
+    """What is said of shells that do not carry their own weight, or are not known to; and whether one of them does.
+
+    Of shells with bracing the loads say whether they stand.
+
+    Parameters
+    ----------
+    ends : whose shells are meant.
+    """
+    found = {end: results.self_weight[end] for end in ends if end in results.self_weight}
+    light = {end: part for end, weighed in found.items() if (part := weighed.load_factor) is not None and part < 1}
+    lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
+    if any(shell.bracing for supported in results.loads.values() for shell in supported.values()):
+        carries = "is known to carry only" if lost & set(light) else "carries only"
+        words = (
+            f"{_alone(light)}without its bracing the shell {carries} {_parts(light, 'its own weight')}: support it until "
+            "its bracing is in place"
+        )
+        return [words] if light else [], True
+    standing = [end for end, weighed in found.items() if end not in light and weighed.limit != "no mass"]
+    falling = {end: part for end, part in light.items() if end not in lost}
+    unknown = {end: part for end, part in light.items() if end in lost}
+    said = []
+    if falling:
+        remedy = "".join(f"; with {end} ends it carries {_times(found[end])} its own weight" for end in standing)
+        said.append(
+            f"{_alone(falling)}the shell does not stand under its own weight: it carries only {_parts(falling)}"
+            f"{remedy or _if_thicker(results, light)}"
+        )
+    if unknown:
+        said.append(
+            f"{_alone(unknown)}it is not known whether the shell stands under its own weight: it could be followed "
+            f"only up to {_parts(unknown)}"
+        )
+    said += [
+        f"with {end} ends the shell carries {_times(found[end])} its own weight; above, it could not be followed, and "
+        "nothing is known"
+        for end in standing
+        if end in lost
+    ]
+    if any(weighed.limit == "no mass" for weighed in found.values()):
+        said.append(
+            "no mass was given, so that it is not known what share of its own weight the shell carries: give "
+            "rod.section.mass"
+        )
+    if set(found) != set(ends):
+        said.append("whether it carries its own weight was not checked")
+    return said, bool(standing)
+
+
+def _alone(factors: Mapping[Ends, float]) -> str:
+    """The end condition of a sentence that is about one."""
+    return "".join(f"with {ends} ends " for ends in factors) if len(factors) == 1 else ""
+
+
+def _parts(factors: Mapping[Ends, float], of: str = "it") -> str:
+    """Parts of the weight, by end condition if there are several."""
+    several = len(factors) > 1
+    each = [f"{part_of_weight(part)} of {of}{f' with {ends} ends' * several}" for ends, part in factors.items()]
+    return " and ".join(each)
+
+
+def _times(weighed: SelfWeight) -> str:
+    least = "at least " if weighed.limit == "not followed" else ""
+    return f"{least}{shown_factor(weighed.load_factor)} times"
+
+
+def _if_thicker(results: Results, factors: Mapping[Ends, float]) -> str:
+    """How thick rods would have to be, and whether they can be bent to the target.
+
+    By similarity: of the same material, in the same shape, rods k times as thick carry k^2 times as many of their own
+    weights, since their EI grows with k^4 and their weight with k^2, and are strained k times as much.
+
+    Parameters
+    ----------
+    factors : on the weight, below 1, that is carried with these ends.
+    """
+    ends, most = max(factors.items(), key=lambda pair: pair[1])
+    if most <= 0:
+        return ""
+    thicker, bent = most**-0.5, _bent(results, ends)
+    used, strain = thicker * (bent.utilisation or 0.0), thicker * (bent.max_bending_strain or 0.0)
+    rods = f"rods about {rounded(thicker, 2)} times as thick"
+    if used > 1 or strain > THIN:
+        bends = f"use {percent(used)} of {strength_name(results, ends)}" if used > 1 else "be too thick for this curvature"
+        return (
+            f"; {rods} would carry theirs with {ends} ends but {bends}: support it, or take another material; rodshell "
+            "check finds what bracing adds"
+        )
+    share = f" and use {percent(used)} of {strength_name(results, ends)}" if used else ""
+    return f"; {rods} would just carry theirs with {ends} ends{share}"
 
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[str]:
