@@ -6,11 +6,19 @@ not checked, and then the result is not good.
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from rodshell.results.own_weight import light, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
-from rodshell.results.results import Clearance, Deployment, Level, Results, SelfWeight, Verdict, WorstBent
+from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
+from rodshell.results.strength_used import (
+    ENDS,
+    THIN,
+    bent_of,
+    by_design_strength,
+    holds_while_erected,
+    strength_name,
+)
 from rodshell.results.wording import (
     millimetres,
-    part_of_weight,
     percent,
     place,
     rounded,
@@ -21,11 +29,8 @@ from rodshell.results.wording import (
 )
 from rodshell.rods.design_strength import RESERVED
 
-ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
-
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
-THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
 FLAT = "the target is flat, nothing pops up"
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
 LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
@@ -73,7 +78,7 @@ def verdict(results: Results) -> Verdict:
     off = 0.0 if best is None else best[1].max_relative or 0.0
     far = [_off_words(results, *best)] if best is not None and off > OFF else []
     there = [ends for ends in shells if _status(shells[ends]) == CONVERGED and shells[ends].stable is not False]
-    weight, stands = _weight(results, usable or there)
+    weight, stands = weight_findings(results, usable or there)
     lead = weight if there and not stands else []
     gravest = [*lead, *far, *grave] if off > FAR_OFF else [*lead, *grave, *far]
     to_check = [*gravest, *weight, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings]
@@ -98,27 +103,6 @@ def utilisation(results: Results) -> float | None:
     return max((bent.utilisation for bent in shapes if bent.utilisation is not None), default=None)
 
 
-def strength_name(results: Results, shape: str) -> str:
-    """By what the utilisation of a shape is counted: design strengths, if they are known.
-
-    Parameters
-    ----------
-    results : with a strength.
-    shape : "pinned", "clamped", or one of the deployment.
-    """
-    preset = results.bending.strength_of if results.bending else None
-    if preset is None:
-        return "the given strength"
-    if not by_design_strength(results):
-        return f"{preset}'s strength, which is characteristic and short-term"
-    return f"{preset}'s {'permanent design strength' if shape in ENDS else 'design strength for erection'}"
-
-
-def by_design_strength(results: Results) -> bool:
-    """Whether utilisation is counted by design strengths."""
-    return results.strength is not None and results.strength.permanent is not None
-
-
 def facts(results: Results) -> list[str]:
     """What was found, in sentences that judge nothing: gaps, supports, strength."""
     return [*_gaps(results), *_strength(results)]
@@ -132,11 +116,6 @@ def _verdict(level: Level, reasons: Iterable[str]) -> Verdict:
 def _status(shell: PopUp | None) -> str:
     """Of a shell; those of the first versions that kept none had converged."""
     return (shell.status if shell else None) or CONVERGED
-
-
-def _bent(results: Results, shape: str) -> WorstBent:
-    """The worst bending of a shape; one without figures where nothing is known."""
-    return (results.bending.shapes() if results.bending else {}).get(shape) or WorstBent()
 
 
 def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
@@ -175,7 +154,7 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
             how = "snaps through" if found.limit_kind == "limit point" else "buckles"
             yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded_down(limit)} times these loads"
         place = found.governs
-        said = place is not None and place.by == "permanent" and (_bent(results, ends).utilisation or 0.0) > 1
+        said = place is not None and place.by == "permanent" and (bent_of(results, ends).utilisation or 0.0) > 1
         if used is not None and used > 1 and not said:
             where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
             at = "" if found.at_factor == 1 else f" already at {rounded(found.at_factor or 0.0)} times these loads"
@@ -204,10 +183,10 @@ def _contact_faults(results: Results, shape: str) -> Iterator[str]:
 
 def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
     """Stress above the strength, strain beyond thin rods."""
-    bent = _bent(results, shape)
+    bent = bent_of(results, shape)
     used, strain = bent.utilisation, bent.max_bending_strain
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
-    if used is not None and used > 1 and not (shape == "deployment" and _holds_while_erected(results, used)):
+    if used is not None and used > 1 and not (shape == "deployment" and holds_while_erected(results, used)):
         share = f"{max(101, round(100 * used))} %"  # never 100 % of what is too much
         if by_design_strength(results):
             yield f"{_shape(shape, bent)} the rods use {share} of {strength_name(results, shape)}{where}"
@@ -221,23 +200,17 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
         )
 
 
-def _holds_while_erected(results: Results, used: float) -> bool:
-    """Whether a preset's rods that use more than their design strength for erection stay below what breaks them."""
-    characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None
-    strength, of_preset = (
-        (results.bending.erection_strength, results.bending.strength_of) if results.bending else (0, "")
-    )
-    return bool(of_preset and strength and characteristic and used * strength <= characteristic)
+def _erection(results: Results, *, thinner: bool) -> Iterator[str]:
+    """Too little safety while the shell is erected as computed; another way may need less.
 
-
-def _erection(results: Results) -> Iterator[str]:
-    """Too little safety while the shell is erected as computed; another way may need less."""
-    bent = _bent(results, "deployment")
+    thinner : whether thinner rods may be advised.
+    """
+    bent = bent_of(results, "deployment")
     used = bent.utilisation
-    if used is not None and used > 1 and _holds_while_erected(results, used):
+    if used is not None and used > 1 and holds_while_erected(results, used):
         yield (
             f"{_shape('deployment', bent)}, the ends moved evenly, the rods use {max(101, round(100 * used))} % of "
-            f"{strength_name(results, 'deployment')}: erect it in another way, or use thinner rods"
+            f"{strength_name(results, 'deployment')}: erect it in another way{', or use thinner rods' * thinner}"
         )
 
 
@@ -281,7 +254,7 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
         yield "whether the shell is stable was not checked"
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
-    yield from _erection(results)
+    yield from _erection(results, thinner=not light(results, usable))
     yield from _rods(results, usable)
     if results.target and not set(usable) <= set(results.agreement):
         yield "the gap to the target was not checked"
@@ -324,7 +297,7 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
     """Whether rods hold and pass each other."""
     met = results.contact
     if any(
-        (met.of(ends) if met else None) is None or _bent(results, ends).max_bending_strain is None for ends in usable
+        (met.of(ends) if met else None) is None or bent_of(results, ends).max_bending_strain is None for ends in usable
     ):
         yield (
             "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
@@ -335,105 +308,12 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
             yield "no strength was given, so it is not known whether the rods hold (checks.strength)"
         return
     name = results.bending.strength_of
-    used = max((_bent(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
+    used = max((bent_of(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
     if name and used > RESERVED and not by_design_strength(results):
         yield (
             f"the rods permanently use {percent(used)} of {strength_name(results, ENDS[0])}: "
             "reduce it for duration and moisture and give the reduced value as checks.strength, or use thinner rods"
         )
-
-
-def _weight(results: Results, ends: list[Ends]) -> tuple[list[str], bool]:
-    """What is said of shells that do not carry their own weight, or are not known to; and whether one of them does.
-
-    Of shells with bracing the loads say whether they stand.
-
-    Parameters
-    ----------
-    ends : whose shells are meant.
-    """
-    found = {end: results.self_weight[end] for end in ends if end in results.self_weight}
-    light = {end: part for end, weighed in found.items() if (part := weighed.load_factor) is not None and part < 1}
-    lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
-    if any(shell.bracing for supported in results.loads.values() for shell in supported.values()):
-        carries = "is known to carry only" if lost & set(light) else "carries only"
-        words = (
-            f"{_alone(light)}without its bracing the shell {carries} {_parts(light, 'its own weight')}: support it until "
-            "its bracing is in place"
-        )
-        return [words] if light else [], True
-    standing = [end for end, weighed in found.items() if end not in light and weighed.limit != "no mass"]
-    falling = {end: part for end, part in light.items() if end not in lost}
-    unknown = {end: part for end, part in light.items() if end in lost}
-    said = []
-    if falling:
-        remedy = "".join(f"; with {end} ends it carries {_times(found[end])} its own weight" for end in standing)
-        said.append(
-            f"{_alone(falling)}the shell does not stand under its own weight: it carries only {_parts(falling)}"
-            f"{remedy or _if_thicker(results, light)}"
-        )
-    if unknown:
-        said.append(
-            f"{_alone(unknown)}it is not known whether the shell stands under its own weight: it could be followed "
-            f"only up to {_parts(unknown)}"
-        )
-    said += [
-        f"with {end} ends the shell carries {_times(found[end])} its own weight; above, it could not be followed, and "
-        "nothing is known"
-        for end in standing
-        if end in lost
-    ]
-    if any(weighed.limit == "no mass" for weighed in found.values()):
-        said.append(
-            "no mass was given, so that it is not known what share of its own weight the shell carries: give "
-            "rod.section.mass"
-        )
-    if set(found) != set(ends):
-        said.append("whether it carries its own weight was not checked")
-    return said, bool(standing)
-
-
-def _alone(factors: Mapping[Ends, float]) -> str:
-    """The end condition of a sentence that is about one."""
-    return "".join(f"with {ends} ends " for ends in factors) if len(factors) == 1 else ""
-
-
-def _parts(factors: Mapping[Ends, float], of: str = "it") -> str:
-    """Parts of the weight, by end condition if there are several."""
-    several = len(factors) > 1
-    each = [f"{part_of_weight(part)} of {of}{f' with {ends} ends' * several}" for ends, part in factors.items()]
-    return " and ".join(each)
-
-
-def _times(weighed: SelfWeight) -> str:
-    least = "at least " if weighed.limit == "not followed" else ""
-    return f"{least}{shown_factor(weighed.load_factor)} times"
-
-
-def _if_thicker(results: Results, factors: Mapping[Ends, float]) -> str:
-    """How thick rods would have to be, and whether they can be bent to the target.
-
-    By similarity: of the same material, in the same shape, rods k times as thick carry k^2 times as many of their own
-    weights, since their EI grows with k^4 and their weight with k^2, and are strained k times as much.
-
-    Parameters
-    ----------
-    factors : on the weight, below 1, that is carried with these ends.
-    """
-    ends, most = max(factors.items(), key=lambda pair: pair[1])
-    if most <= 0:
-        return ""
-    thicker, bent = most**-0.5, _bent(results, ends)
-    used, strain = thicker * (bent.utilisation or 0.0), thicker * (bent.max_bending_strain or 0.0)
-    rods = f"rods about {rounded(thicker, 2)} times as thick"
-    if used > 1 or strain > THIN:
-        bends = f"use {percent(used)} of {strength_name(results, ends)}" if used > 1 else "be too thick for this curvature"
-        return (
-            f"; {rods} would carry theirs with {ends} ends but {bends}: support it, or take another material; rodshell "
-            "check finds what bracing adds"
-        )
-    share = f" and use {percent(used)} of {strength_name(results, ends)}" if used else ""
-    return f"; {rods} would just carry theirs with {ends} ends{share}"
 
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[str]:

@@ -344,7 +344,7 @@ class ArcLength:
         """With its modes and the nearest singular stiffness, as the stiffness of the lowest modes changes here."""
         values, modes = self._lowest_modes(tangent, start)
         step = min(PROBE * self.length / max(self.reach(here.motion), TINY), PROBE_FACTOR / abs(here.rate))
-        # by the difference of both sides: that of one has a stiffness of its own, EA times the square of the step, which
+        # the difference of both sides: that of one has a stiffness of its own, EA times the square of the step, which
         # outweighs the modes of thin rods
         change = (self._values_near(here, step) - self._values_near(here, -step)) / (2 * step)
         between = _products(modes, np.array([tangent.pattern.product(change, mode) for mode in modes]))
