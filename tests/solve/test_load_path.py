@@ -130,6 +130,17 @@ def test_a_dome_is_not_left_by_a_jump_to_its_inverted_shape() -> None:
     assert path.place == 0
 
 
+@pytest.mark.parametrize("thinner", [1, 1e2, 1e4])
+def test_thin_rods_hide_no_loss_of_stability(thinner: float) -> None:
+    """Their EA, times the square of a step, outweighs the modes that give way, and must not be taken for a change of
+    stiffness along the path: steps would be so short that all factorisations are used up before the limit point."""
+    frame = known.lees_frame(stretch=thinner * 6 * 720.0)
+    path = load_path(frame.unloaded, frame.load, most=3.0)
+    assert path.limit == "limit point"
+    assert path.factor == pytest.approx(frame.exact["upper"], rel=5e-3)  # 40 edges a rod: 1e-3; and CLOSE
+    assert path.factorizations <= 40  # 25 to 34; 120 where the path is lost
+
+
 def test_a_ring_leaves_its_circle_under_pressure() -> None:
     ring = known.ring_under_pressure(48)
     path = load_path(ring.unloaded, ring.load, most=3.0)

@@ -13,7 +13,7 @@ from rodshell.checks.contact import Contact, contact, contact_of, worst_contact
 from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import SelfWeightCheck, self_weight, unknown_weights, weakest
+from rodshell.checks.self_weight import SelfWeightCheck, self_weight, weakest
 from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import Ends
@@ -116,7 +116,7 @@ class Checks:
         turned: tuple[str, ...] = ()
         if self.clamped_from_flat is False:
             turned = ("turned into their clamps after deployment, the ends lead to another than the clamped shape",)
-        return (*late, *way, *turned, *unknown_weights(self.self_weight), *self.tight)
+        return (*late, *way, *turned, *self.tight)
 
     @property
     def stages_below_final(self) -> tuple[tuple[float, Bending], ...]:

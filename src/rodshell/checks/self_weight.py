@@ -6,14 +6,13 @@ not enough: the unloaded shell is bent, and sinks before it buckles. Loads that 
 are in `rodshell.loads`.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from rodshell.formfinding.methods import STANDARD_GRAVITY
-from rodshell.formfinding.popup import Ends
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load_path import load_path
@@ -83,26 +82,6 @@ def self_weight(
     return SelfWeightCheck(end.factor, deflection, limit, end.factorizations)
 
 
-def unknown_weights(found: Mapping[Ends, SelfWeightCheck]) -> tuple[str, ...]:
-    """Sentences on what is not known.
-
-    Parameters
-    ----------
-    found : by end condition.
-    """
-    if any(weight.limit == "no mass" for weight in found.values()):
-        return (
-            "no mass was given, so that it is not known what share of its own weight the shell carries: "
-            "give rod.section.mass",
-        )
-    return tuple(
-        f"with {ends} ends the shell carries at least {_in_weights(weight.load_factor or 0.0)} its own weight; above, "
-        "its path could not be followed, and nothing is known"
-        for ends, weight in found.items()
-        if weight.limit == "not followed"
-    )
-
-
 def weakest(parts: Sequence[SelfWeightCheck]) -> SelfWeightCheck:
     """Of patches that stand by themselves: the smallest factor, and the largest deflection if all carry their weight.
 
@@ -114,7 +93,3 @@ def weakest(parts: Sequence[SelfWeightCheck]) -> SelfWeightCheck:
     sunk = [part.deflection for part in parts]
     deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)
     return SelfWeightCheck(least.load_factor, deflection, least.limit, sum(part.factorizations for part in parts))
-
-
-def _in_weights(factor: float) -> str:
-    return f"{100 * factor:.2g} % of" if factor < 1 else f"{factor:.3g} times"

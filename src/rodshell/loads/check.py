@@ -156,25 +156,7 @@ class LoadChecks:
         if self.refused:
             return (f"the loads were not checked: {self.refused}",)
         late = (f"{self.stopped}; not checked: {', '.join(self.missing)}",) if self.stopped else ()
-        lost = tuple(
-            f"under {name} with {ends} ends the path of the loaded shell could not be followed beyond "
-            f"{shell.limit_factor:.3g} times the loads, and nothing is known above"
-            for name, by_ends in self.shells.items()
-            for ends, shell in by_ends.items()
-            if shell.limit_kind == "lost"
-        )
-        imperfect = tuple(
-            f"under {name} with {ends} ends and imperfections "
-            + (
-                "no equilibrium was found, and nothing is known of it"
-                if shell.imperfect_factor is None
-                else f"nothing is known above {shell.imperfect_factor:.3g} times the loads"
-            )
-            for name, by_ends in self.shells.items()
-            for ends, shell in by_ends.items()
-            if shell.imperfect_kind == "lost"
-        )
-        return (*late, *lost, *imperfect, *self._unjudged)
+        return (*late, *self._unjudged)
 
     @property
     def _unjudged(self) -> tuple[str, ...]:

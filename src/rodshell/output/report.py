@@ -24,7 +24,8 @@ from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import SHELLS, shown_case
 from rodshell.results.records import Agreement, Drape, Ends, Gate, PopUp, Record
 from rodshell.results.results import Clearance, Reactions, Stock
-from rodshell.results.verdict import ENDS, by_design_strength, facts, unknown_below
+from rodshell.results.strength_used import ENDS, by_design_strength
+from rodshell.results.verdict import facts, unknown_below
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
 
 IN_PAGE = ("supports", "elevations", "erection")

@@ -20,7 +20,7 @@ from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.loaded import LoadedShell
 from rodshell.results.records import Ends, Meeting, printable
-from rodshell.results.verdict import ENDS
+from rodshell.results.strength_used import ENDS
 from rodshell.results.wording import FINEST, Rounding, rounding_of
 
 Rows = list[list[str]]

@@ -93,7 +93,7 @@ def checked_results(
     withstood = _Withstood.of(limits, strength)
     bending = _bending(checks, mesh, withstood)
     found = results.changed(
-        warnings=(*results.warnings, *torsion, *checks.warnings, *fabricated.warnings),
+        warnings=(*checks.warnings, *torsion, *results.warnings, *fabricated.warnings),
         rods=_rods(results.rods, mesh, checks, fabricated, withstood),
         bending=bending.changed(shear_strength=shear_strength, strength_of=None if withstood.given else strength_of),
         strength=_design_strength(limits, bending),

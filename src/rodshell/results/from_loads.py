@@ -36,7 +36,7 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
             }
             for name, by_ends in checks.shells.items()
         },
-        warnings=(*results.warnings, *checks.warnings),
+        warnings=(*checks.warnings, *results.warnings),
     )
     late = f"the loads were not checked: {checks.refused}" if checks.refused else checks.stopped
     return found.changed(status=late) if late and found.status == "converged" else found

@@ -6,7 +6,8 @@ from math import degrees
 from rodshell.results.loaded import DesignStrength
 from rodshell.results.records import Bent, RodType
 from rodshell.results.results import Bending, Results
-from rodshell.results.verdict import strength_name, unknown_below, verdict_of
+from rodshell.results.strength_used import strength_name
+from rodshell.results.verdict import unknown_below, verdict_of
 from rodshell.results.wording import (
     NAMES,
     case_rows,

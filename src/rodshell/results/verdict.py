@@ -6,8 +6,17 @@ not checked, and then the result is not good.
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from rodshell.results.own_weight import light, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
+from rodshell.results.strength_used import (
+    ENDS,
+    THIN,
+    bent_of,
+    by_design_strength,
+    holds_while_erected,
+    strength_name,
+)
 from rodshell.results.wording import (
     millimetres,
     percent,
@@ -20,11 +29,8 @@ from rodshell.results.wording import (
 )
 from rodshell.rods.design_strength import RESERVED
 
-ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
-
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
-THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
 FLAT = "the target is flat, nothing pops up"
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
 LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
@@ -43,6 +49,10 @@ def verdict(results: Results) -> Verdict:
 
     An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
     enough for their bends. Without one that can be used, or far off the target, the result is unbuildable.
+
+    The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
+    under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
+    then the warnings.
 
     Parameters
     ----------
@@ -67,11 +77,14 @@ def verdict(results: Results) -> Verdict:
     best = _best(results, usable)
     off = 0.0 if best is None else best[1].max_relative or 0.0
     far = [_off_words(results, *best)] if best is not None and off > OFF else []
-    open_points = [*_open_points(results, usable), *results.warnings]
+    there = [ends for ends in shells if _status(shells[ends]) == CONVERGED and shells[ends].stable is not False]
+    weight, stands = weight_findings(results, usable or there)
+    lead = weight if there and not stands else []
+    gravest = [*lead, *far, *grave] if off > FAR_OFF else [*lead, *grave, *far]
+    to_check = [*gravest, *weight, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings]
     if not usable or deployment or off > FAR_OFF:
-        gravest = [*far, *grave] if off > FAR_OFF else [*grave, *far]
-        return _verdict("unbuildable", [*gravest, *open_points])
-    if to_check := [*grave, *far, *open_points]:
+        return _verdict("unbuildable", to_check)
+    if to_check:
         return _verdict("check", to_check)
     return _verdict("good", _merits(results, usable))
 
@@ -90,27 +103,6 @@ def utilisation(results: Results) -> float | None:
     return max((bent.utilisation for bent in shapes if bent.utilisation is not None), default=None)
 
 
-def strength_name(results: Results, shape: str) -> str:
-    """By what the utilisation of a shape is counted: design strengths, if they are known.
-
-    Parameters
-    ----------
-    results : with a strength.
-    shape : "pinned", "clamped", or one of the deployment.
-    """
-    preset = results.bending.strength_of if results.bending else None
-    if preset is None:
-        return "the given strength"
-    if not by_design_strength(results):
-        return f"{preset}'s strength, which is characteristic and short-term"
-    return f"{preset}'s {'permanent design strength' if shape in ENDS else 'design strength for erection'}"
-
-
-def by_design_strength(results: Results) -> bool:
-    """Whether utilisation is counted by design strengths."""
-    return results.strength is not None and results.strength.permanent is not None
-
-
 def facts(results: Results) -> list[str]:
     """What was found, in sentences that judge nothing: gaps, supports, strength."""
     return [*_gaps(results), *_strength(results)]
@@ -124,11 +116,6 @@ def _verdict(level: Level, reasons: Iterable[str]) -> Verdict:
 def _status(shell: PopUp | None) -> str:
     """Of a shell; those of the first versions that kept none had converged."""
     return (shell.status if shell else None) or CONVERGED
-
-
-def _bent(results: Results, shape: str) -> WorstBent:
-    """The worst bending of a shape; one without figures where nothing is known."""
-    return (results.bending.shapes() if results.bending else {}).get(shape) or WorstBent()
 
 
 def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
@@ -167,7 +154,7 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
             how = "snaps through" if found.limit_kind == "limit point" else "buckles"
             yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded_down(limit)} times these loads"
         place = found.governs
-        said = place is not None and place.by == "permanent" and (_bent(results, ends).utilisation or 0.0) > 1
+        said = place is not None and place.by == "permanent" and (bent_of(results, ends).utilisation or 0.0) > 1
         if used is not None and used > 1 and not said:
             where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
             at = "" if found.at_factor == 1 else f" already at {rounded(found.at_factor or 0.0)} times these loads"
@@ -196,10 +183,10 @@ def _contact_faults(results: Results, shape: str) -> Iterator[str]:
 
 def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
     """Stress above the strength, strain beyond thin rods."""
-    bent = _bent(results, shape)
+    bent = bent_of(results, shape)
     used, strain = bent.utilisation, bent.max_bending_strain
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
-    if used is not None and used > 1 and not (shape == "deployment" and _holds_while_erected(results, used)):
+    if used is not None and used > 1 and not (shape == "deployment" and holds_while_erected(results, used)):
         share = f"{max(101, round(100 * used))} %"  # never 100 % of what is too much
         if by_design_strength(results):
             yield f"{_shape(shape, bent)} the rods use {share} of {strength_name(results, shape)}{where}"
@@ -213,23 +200,17 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
         )
 
 
-def _holds_while_erected(results: Results, used: float) -> bool:
-    """Whether a preset's rods that use more than their design strength for erection stay below what breaks them."""
-    characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None
-    strength, of_preset = (
-        (results.bending.erection_strength, results.bending.strength_of) if results.bending else (0, "")
-    )
-    return bool(of_preset and strength and characteristic and used * strength <= characteristic)
+def _erection(results: Results, *, thinner: bool) -> Iterator[str]:
+    """Too little safety while the shell is erected as computed; another way may need less.
 
-
-def _erection(results: Results) -> Iterator[str]:
-    """Too little safety while the shell is erected as computed; another way may need less."""
-    bent = _bent(results, "deployment")
+    thinner : whether thinner rods may be advised.
+    """
+    bent = bent_of(results, "deployment")
     used = bent.utilisation
-    if used is not None and used > 1 and _holds_while_erected(results, used):
+    if used is not None and used > 1 and holds_while_erected(results, used):
         yield (
             f"{_shape('deployment', bent)}, the ends moved evenly, the rods use {max(101, round(100 * used))} % of "
-            f"{strength_name(results, 'deployment')}: erect it in another way, or use thinner rods"
+            f"{strength_name(results, 'deployment')}: erect it in another way{', or use thinner rods' * thinner}"
         )
 
 
@@ -271,29 +252,52 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
         yield f"the job is not complete: {status}"
     if any(shells[ends].stable is None for ends in usable):
         yield "whether the shell is stable was not checked"
-    yield from _weight(results, usable or [*results.self_weight])
-    for name, by_ends in results.loads.items():
-        for ends in usable:
-            if ends not in by_ends:
-                yield f"{name} with {ends} ends was not checked"
-            elif by_ends[ends].imperfect_factor is not None and (by_ends[ends].imperfect_factor or 0.0) < 1:
-                yield (
-                    f"with {ends} ends and imperfections the shell falls under {name} at "
-                    f"{rounded_down(by_ends[ends].imperfect_factor or 0.0)} times these loads"
-                )
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
-    yield from _erection(results)
+    yield from _erection(results, thinner=not light(results, usable))
     yield from _rods(results, usable)
     if results.target and not set(usable) <= set(results.agreement):
         yield "the gap to the target was not checked"
+
+
+def _loads(results: Results, ends: list[Ends]) -> Iterator[str]:
+    """How far shells are known under loads where they could not be followed, and where imperfect ones fall.
+
+    Parameters
+    ----------
+    ends : whose shells are meant.
+    """
+    for name, by_ends in results.loads.items():
+        for end in ends:
+            if end not in by_ends:
+                yield f"{name} with {end} ends was not checked"
+                continue
+            found = by_ends[end]
+            limit, imperfect = found.limit_factor or 0.0, found.imperfect_factor
+            if found.limit_kind == "not followed" and limit < 1:
+                yield (
+                    f"whether the shell stands under {name} with {end} ends is not known: it could be followed only up "
+                    f"to {rounded_down(limit)} times these loads"
+                )
+            elif found.limit_kind == "not followed":
+                yield (
+                    f"under {name} with {end} ends the shell could not be followed beyond {rounded_down(limit)} times "
+                    "the loads, and nothing is known above"
+                )
+            imperfectly = f"under {name} with {end} ends and imperfections"
+            if found.imperfect_kind == "not followed" and imperfect is None:
+                yield f"{imperfectly} no equilibrium was found, and nothing is known of it"
+            elif found.imperfect_kind == "not followed":
+                yield f"{imperfectly} nothing is known above {rounded_down(imperfect or 0.0)} times the loads"
+            elif imperfect is not None and imperfect < 1:
+                yield f"{imperfectly} the shell falls at {rounded_down(imperfect)} times these loads"
 
 
 def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
     """Whether rods hold and pass each other."""
     met = results.contact
     if any(
-        (met.of(ends) if met else None) is None or _bent(results, ends).max_bending_strain is None for ends in usable
+        (met.of(ends) if met else None) is None or bent_of(results, ends).max_bending_strain is None for ends in usable
     ):
         yield (
             "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
@@ -304,27 +308,12 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
             yield "no strength was given, so it is not known whether the rods hold (checks.strength)"
         return
     name = results.bending.strength_of
-    used = max((_bent(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
+    used = max((bent_of(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
     if name and used > RESERVED and not by_design_strength(results):
         yield (
             f"the rods permanently use {percent(used)} of {strength_name(results, ENDS[0])}: "
             "reduce it for duration and moisture and give the reduced value as checks.strength, or use thinner rods"
         )
-
-
-def _weight(results: Results, usable: list[Ends]) -> Iterator[str]:
-    """Shells that cannot stand; what is not known of them is among a result's warnings."""
-    borne = {ends: found for ends, found in results.self_weight.items() if ends in usable}
-    if set(borne) != set(usable):
-        yield "whether it carries its own weight was not checked"
-    factors = {ends: found.load_factor for ends, found in borne.items() if found.limit != "not followed"}
-    weak = {ends: factor for ends, factor in factors.items() if factor is not None and factor < 1}
-    if weak:
-        each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
-        if any(shell.bracing for supported in results.loads.values() for shell in supported.values()):
-            yield f"without its bracing it carries only {each}: support it until its bracing is in place"
-        else:
-            yield f"it carries only {each}: it does not stand unless it is supported, braced or made of stiffer rods"
 
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[str]:

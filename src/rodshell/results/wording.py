@@ -176,8 +176,13 @@ def share_of_weight(found: SelfWeight) -> str:
         return "more than 100 times"
     if found.limit == "unstable unloaded":
         return "none: unstable unloaded"
-    least = "at least " if found.limit == "not followed" else ""
-    return least + (percent(factor) if factor < 0.995 else f"{rounded_down(factor)} times")
+    share = part_of_weight(factor) if factor < 1 else f"{rounded_down(factor)} times"
+    return f"at least {share}, unknown above" if found.limit == "not followed" else share
+
+
+def part_of_weight(factor: float) -> str:
+    """A load factor below 1 as a percentage, never as 100 %."""
+    return percent(factor) if factor < 0.995 else f"{rounded_down(100 * factor)} %"
 
 
 def whole_percent(share: float) -> str:

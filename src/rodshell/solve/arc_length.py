@@ -344,8 +344,9 @@ class ArcLength:
         """With its modes and the nearest singular stiffness, as the stiffness of the lowest modes changes here."""
         values, modes = self._lowest_modes(tangent, start)
         step = min(PROBE * self.length / max(self.reach(here.motion), TINY), PROBE_FACTOR / abs(here.rate))
-        ahead = self._values_near(here, step)
-        change = (ahead - tangent.values) / step
+        # the difference of both sides: that of one has a stiffness of its own, EA times the square of the step, which
+        # outweighs the modes of thin rods
+        change = (self._values_near(here, step) - self._values_near(here, -step)) / (2 * step)
         between = _products(modes, np.array([tangent.pattern.product(change, mode) for mode in modes]))
         root = 1.0 / np.sqrt(values)
         loss = np.linalg.eigvalsh(-between * root[:, None] * root)  # 1/m: the modes' stiffness vanishes at 1/loss
@@ -356,7 +357,7 @@ class ArcLength:
         )  # fmt: skip
 
     def _values_near(self, here: Point, step: float) -> Floats:
-        """(nnz,) values of the stiffness a step along the tangent from a point, to first order."""
+        """(nnz,) values of the stiffness a step along the tangent from a point, or back, to first order."""
         factor = here.factor + step * here.rate
         elements = self._loaded.load.elements(here.elements, here.state, factor)
         return self._loaded.values(elements, here.state + step * here.motion, here.forces + step * here.change, factor)

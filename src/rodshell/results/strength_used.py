@@ -1,0 +1,54 @@
+"""How much of their strength the rods of a result use, and by which strength that is counted."""
+
+from rodshell.results.records import Ends
+from rodshell.results.results import Results, WorstBent
+
+ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
+THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
+
+
+def bent_of(results: Results, shape: str) -> WorstBent:
+    """The worst bending of a shape; one without figures where nothing is known.
+
+    Parameters
+    ----------
+    results : with or without checks of bending.
+    shape : "pinned", "clamped", or one of the deployment.
+    """
+    return (results.bending.shapes() if results.bending else {}).get(shape) or WorstBent()
+
+
+def strength_name(results: Results, shape: str) -> str:
+    """By what the utilisation of a shape is counted: design strengths, if they are known.
+
+    Parameters
+    ----------
+    results : with a strength.
+    shape : "pinned", "clamped", or one of the deployment.
+    """
+    preset = results.bending.strength_of if results.bending else None
+    if preset is None:
+        return "the given strength"
+    if not by_design_strength(results):
+        return f"{preset}'s strength, which is characteristic and short-term"
+    return f"{preset}'s {'permanent design strength' if shape in ENDS else 'design strength for erection'}"
+
+
+def by_design_strength(results: Results) -> bool:
+    """Whether utilisation is counted by design strengths."""
+    return results.strength is not None and results.strength.permanent is not None
+
+
+def holds_while_erected(results: Results, used: float) -> bool:
+    """Whether a preset's rods that use more than their design strength for erection stay below what breaks them.
+
+    Parameters
+    ----------
+    results : with a strength.
+    used : of the design strength for erection [-].
+    """
+    characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None
+    strength, of_preset = (
+        (results.bending.erection_strength, results.bending.strength_of) if results.bending else (0, "")
+    )
+    return bool(of_preset and strength and characteristic and used * strength <= characteristic)
