@@ -24,6 +24,7 @@ def dispatcher(function: Kernel, options: dict[str, object]) -> Kernel:
     module, _, name = name_of(function).rpartition(".")
     kept = name in KERNELS.get(module, {}) and kernels_are_kept()
     of_its_own: dict[str, object] = {"error_model": "numpy", "fastmath": False, "cache": kept}
+    of_its_own["no_cfunc_wrapper"] = True  # for calls from C, of which there are none
     kernel: Kernel = njit(**of_its_own | options)(function)
     return kernel
 
