@@ -6,6 +6,7 @@ from math import inf
 import numpy as np
 
 import rodshell as rs
+from rodshell.refining.offer import offer
 
 
 def _forms() -> Iterator[object]:
@@ -15,6 +16,14 @@ def _forms() -> Iterator[object]:
     yield form
     yield rs.find_form(target, layout, _rod(), warm_start=form)
     yield rs.find_form(rs.HeightField(formula="0.1 - x**2 - y**2", domain=rs.Rectangle((0.4, 0.3))), layout, _rod())
+
+
+def _commands() -> Iterator[object]:
+    """What `rodshell form` does: the checks of a form, and the offer of a refinement."""
+    small = {"layout.rods": "5x5", "layout.spacing": "80 mm", "layout.edge": "40 mm"}
+    form = rs.Job.load("hemisphere", small).run()
+    yield form.stages
+    yield offer(form.stages)
 
 
 def _joints() -> Iterator[object]:
@@ -74,6 +83,6 @@ def _few() -> rs.GridLayout:
 
 
 JOBS: dict[str, Callable[[], Iterator[object]]] = {
-    "forms": _forms, "joints": _joints, "meshes": _meshes, "gravity": _gravity, "falls": _falls,
+    "forms": _forms, "commands": _commands, "joints": _joints, "meshes": _meshes, "gravity": _gravity, "falls": _falls,
     "single rods": _single_rods,
 }  # fmt: skip

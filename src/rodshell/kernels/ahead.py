@@ -14,7 +14,6 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from pathlib import Path
 from time import monotonic
 from typing import Any
 
@@ -35,19 +34,17 @@ def compile_kernels(progress: Callable[[int, int, float | None], None], *, every
         None while that is not known.
     every : those of some jobs as well, which Numba otherwise compiles at their first call.
     """
-    rows = _rows(every)
-    first = next((row for row in rows if not _is_kept(*row)), None)
-    if first is None:
+    missing = [row for row in _rows(every) if not _is_kept(*row)]
+    if not missing:
         return 0
     begun = monotonic()
-    with _helper(every) as helper:  # which begins while this process still imports the other modules
-        missing = [first, *(row for row in rows if not _is_kept(*row))]
-        work = [EACH + _size(kernel) for kernel, _ in missing]
+    with _helper(every) as helper, _without_collector():
+        work = [_work(kernel) for kernel, _ in missing]
         waiting, made = set(range(len(missing))), 0
         progress(0, len(missing), None)
         for k, (kernel, arguments) in enumerate(missing):
             if k in waiting and not _is_kept(kernel, arguments):
-                kernel.compile(arguments)
+                _compile(kernel, arguments)
                 made += work[k]
             waiting -= {other for other in waiting if other <= k or _is_kept(*missing[other])}
             left = sum(work[other] for other in waiting)
@@ -62,17 +59,35 @@ def compile_kernels(progress: Callable[[int, int, float | None], None], *, every
     return len(missing)
 
 
-def _rows(every: bool) -> Iterator[tuple[Any, tuple[Any, ...]]]:
-    """Each kernel of the table, with the types of its arguments: module by module, the largest sources at both ends, so
-    that little is compiled twice where two processes meet."""
-    package = Path(__file__).parent.parent
-    by_size = sorted(
-        KERNELS, key=lambda module: -package.joinpath(*module.split(".")).with_suffix(".py").stat().st_size
-    )
-    for module in by_size[::2] + by_size[1::2][::-1]:
-        for name, row in KERNELS[module].items():
-            if every or OF_SOME_JOBS.isdisjoint((module, f"{module}.{name}")):
-                yield getattr(import_module(f"{PACKAGE}{module}"), name), arguments_of(row)
+def _rows(every: bool) -> list[tuple[Any, tuple[Any, ...]]]:
+    """Each kernel of the table, with the types of its arguments: module by module, since kernels of a module share what
+    they call; those of long kernels at both ends, so that little is compiled twice where two processes meet."""
+    modules = list[list[tuple[Any, tuple[Any, ...]]]]()
+    for module, rows in KERNELS.items():
+        if every or module not in OF_SOME_JOBS:
+            loaded = import_module(f"{PACKAGE}{module}")
+            names = (name for name in rows if every or f"{module}.{name}" not in OF_SOME_JOBS)
+            modules.append([(getattr(loaded, name), arguments_of(rows[name])) for name in names])
+    modules.sort(key=lambda kernels: -max((_work(kernel) for kernel, _ in kernels), default=0))
+    return [row for kernels in modules[::2] + modules[1::2][::-1] for row in kernels]
+
+
+def _compile(kernel: Any, arguments: tuple[Any, ...]) -> None:
+    """Compile a kernel, without Python's collector: then only what this kernel left is searched for garbage."""
+    kernel.compile(arguments)
+    gc.collect(0)
+
+
+@contextmanager
+def _without_collector() -> Iterator[None]:
+    """It searches all that Numba knows again and again, a sixth of the work."""
+    on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if on:
+            gc.enable()
 
 
 def _is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
@@ -82,8 +97,13 @@ def _is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
     return key in cache._cache_file._load_index()
 
 
+def _work(kernel: Any) -> int:
+    """About what it takes to compile a kernel, as bytes of code."""
+    return EACH + _size(kernel)
+
+
 def _size(kernel: Any, known: frozenset[Kernel] = frozenset()) -> int:
-    """Bytes of Python's code of a kernel and of those that it calls: about what it takes to compile."""
+    """Bytes of Python's code of a kernel and of those that it calls."""
     function = kernel.py_func
     called = (function.__globals__.get(name) for name in function.__code__.co_names)
     inner = [callee for callee in called if hasattr(callee, "py_func") and callee not in known]
@@ -118,11 +138,11 @@ def _help() -> None:
         os._exit(0)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    gc.disable()  # a sixth of the work, to free memory that this process soon gives back
     threading.Thread(target=end_with_the_other, daemon=True).start()
-    for kernel, arguments in reversed([*_rows("every" in sys.argv)]):
-        if not _is_kept(kernel, arguments):
-            kernel.compile(arguments)
+    with _without_collector():
+        for kernel, arguments in reversed(_rows("every" in sys.argv)):
+            if not _is_kept(kernel, arguments):
+                _compile(kernel, arguments)
 
 
 if __name__ == "__main__":

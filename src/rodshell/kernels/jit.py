@@ -1,12 +1,15 @@
 """Kernels compiled by Numba when they are first called; those of the table are kept where a folder can be written."""
 
+from typing import Any
+
 from rodshell.errors import RodshellError
 from rodshell.kernels import Kernel, name_of
 from rodshell.kernels.cache import kernels_are_kept
 from rodshell.kernels.table import KERNELS
 
 try:
-    from numba import njit, types
+    from numba import config, njit, types
+    from numba.core.registry import CPUDispatcher
 except ModuleNotFoundError as error:
     raise RodshellError(
         "no compiled kernels for this processor are installed, nor Numba, which would compile them: pip install numba"
@@ -22,10 +25,26 @@ def dispatcher(function: Kernel, options: dict[str, object]) -> Kernel:
     only kernels call are not kept: they are part of these, and to write them takes a twentieth of the time.
     """
     module, _, name = name_of(function).rpartition(".")
-    kept = name in KERNELS.get(module, {}) and kernels_are_kept()
+    from_python = name in KERNELS.get(module, {})
+    kept = from_python and kernels_are_kept()
     of_its_own: dict[str, object] = {"error_model": "numpy", "fastmath": False, "cache": kept}
+    of_its_own["no_cfunc_wrapper"] = True  # for calls from C, of which there are none
     kernel: Kernel = njit(**of_its_own | options)(function)
-    return kernel
+    return kernel if from_python or config.DISABLE_JIT else _Inner(kernel)
+
+
+class _Inner(CPUDispatcher):  # type: ignore[misc, unused-ignore]
+    """A kernel that only kernels call, compiled without what a call from Python needs: a thirtieth of the work.
+
+    Such a call would end the process. It goes to the kernel as Numba declares it, which is compiled for that.
+    """
+
+    def __init__(self, kernel: Any) -> None:
+        super().__init__(kernel.py_func, targetoptions=kernel.targetoptions | {"no_cpython_wrapper": True})
+        self._from_python = kernel
+
+    def __call__(self, *given: Any) -> Any:
+        return self._from_python(*given)
 
 
 def arguments_of(row: str) -> tuple[types.Type, ...]:

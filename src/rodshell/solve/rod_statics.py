@@ -385,7 +385,7 @@ def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
     state = rod.state() if start is None else np.array(start, dtype=float)
     if state.shape != (rod.block_count, 3):
         raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
-    return finite("the state to start from", state, *state.shape)
+    return finite("the state to start from", state, *state.shape).copy()
 
 
 def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Freedom, report: SolveReport) -> RodShape:

@@ -279,6 +279,7 @@ def product(indptr: Longs, indices: Longs, data: Floats, x: Floats) -> Floats:
     data : (nnz,) its values.
     x : (n,) vector.
     """
+    data = np.require(data, requirements="W")  # that of a tangent cannot be written to, see there
     residual, *_ = _residual(indptr, indices, data, np.ascontiguousarray(x), np.zeros(len(x)))
     return np.asarray(-residual)
 

@@ -274,10 +274,15 @@ class TangentAssembly:
         SingularError : a pivot vanishes.
         """
         free, values = self.values(elements, state, forces, stretch)
-        state, forces = state.copy(), forces.copy()
-        for array in (state, forces, values):
-            array.flags.writeable = False
-        return Tangent(state, forces, free, values, self.pattern, self.pattern.solver.factor(values))
+        factors = self.pattern.solver.factor(values)
+        return Tangent(_fixed(state.copy()), _fixed(forces.copy()), free, _fixed(values), self.pattern, factors)
+
+
+def _fixed(array: Floats) -> Floats:
+    """A view that cannot be written to. The array itself can: Numba compiles a kernel again for arrays that cannot."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def subspace_iteration(
