@@ -23,10 +23,16 @@ class _Attributes(DXFNamespace):  # type: ignore[misc]
         self.__dict__[key] = value
 
     def export_dxf_attribs(self, tagwriter: TagWriter, attribs: str | Iterable[str]) -> None:
-        """Write those that are set, or that every entity of the kind has in a file."""
-        names = (attribs,) if isinstance(attribs, str) else attribs
-        held, always = self.__dict__, self._entity.always
-        super().export_dxf_attribs(tagwriter, [name for name in names if name in held or name in always])
+        """Write those that are set, and those that every entity of the kind has in a file."""
+        known, held, always = self.dxfattribs, self.__dict__, self._entity.always
+        for name in (attribs,) if isinstance(attribs, str) else attribs:
+            if name not in held:
+                if name in always:
+                    super().export_dxf_attribs(tagwriter, name)
+            elif isinstance(held[name], tuple):
+                tagwriter.write_vertex(known.get(name).code, held[name])
+            else:
+                tagwriter.write_tag2(known.get(name).code, held[name])
 
 
 class _Plain(DXFGraphic):  # type: ignore[misc]
