@@ -1,6 +1,7 @@
 """A rod that fits its target: the section that withstands the bends of the target's net in a given material."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -8,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import fibre_strain
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, NetLimitError
 from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout

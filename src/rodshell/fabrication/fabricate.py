@@ -1,12 +1,12 @@
 """Cut list, layers, splices, stock and bracing of a grid, in one call, and the lengths that decide the cutting."""
 
+from dataclasses import dataclass
 from functools import partial
 from math import isfinite
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.fabrication.cutting import Nesting, nest, splices
 from rodshell.layout import GridMesh, Profile

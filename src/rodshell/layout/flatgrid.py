@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from reprlib import repr as short
 from typing import Literal
@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout.profile import Profile

@@ -1,6 +1,6 @@
 """Two families of parallel rods, orthogonal in the flat grid, before they are cut to a target."""
 
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from math import degrees, pi
 from numbers import Real
 from reprlib import repr as short
@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod
 from rodshell.validation import instance, number, numbers, positive

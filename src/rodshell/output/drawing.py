@@ -2,7 +2,7 @@
 
 import pathlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import cos, sin
@@ -11,7 +11,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 
 Anchor = Literal["start", "middle", "end"]
 

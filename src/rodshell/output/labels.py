@@ -1,12 +1,12 @@
 """Labels that never cover each other, and callouts: names along an outline, each with a line to its place."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats
-from rodshell.dataclass import dataclass
 from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
 
 Extent = tuple[float, float, float, float]

@@ -2,12 +2,11 @@
 
 import datetime
 from collections.abc import Mapping
-from dataclasses import asdict, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from rodshell.checks.bending import VON_MISES, require_known_stress
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.joints import Joint

@@ -5,7 +5,7 @@ draws soft edges, and written by Pillow, as their texts are.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from io import BytesIO
 from typing import TYPE_CHECKING
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
 from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Path, Pen, Pencil, Text
 from rodshell.output.grid import STAGE, GridRod, Shape, opens, outlines_of, rods_of, shape_names, shape_of

@@ -13,6 +13,7 @@ takes the state for straight on: it misses what a shell sinks before it buckles,
 the path says.
 """
 
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
@@ -21,7 +22,6 @@ from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError, StabilityError
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load, LoadedAssembly

@@ -16,12 +16,11 @@ the elements where the descent starts, so that metres, radians and soft and stif
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import OutOfTimeError
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
 from rodshell.solve.newton_matrix import SparseSum

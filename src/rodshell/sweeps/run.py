@@ -2,11 +2,10 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
-from rodshell.dataclass import dataclass
 from rodshell.progress import Progress, silent
 from rodshell.sweeps.columns import CONVERGED, is_usable
 from rodshell.sweeps.computing import Computation, Wanted, opened_computation

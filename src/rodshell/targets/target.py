@@ -1,12 +1,12 @@
 """What every target offers: an implicit surface, continued smoothly past the end of the shell."""
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 

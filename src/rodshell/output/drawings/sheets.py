@@ -5,7 +5,7 @@ The title block says what a drawing is, of which rods, by whom, when, to which t
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from math import ceil
 from textwrap import wrap
@@ -13,7 +13,6 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
 from rodshell.output.labels import Room, lines_meet_moved
 from rodshell.output.schedules import Table, head
