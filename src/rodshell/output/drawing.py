@@ -56,6 +56,7 @@ LAYERS = {
     "DIM": Layer(SOFT, 0.13, 8),
     "TITLE": Layer(INK, 0.18, 7),
 }
+FORBIDDEN = '<>/\\":;?*|=`,'  # in a layer's name [DXF reference]
 
 
 class Pen(NamedTuple):

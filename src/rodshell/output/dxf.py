@@ -4,19 +4,18 @@ from collections.abc import Mapping
 from io import StringIO
 from itertools import chain, count
 from math import degrees
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
+import ezdxf
+from ezdxf.document import CREATED_BY_EZDXF, WRITTEN_BY_EZDXF
+from ezdxf.document import Drawing as Document
+from ezdxf.layouts import Modelspace
 
-from rodshell.output.drawing import LAYERS, Drawing, Path, Text
+from rodshell.output.drawing import FORBIDDEN, LAYERS, Drawing, Path, Text
+from rodshell.output.dxf_entities import PlainCircle, PlainLine, PlainPolyline, PlainText, Writer
 from rodshell.results.records import printable
 
-if TYPE_CHECKING:
-    from ezdxf.document import Drawing as Document
-    from ezdxf.layouts import Modelspace
-
-FORBIDDEN = '<>/\\":;?*|=`,'  # in a layer's name [DXF reference]; it holds LONGEST letters at most
-LONGEST = 200
+LONGEST = 200  # letters of a layer's name
 CAPITAL = 0.716  # height of Arial's capitals over the text size; a DXF text is as high as its capitals
 DATE = 2451544.5  # 2000-01-01, a Julian date
 IDENTIFIER = "{00000000-0000-0000-0000-000000000000}"
@@ -31,8 +30,6 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
     drawing : at 1:1 [mm].
     names : for some layers the name that they take in the file (see `layer_names`).
     """
-    import ezdxf
-
     document = ezdxf.new("R2010", units=ezdxf.units.MM)
     layers = layer_names(names or {})
     _set_up(document, layers, drawing)
@@ -40,7 +37,8 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
     for path in drawing.paths:
         _add_path(space, path, layers[path.layer])
     for mark in drawing.marks:
-        space.add_circle(mark.at.tolist(), float(mark.radius), dxfattribs={"layer": layers[mark.layer]})
+        center = (*mark.at.tolist(), 0.0)
+        space.add_entity(PlainCircle(layer=layers[mark.layer], center=center, radius=float(mark.radius)))
     for text in drawing.texts:
         _add_text(space, text, layers[text.layer])
     return _written(document)
@@ -63,14 +61,11 @@ def layer_names(names: Mapping[str, str]) -> dict[str, str]:
     return shown
 
 
-def _written(document: "Document") -> str:
+def _written(document: Document) -> str:
     """As `document.write`, but files of the same content are the same: no time of writing, no random identifiers.
 
     ezdxf has a switch for that, which holds for the whole process, other threads included.
     """
-    from ezdxf.document import CREATED_BY_EZDXF, WRITTEN_BY_EZDXF
-    from ezdxf.lldxf.tagwriter import TagWriter
-
     for kind in sorted(document.entitydb.dxf_types_in_use()):
         document.classes.add_class(kind)  # in a fixed order: `update_all` has that of a set
     document.commit_pending_changes()
@@ -82,11 +77,11 @@ def _written(document: "Document") -> str:
     about = document.ezdxf_metadata()
     about[CREATED_BY_EZDXF] = about[WRITTEN_BY_EZDXF] = "rodshell"
     stream = StringIO()
-    document.export_sections(TagWriter(stream, document.dxfversion))
+    document.export_sections(Writer(stream, document.dxfversion))
     return stream.getvalue()
 
 
-def _set_up(document: "Document", layers: Mapping[str, str], drawing: Drawing) -> None:
+def _set_up(document: Document, layers: Mapping[str, str], drawing: Drawing) -> None:
     """Layers with colour, line weight and line type, text styles, and a first view of the whole drawing."""
     scale = drawing.pen_scale
     for name, layer in LAYERS.items():
@@ -106,28 +101,27 @@ def _set_up(document: "Document", layers: Mapping[str, str], drawing: Drawing) -
     space.dxf.extmin, space.dxf.extmax = (*low.tolist(), 0.0), (*high.tolist(), 0.0)
 
 
-def _add_path(space: "Modelspace", path: Path, layer: str) -> None:
-    look = {"layer": layer}
+def _add_path(space: Modelspace, path: Path, layer: str) -> None:
     if not path.flat:
-        space.add_polyline3d(path.points.tolist(), close=path.closed, dxfattribs=look)
+        space.add_polyline3d(path.points.tolist(), close=path.closed, dxfattribs={"layer": layer})
     elif len(path.points) == 2:
-        space.add_line(*path.points.tolist(), dxfattribs=look)
-    else:  # all points at once: ezdxf adds points that it is given one by one to a copy of those before
-        rows = np.zeros((len(path.points), 5))  # x, y, and neither widths nor bulge
-        rows[:, :2] = path.points
-        space.add_lwpolyline([], close=path.closed, dxfattribs=look).lwpoints.extend(rows)
+        start, end = ((*point, 0.0) for point in path.points.tolist())
+        space.add_entity(PlainLine(layer=layer, start=start, end=end))
+    else:
+        space.add_entity(PlainPolyline(path.points, closed=path.closed, layer=layer))
 
 
-def _add_text(space: "Modelspace", text: Text, layer: str) -> None:
-    at = text.at.tolist()
+def _add_text(space: Modelspace, text: Text, layer: str) -> None:
+    at = (*text.at.tolist(), 0.0)
     look = {
         "layer": layer, "style": STYLES[text.bold][0], "height": CAPITAL * text.size, "insert": at,
+        "text": _plain(text.text),
     }  # fmt: skip
     if text.angle:
         look["rotation"] = degrees(text.angle)
     if text.anchor != "start":  # on its baseline; the second point counts [DXF reference]
         look |= {"halign": {"middle": 1, "end": 2}[text.anchor], "align_point": at}
-    space.add_text(_plain(text.text), dxfattribs=look)
+    space.add_entity(PlainText(**look))
 
 
 def _plain(text: str) -> str:

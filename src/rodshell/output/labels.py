@@ -156,7 +156,8 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
     """
     first = float(np.arctan2(way[1], way[0]))
     half = 0.5 * size * np.array([LETTER * len(text), LINE])
-    lines = lines_near(lines, end, 0.5 * (STEPS + 2) * size + 2 * float(half.max()))
+    reach = 0.5 * (STEPS + 2) * size + 2 * float(half.max())
+    lines = lines_near(lines, end - reach, end + reach)
     for step, turn in ((step, turn) for step in range(STEPS) for turn in TURNS):
         ray = np.array([np.cos(first + turn), np.sin(first + turn)])
         to_side = float(np.min(half / np.maximum(np.abs(ray), 1e-12)))  # from the box's middle to its rim
@@ -297,17 +298,30 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     return bool(runs_through((lines - box.sum(axis=0) / 4) @ axes).any())
 
 
-def lines_near(lines: Floats, place: Floats, reach: float) -> Floats:
-    """Those of the lines (m, 2, 2) that may come as near to a place (2,) as `reach`, across and along.
+def lines_meet_moved(box: Floats, shifts: Floats, lines: Floats) -> Bools:
+    """(k,) whether one of the lines runs through the rectangle where it is after each shift, as of `lines_meet`.
 
     Parameters
     ----------
-    lines : (m, 2, 2) ends; place : (2,); reach : distance across and along.
+    box : (4, 2) corners in a row; shifts : (k, 2) of it; lines : (m, 2, 2) ends.
     """
-    if not len(lines):
-        return lines
+    places = (box + shifts[:, None]).reshape(-1, 2)
+    lines = lines_near(lines, places.min(axis=0, initial=np.inf), places.max(axis=0, initial=-np.inf))
+    sides = box[[1, 3]] - box[0]
+    axes = (2.0 * sides / (sides**2).sum(axis=1)[:, None]).T
+    seen = (lines - box.sum(axis=0) / 4) @ axes - (shifts @ axes)[:, None, None]
+    return np.asarray(runs_through(seen).any(axis=1))
+
+
+def lines_near(lines: Floats, low: Floats, high: Floats) -> Floats:
+    """Those of the lines (m, 2, 2) that may come into a rectangle.
+
+    Parameters
+    ----------
+    lines : (m, 2, 2) ends; low, high : (2,) lower left and upper right corner of the rectangle.
+    """
     a, b = lines[:, 0], lines[:, 1]
-    near = (np.minimum(a, b) < place + reach) & (np.maximum(a, b) > place - reach)
+    near = (np.minimum(a, b) < high) & (np.maximum(a, b) > low)
     return np.asarray(lines[near[:, 0] & near[:, 1]])
 
 
@@ -446,7 +460,8 @@ def _free(name: str, place: Floats, start: Floats, way: Floats, size: float, roo
     half = (0.3 + 0.5 * LETTER * len(name)) * size
     foot = off_its_mark(np.array([place, start]), size)
     near = float(np.linalg.norm(start - place)) < FARTHEST * size
-    lines = lines_near(lines, start, 2 * half + CLOSE * size) if near else lines
+    reach = 2 * half + CLOSE * size
+    lines = lines_near(lines, start - reach, start + reach)
     for step in range(CLOSE if near and room.free(foot) else 0):
         label = Label(name, start + (half + 0.5 * step * size) * way, angle, start, moved=True)
         if fits(label, size, room, lines) and room.free(thin(label.leader(size), THIN * size)):

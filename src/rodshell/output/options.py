@@ -63,8 +63,7 @@ class DrawingStyle:
 
 def _require_names(layers: Mapping[str, str]) -> None:
     """Refuse new names of layers that a DXF file cannot have."""
-    from rodshell.output.drawing import LAYERS  # here, as most drawings have our layers
-    from rodshell.output.dxf import FORBIDDEN
+    from rodshell.output.drawing import FORBIDDEN, LAYERS  # here, as most drawings have our layers
 
     for layer, name in layers.items():
         if layer not in LAYERS:

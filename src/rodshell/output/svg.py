@@ -1,7 +1,6 @@
 """A drawing as SVG, and what other SVG files are written with: elements, escaped texts, short numbers."""
 
-import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from html import escape
 from itertools import groupby
@@ -12,8 +11,6 @@ import numpy as np
 
 from rodshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Text
 
-ZEROS = re.compile(r"\.00(?!\d)|(?<=\.\d)0(?!\d)")
-MINUS_ZERO = re.compile(r"-0(?![.\d])")
 FLIP = np.array([1.0, -1.0])
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans Condensed', sans-serif"
 
@@ -127,22 +124,22 @@ def _shapes(drawing: Drawing) -> Iterator[str]:
         members = list(group)
         anonymous = [item for item in members if isinstance(item, Path) and not (item.name or item.note)]
         if len(anonymous) == len(members):
-            yield tag("path", d=_short("".join(map(_data, anonymous))), class_=layer, **_look(pen))
+            yield tag("path", d=_data(anonymous), class_=layer, **_look(pen))
         else:
             shapes = [_path(item) if isinstance(item, Path) else _mark(item) for item in members]
             yield tag("g", *shapes, class_=layer, **_look(pen))
 
 
-def _data(path: Path) -> str:
-    """Data of a path without a name, to 0.01 of a unit, not yet shortened."""
-    flipped = (path.points * FLIP).ravel().tolist()
-    words = "L".join(["%.2f %.2f"] * len(path.points)) % tuple(flipped)
-    return f"M{words}Z" if path.closed else f"M{words}"
+def _data(paths: Sequence[Path]) -> str:
+    """Data of paths without names, to 0.01 of a unit; zeros have no sign."""
+    points = np.round(np.concatenate([path.points for path in paths]) * FLIP, 2) + 0.0
+    return "".join([_data_of(len(path.points), path.closed) for path in paths]) % tuple(points.ravel().tolist())
 
 
-def _short(words: str) -> str:
-    """Numbers with two decimals as `number` has them."""
-    return MINUS_ZERO.sub("0", ZEROS.sub("", words))
+@cache
+def _data_of(count: int, closed: bool) -> str:
+    """The format of the data of a path with so many points; 15 digits show no more than was rounded to."""
+    return f"M{'L'.join(['%.15g %.15g'] * count)}{'Z' if closed else ''}"
 
 
 def _look(pen: Pen) -> dict[str, Any]:

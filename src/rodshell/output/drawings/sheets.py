@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
-from itertools import product
 from math import ceil
 from textwrap import wrap
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
-from rodshell.output.labels import Room, lines_meet
+from rodshell.output.labels import Room, lines_meet_moved
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash
@@ -452,7 +451,8 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         if not within(text.box(), low, high):
             free.take(text.box())
     paths = [path.points for path in part.paths if not within(path.points, low, high)]
-    drawn = np.concatenate([np.empty((0, 2, 2)), *(np.stack([line[:-1], line[1:]], axis=1) for line in paths)])
+    ends = [points[:-1] for points in paths], [points[1:] for points in paths]
+    drawn = np.stack([np.concatenate([np.empty((0, 2)), *points]) for points in ends], axis=1)
     pen = Pen("#b3372c", 0.25, (6.0, 1.5, 1.0, 1.5))
     sides: tuple[tuple[bool, tuple[int, int], list[Floats], tuple[float, float], float], ...] = (
         (bool(row > 0), (row - 1, column), [np.array([low[0], high[1]]), high], (0.0, 1.5), 0.0),
@@ -472,11 +472,13 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         pencil.line(line, "TITLE", pen=pen)
         start, along = line[0] + off, np.array([np.cos(angle), np.sin(angle)])
         words = f"match line to part {_part(*neighbour)}"
-        steps = range(4, int(np.linalg.norm(line[1] - line[0])) - 50, 2)
-        for clear_of, step in product((drawn, drawn[:0]), steps):
-            written = Text(words, start + step * along, TEXT, "TITLE", angle=angle, colour=pen.colour)
-            if not lines_meet(written.box(), clear_of) and free.claim(written.box()):
-                pencil.texts.append(written)
+        steps = np.arange(4, int(np.linalg.norm(line[1] - line[0])) - 50, 2)
+        written = Text(words, start, TEXT, "TITLE", angle=angle, colour=pen.colour)
+        met = lines_meet_moved(written.box(), steps[:, None] * along, drawn)
+        for step in (*steps[~met].tolist(), *steps.tolist()):
+            placed = replace(written, at=start + step * along)
+            if free.claim(placed.box()):
+                pencil.texts.append(placed)
                 break
     return pencil.done("", "", TEXT)
 
