@@ -35,7 +35,7 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
     if any(shell.bracing for supported in results.loads.values() for shell in supported.values()):
         carries = "is known to carry only" if lost & set(parts) else "carries only"
         weight = _parts(parts, "its own weight")
-        words = f"{_alone(parts)}without its bracing the shell {carries} {weight}: support it until that is in place"
+        words = f"{_alone(parts)}the shell {carries} {weight} without its bracing: support it until that is in place"
         return [words] if parts else [], True
     standing = [end for end, weighed in found.items() if end not in parts and weighed.limit != "no mass"]
     falling = {end: part for end, part in parts.items() if end not in lost}
