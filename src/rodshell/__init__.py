@@ -159,7 +159,8 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in _HOME_OF:
         raise AttributeError(f"module 'rodshell' has no attribute {name!r}")
-    return getattr(import_module(_HOME_OF[name]), name)
+    globals()[name] = found = getattr(import_module(_HOME_OF[name]), name)  # asked for once only
+    return found
 
 
 def __dir__() -> list[str]:

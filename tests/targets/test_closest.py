@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.targets.target import newton_to_closest, shape_operators
+from rodshell.targets.target import NO_FORCES, newton_to_closest, shape_operators
 from tests.targets.meshes import PARTS, Floats
 
 COUNT = 200
@@ -70,12 +70,15 @@ def test_at_a_centre_of_curvature_the_step_keeps_to_the_normal():
 def test_shape_operators_are_projected_hessians():
     _, _, _, gradient, hessian, _ = states()
     normal, shape = np.empty_like(gradient), np.empty_like(hessian)
-    shape_operators(gradient, hessian, normal, shape)
+    shape_operators(gradient, hessian, NO_FORCES, normal, shape)
     steep = np.linalg.norm(gradient, axis=1)
     n = gradient / steep[:, None]
     tangential = np.eye(3) - n[:, :, None] * n[:, None]
     assert normal == pytest.approx(n)
     assert shape == pytest.approx(tangential @ (hessian / steep[:, None, None]) @ tangential)
+    forces, times = np.random.default_rng(1).normal(size=gradient.shape), np.empty_like(shape)
+    shape_operators(gradient, hessian, forces, normal, times)
+    assert times == pytest.approx((n * forces).sum(axis=1)[:, None, None] * shape)
 
 
 def test_distances_are_those_of_gaps_on_both_sides():

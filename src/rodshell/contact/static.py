@@ -7,11 +7,11 @@ from typing import Self
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.targets import Target
+from rodshell.targets.target import shape_operators
 from rodshell.validation import brief
 
 
@@ -52,8 +52,9 @@ class BoundToTarget:
         state : (n, 3) nodes [m].
         gradient : (n, 3) of the energy there [N].
         """
-        _, normal, curvature = self.target.on_surface(state)
-        curvature *= -dot(normal, gradient)[:, None, None]
+        _, slope, hessian = self.target.implicit(state)
+        normal, curvature = np.empty_like(slope), np.empty_like(hessian)
+        shape_operators(slope, hessian, -gradient, normal, curvature)
         return curvature
 
     def remaining(self, state: Floats) -> Floats | None:

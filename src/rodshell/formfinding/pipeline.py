@@ -105,10 +105,11 @@ def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type:
             middle = 0.5 * (stations[entry] + stations[entry + 1])
             first = min(max(entry + 1 - count // 2, start), stop - count)
             for j in range(first, first + count):
-                weight = 1.0
+                above, below = 1.0, 1.0
                 for k in range(first, first + count):
                     if j != k:
-                        weight *= (middle - stations[k]) / (stations[j] - stations[k])
+                        above, below = above * (middle - stations[k]), below * (stations[j] - stations[k])
+                weight = above / below
                 for axis in range(3):
                     result[edge, axis] += weight * positions[rod_nodes[j], axis]
             edge += 1

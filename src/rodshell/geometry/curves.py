@@ -36,10 +36,11 @@ def put_lagrange(knots, points, n, at, result, row):  # type: ignore[no-untyped-
     for d in range(points.shape[2]):
         result[row, d] = 0.0
     for j in range(knots.shape[1]):
-        weight = 1.0
+        above, below = 1.0, 1.0
         for k in range(knots.shape[1]):
             if j != k:
-                weight *= (at - knots[n, k]) / (knots[n, j] - knots[n, k])
+                above, below = above * (at - knots[n, k]), below * (knots[n, j] - knots[n, k])
+        weight = above / below
         for d in range(points.shape[2]):
             result[row, d] += weight * points[n, j, d]
 
@@ -130,10 +131,11 @@ def _window(knots, at, right, first, last, shares, row):  # type: ignore[no-unty
     near = min(4, last - first + 1)
     window = min(max(right - near // 2, first), last + 1 - near)
     for j in range(near):
-        shares[row, j] = 1.0
+        above, below = 1.0, 1.0
         for k in range(near):
             if j != k:
-                shares[row, j] *= (at - knots[window + k]) / (knots[window + j] - knots[window + k])
+                above, below = above * (at - knots[window + k]), below * (knots[window + j] - knots[window + k])
+        shares[row, j] = above / below
     return window
 
 

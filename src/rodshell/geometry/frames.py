@@ -18,8 +18,8 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Inner products (...) of arrays (..., 3)."""
-    return np.asarray(np.einsum("...i,...i->...", a, b))
+    """Inner products (...) of arrays (..., 3); several times faster than by numpy's einsum on long arrays."""
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
 
 
 def unit(a: Floats) -> Floats:

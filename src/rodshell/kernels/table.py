@@ -156,6 +156,6 @@ KERNELS: dict[str, dict[str, str]] = {
         "along_gradient": "f2 f1 f2",
         "newton_to_closest": "f2 f2 i1 f1 f2 f3 f1 f f2 f1",
         "offset_shape": "f3 f1",
-        "shape_operators": "f2 f3 f2 f3",
+        "shape_operators": "f2 f3 f2 f2 f3",
     },
 }

@@ -282,11 +282,12 @@ def _interpolate(u, v, points, line, across, start, s, result):  # type: ignore[
                 after += 1
             first = min(max(after - near // 2, 0), count - near)
             for j in range(near):
-                shares[j] = 1.0
+                at_j, above, below = knots[known[first + j]], 1.0, 1.0
                 for k in range(near):
                     if j != k:
                         at_k = knots[known[first + k]]
-                        shares[j] *= (s[e] - at_k) / (knots[known[first + j]] - at_k)
+                        above, below = above * (s[e] - at_k), below * (at_j - at_k)
+                shares[j] = above / below
             for d in range(3):
                 value = 0.0
                 for j in range(near):

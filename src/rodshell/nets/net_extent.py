@@ -55,7 +55,7 @@ class Covering(Net):
         """
         result = list[float]()
         for s, touched in ((self.u, self.inside.any(axis=1)), (self.v, self.inside.any(axis=0))):
-            on = np.flatnonzero(touched) if touched.any() else np.array([0, len(s) - 1])
+            on = np.flatnonzero(touched).tolist() or [0, len(s) - 1]
             result += [-s[max(on[0] - past, 0)], s[min(on[-1] + past, len(s) - 1)]]
         return np.array(result)
 
@@ -246,9 +246,10 @@ def _stride(target: Target, start: Axes, heights: Heights) -> Covering:
 
 def _around(inside: Bools) -> Bools:
     """Nodes of an axis from one before the first inside, or the anchor, to one past the last; all where none is."""
-    on = np.append(np.flatnonzero(inside), STRIDES) if inside.any() else np.array([0, len(inside)])
-    k = np.arange(len(inside))
-    return np.asarray((k >= on.min() - 1) & (k <= on.max() + 1))
+    on = np.flatnonzero(inside).tolist() or [0, len(inside)]
+    around = np.zeros_like(inside)
+    around[max(min(on[0], STRIDES) - 1, 0) : max(on[-1], STRIDES) + 2] = True
+    return around
 
 
 def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:

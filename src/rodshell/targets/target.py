@@ -11,6 +11,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
 
+NO_FORCES = np.empty((0, 3))
 NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
 
 
@@ -144,7 +145,7 @@ class Target(ABC):
         """Normal and shape operator at points `x` (n, 3) [m] that lie on the surface; the distance is taken as 0."""
         _, gradient, hessian = self.implicit(x)
         normal, shape = np.empty_like(gradient), np.empty_like(hessian)
-        shape_operators(gradient, hessian, normal, shape)
+        shape_operators(gradient, hessian, NO_FORCES, normal, shape)
         return Gap(np.zeros(len(x)), normal, shape)
 
     def closest(self, x: Floats) -> Floats:
@@ -362,12 +363,13 @@ def _times(h, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy")
-def shape_operators(gradient, hessian, normal, shape):  # type: ignore[no-untyped-def]
+def shape_operators(gradient, hessian, forces, normal, shape):  # type: ignore[no-untyped-def]
     """Unit normals n, and shape operators P F'' P / |F'| with P = 1 - n n.
 
     Parameters
     ----------
     gradient, hessian : (m, 3), (m, 3, 3) of F at points of the surface.
+    forces : (m, 3) by whose normal components the operators are multiplied [N]; empty: they are not.
     normal, shape : (m, 3), (m, 3, 3) output.
     """
     for m in range(len(gradient)):
@@ -378,6 +380,8 @@ def shape_operators(gradient, hessian, normal, shape):  # type: ignore[no-untype
         hx, hy, hz = _times(h, n[0], n[1], n[2])
         twice = n[0] * hx + n[1] * hy + n[2] * hz
         hn = hx - 0.5 * twice * n[0], hy - 0.5 * twice * n[1], hz - 0.5 * twice * n[2]
+        if len(forces) > 0:
+            scale *= n[0] * forces[m, 0] + n[1] * forces[m, 1] + n[2] * forces[m, 2]
         for i in range(3):
             for j in range(3):
                 shape[m, i, j] = scale * (h[i, j] - hn[i] * n[j] - n[i] * hn[j])
