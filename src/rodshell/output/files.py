@@ -266,7 +266,8 @@ def _rhino(content: Content) -> Files:
 
 def _png(content: Content) -> Files:
     from rodshell.output.grid import shape_of
-    from rodshell.output.pictures import deployment_picture, drawing_png, picture
+    from rodshell.output.pictures import deployment_picture, picture
+    from rodshell.output.png import drawing_png
 
     archive = content.archive
     popped = [name for name in _shells(archive) if name != "draped"]
