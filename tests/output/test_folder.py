@@ -153,7 +153,7 @@ def test_files_that_stand_in_the_way_are_refused_before_the_work(tmp_path: Path)
 
 def test_every_name_of_every_kind_is_known_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
     costly = (
-        "pictures.drawing_png",
+        "png.drawing_png",
         "pictures.picture",
         "pictures.deployment_picture",
         "pdf.drawings_pdf",

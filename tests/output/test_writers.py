@@ -15,7 +15,8 @@ from rodshell.output.colour_scale import mixed, scale_of
 from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
 from rodshell.output.grid import rods_of, shape_of
 from rodshell.output.labels import Room, lines_meet
-from rodshell.output.pictures import DEPTHS, PAPER, drawing_png, picture
+from rodshell.output.pictures import DEPTHS, PAPER, picture
+from rodshell.output.png import drawing_png
 from rodshell.output.svg import drawing_svg, number
 from rodshell.results import Archive, Results
 from tests.output.forms import archive as archive_of

@@ -7,13 +7,14 @@ Ours are valid, and few.
 from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
 from ezdxf.entities import Circle, DXFGraphic, Line, LWPolyline, Text
 from ezdxf.entities.dxfns import DXFNamespace
 from ezdxf.lldxf.tagwriter import TagWriter
-from ezdxf.lldxf.types import DXFTag, DXFVertex
+from ezdxf.lldxf.types import TAG_STRING_FORMAT, DXFTag, DXFVertex
 
 from rodshell.arrays import Floats
+
+POINT = "".join(TAG_STRING_FORMAT % (code, "%s") for code in (10, 20))
 
 
 class _Attributes(DXFNamespace):  # type: ignore[misc]
@@ -68,9 +69,20 @@ class PlainPolyline(_Plain, LWPolyline):  # type: ignore[misc]
     def __init__(self, points: Floats, *, closed: bool, **attributes: Any) -> None:
         super().__init__(**attributes)
         self.closed = closed
-        rows = np.zeros((len(points), 5))  # x, y, and neither widths nor bulge
-        rows[:, :2] = points
-        self.lwpoints.extend(rows)  # all at once: points that ezdxf is given one by one it adds to a copy of the others
+        self.lwpoints = _Points(10, points)
+
+
+class _Points(DXFTag):  # type: ignore[misc]
+    """The points (k, 2) of a polyline as one tag."""
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    def dxftags(self) -> tuple[DXFTag, ...]:
+        return (self,)
+
+    def dxfstr(self) -> str:
+        return len(self.value) * POINT % tuple(self.value.ravel().tolist())
 
 
 class Writer(TagWriter):  # type: ignore[misc]

@@ -105,6 +105,12 @@ class Content:
 
         return drawing_set(self.archive)
 
+    @cached_property
+    def svgs(self) -> dict[str, str]:
+        from rodshell.output.svg import drawing_svg
+
+        return {name: drawing_svg(drawing) for name, drawing in self.drawings.items()}
+
 
 def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
     """Names in the result's folder and contents of the files of some kinds; default: all but 3dm.
@@ -189,10 +195,8 @@ def _dxf(content: Content) -> Files:
 
 
 def _svg(content: Content) -> Files:
-    from rodshell.output.svg import drawing_svg
-
-    for name, drawing in content.drawings.items():
-        yield f"drawings/{name}.svg", drawing_svg(drawing)
+    for name, svg in content.svgs.items():
+        yield f"drawings/{name}.svg", svg
 
 
 def _pdf(content: Content) -> Files:
@@ -266,7 +270,8 @@ def _rhino(content: Content) -> Files:
 
 def _png(content: Content) -> Files:
     from rodshell.output.grid import shape_of
-    from rodshell.output.pictures import deployment_picture, drawing_png, picture
+    from rodshell.output.pictures import deployment_picture, picture
+    from rodshell.output.png import drawing_png
 
     archive = content.archive
     popped = [name for name in _shells(archive) if name != "draped"]
@@ -283,7 +288,7 @@ def _png(content: Content) -> Files:
 def _report(content: Content) -> Files:
     from rodshell.output.report import report_html
 
-    yield "report.html", report_html(content.archive, content.plan, content.drawings)
+    yield "report.html", report_html(content.archive, content.plan, content.drawings, content.svgs)
 
 
 def _shells(archive: Archive) -> list[str]:

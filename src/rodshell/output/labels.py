@@ -305,8 +305,8 @@ def lines_meet_moved(box: Floats, shifts: Floats, lines: Floats) -> Bools:
     ----------
     box : (4, 2) corners in a row; shifts : (k, 2) of it; lines : (m, 2, 2) ends.
     """
-    places = (box + shifts[:, None]).reshape(-1, 2)
-    lines = lines_near(lines, places.min(axis=0, initial=np.inf), places.max(axis=0, initial=-np.inf))
+    corners = (box + shifts[:, None]).reshape(-1, 2)
+    lines = lines_near(lines, corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf))
     sides = box[[1, 3]] - box[0]
     axes = (2.0 * sides / (sides**2).sum(axis=1)[:, None]).T
     seen = (lines - box.sum(axis=0) / 4) @ axes - (shifts @ axes)[:, None, None]

@@ -40,14 +40,13 @@ def obj_text(archive: Archive, state: str) -> str:
     ----------
     state : "draped", "popped_pinned" or "popped_clamped".
     """
-    lines = [
-        f"# rodshell, {state}, metres",
-        *(f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in archive.states[state].tolist()),
-    ]
+    nodes = archive.states[state]
+    text = f"# rodshell, {state}, metres\n"
+    text += len(nodes) * "v %.9f %.9f %.9f\n" % tuple(nodes.ravel().tolist())
     for rod in rods_of(archive):
         if len(rod.nodes) > 1:
-            lines += [f"o {' '.join(rod.id.split()) or 'rod'}", "l " + " ".join(map(str, rod.nodes + 1))]
-    return "\n".join(lines) + "\n"
+            text += f"o {' '.join(rod.id.split()) or 'rod'}\nl {' '.join(map(str, (rod.nodes + 1).tolist()))}\n"
+    return text
 
 
 def vtp_text(archive: Archive, name: str) -> str:

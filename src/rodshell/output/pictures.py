@@ -1,28 +1,19 @@
 """Pictures of a shape in space: its rods, near ones over far ones, coloured by gap or stress; as SVG and PNG.
 
-The view is axonometric: from the right, the front and above, without perspective. PNG files are drawn by aggdraw, which
-draws soft edges, and written by Pillow, as their texts are.
+The view is axonometric: from the right, the front and above, without perspective.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from io import BytesIO
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
-from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Path, Pen, Pencil, Text
+from rodshell.output.drawing import Drawing, Path, Pen, Pencil
 from rodshell.output.grid import STAGE, GridRod, Shape, opens, outlines_of, rods_of, shape_names, shape_of
 from rodshell.output.svg import number, picture_document
 from rodshell.results.archive import SHELLS, Archive, made_once
 from rodshell.results.wording import MINUS, UNDER, nice_ticks, shown_length
-
-if TYPE_CHECKING:
-    from PIL.ImageDraw import ImageDraw
-    from PIL.ImageFont import FreeTypeFont
 
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(27.0)  # of the eye
 _C, _S, _CE, _SE = np.cos(AZIMUTH), np.sin(AZIMUTH), np.cos(ELEVATION), np.sin(ELEVATION)
@@ -415,87 +406,3 @@ def _largest(pencil: Pencil, archive: Archive, shape: Shape, view: View) -> None
     _dot(pencil, np.array([x, y]), 6.0, Pen(INK, 1.1))
     anchor = "end" if side < 0 else "start"
     pencil.write(text, (x + 9 * side, y + 7), 13.0, "TITLE", anchor=anchor, bold=True, halo=PAPER)
-
-
-CAP = 0.5  # pixels
-COLOURS = 256  # of a file at most: a third of the bytes, and no colour off by more than a tenth
-HALO = 2.0  # width of a text's halo, in drawing units
-
-
-def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
-    """A PNG file of a drawing.
-
-    Parameters
-    ----------
-    drawing : paths and level texts; dashes, marks and angles of texts, which pictures do not have, are not drawn.
-    width : of the image [pixels].
-    """
-    from aggdraw import Brush, Draw
-    from aggdraw import Pen as Stroke
-    from PIL import Image, ImageDraw
-
-    low, high = drawing.box()
-    scale = width / float(high[0] - low[0])
-    corner = np.array([low[0], high[1]])
-    size = (width, round(scale * float(high[1] - low[1])))
-    canvas = Draw("RGB", size, "white")
-    last, stroke = None, None
-    for path, points in zip(drawing.paths, _lines(drawing.paths, corner, scale), strict=True):
-        pen = drawing.pen(path)
-        if path.closed and pen.fill:
-            canvas.polygon(points, None, Brush(pen.fill))
-        if pen.width:
-            if pen is not last:
-                last, stroke = pen, Stroke(pen.colour, scale * pen.width)
-            canvas.line(points + points[:2] if path.closed else points, stroke)
-    image = Image.frombytes("RGB", size, canvas.tobytes())
-    letters = ImageDraw.Draw(image)
-    for text in drawing.texts:
-        _write(letters, text, _pixels(text.at, corner, scale), scale)
-    stream = BytesIO()
-    if image.getcolors(COLOURS) is None:
-        image = image.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    image.save(stream, "PNG", compress_level=3)
-    return stream.getvalue()
-
-
-def _lines(paths: Sequence[Path], corner: Floats, scale: float) -> list[list[float]]:
-    """The points of each path in pixels, x, y, x, y, ...
-
-    Open lines are CAP longer at both ends: where two meet, their soft ends would show as a seam.
-    """
-    pieces = [path.points for path in paths]
-    count = np.array([*map(len, pieces)], dtype=np.intp)
-    points = _pixels(np.concatenate([np.empty((0, 2)), *pieces]), corner, scale)
-    stop = np.cumsum(count)
-    still_open = (count > 1) & ~np.array([path.closed for path in paths], dtype=bool)
-    first, last = (stop - count)[still_open], stop[still_open] - 1
-    for end, inside in ((first, first + 1), (last, last - 1)):
-        along = points[end] - points[inside]
-        points[end] += CAP * along / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
-    flat = points.ravel().tolist()
-    return [flat[2 * (end - size) : 2 * end] for end, size in zip(stop.tolist(), count.tolist(), strict=True)]
-
-
-def _pixels(points: Floats, corner: Floats, scale: float) -> Floats:
-    """Points (..., 2), y up, as pixels from the upper left `corner`, y down."""
-    return np.asarray(scale * (points - corner) * (1, -1))
-
-
-def _write(letters: "ImageDraw", text: Text, at: Floats, scale: float) -> None:
-    letters.text(
-        tuple(at.tolist()),
-        text.text,
-        fill=text.colour or LAYERS[text.layer].colour,
-        font=_font(text.bold, scale * text.size),
-        anchor={"start": "ls", "middle": "ms", "end": "rs"}[text.anchor],
-        stroke_width=round(HALO * scale) if text.halo else 0,
-        stroke_fill=text.halo or None,
-    )
-
-
-@lru_cache(maxsize=16)
-def _font(bold: bool, size: float) -> "FreeTypeFont":
-    from PIL import ImageFont
-
-    return ImageFont.truetype(str(BOLD if bold else REGULAR), size)

@@ -10,7 +10,7 @@ from typing import Any
 
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
-from rodshell.output.drawings.sheets import NOTE, on_a_page
+from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
 from rodshell.output.grid import CAPTIONS
 from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
@@ -18,7 +18,7 @@ from rodshell.output.schedules import Table, heading, rods_table, seams_table, s
 from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
 from rodshell.output.section_profiles import profiles_svg
-from rodshell.output.svg import drawing_svg, inline
+from rodshell.output.svg import SCALE, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import SHELLS, shown_case
@@ -39,13 +39,14 @@ GUIDED = "; between {start} and {stop} of the deployment it has to be guided, an
 NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between are not known."
 
 
-def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing]) -> str:
-    """The whole page; `plan` and `drawings` are the archive's.
+def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing], files: Mapping[str, str]) -> str:
+    """The whole page; `plan`, `drawings` and `files` are the archive's.
 
     Parameters
     ----------
     plan : the flat plan of the archive.
     drawings : of the archive, by name, see `drawing_set`.
+    files : the same as SVG files.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
@@ -80,8 +81,8 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         loads=loads_page(archive),
         figures=key_figures(results, plan),
         levels=levels_table(results),
-        plan=shown(_on_page(drawings["plan"])),
-        drawings=[(drawings[name].title, shown(_on_page(drawings[name]))) for name in IN_PAGE if name in drawings],
+        plan=shown(_on_page(files["plan"])),
+        drawings=[(drawings[name].title, shown(_on_page(files[name]))) for name in IN_PAGE if name in drawings],
         tables=[
             (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
         ],
@@ -92,8 +93,9 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     )
 
 
-def _on_page(drawing: Drawing) -> str:
-    return drawing_svg(on_a_page(drawing), scale="lengths in mm")
+def _on_page(svg: str) -> str:
+    """A drawing's file for a page, which shows it in any size: its titles claim no scale, only its bar is right."""
+    return svg.replace(f"{TRUE_SIZE}</text>", "</text>").replace(f", {SCALE}</title>", ", lengths in mm</title>")
 
 
 def _view(archive: Archive) -> dict[str, Any] | None:

@@ -415,9 +415,9 @@ def _utilisation(rod: GridRod) -> float | None:
 # CSV
 
 NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-RUN = "=+\\-@\uff1d\uff0b\uff0d\uff20"  # what a formula begins with, the last four full-width
+RUN = frozenset("=+-@\uff1d\uff0b\uff0d\uff20")  # what a formula begins with, the last four full-width
 WHOLE = re.compile(NUMBER)
-FORMULA = re.compile(rf'(^[\s"]*|[;,][\s"]*(?!{NUMBER}\s*(?:[;,]|$)))(?=[{RUN}])')
+FORMULA = re.compile(rf'(^[\s"]*|[;,][\s"]*(?!{NUMBER}\s*(?:[;,]|$)))(?=[{re.escape("".join(sorted(RUN)))}])')
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
@@ -439,4 +439,6 @@ def safe_cell(cell: str) -> str:
     ----------
     cell : a number or a text.
     """
+    if RUN.isdisjoint(cell):
+        return printable(cell)
     return cell if WHOLE.fullmatch(cell) else FORMULA.sub(r"\1'", printable(cell))

@@ -11,6 +11,7 @@ import numpy as np
 
 from rodshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Text
 
+SCALE = "1:1 in mm"  # of a drawing's file, after its title
 FLIP = np.array([1.0, -1.0])
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans Condensed', sans-serif"
 
@@ -86,20 +87,19 @@ def inline(svg: str) -> str:
     return f"<svg viewBox{rest}" if head.startswith("<svg") else svg
 
 
-def drawing_svg(drawing: Drawing, *, scale: str = "1:1 in mm") -> str:
+def drawing_svg(drawing: Drawing) -> str:
     """An SVG file at true scale, a unit a millimetre; neighbours of one layer and pen are one path or group.
 
     Parameters
     ----------
     drawing : y up; paths in space are not drawn.
-    scale : named in the title. It is that of the file: a page may show it in any size.
     """
     margin = 2 * drawing.text
     low, high = drawing.box()
     width, height = high - low + 2 * margin
     return document(
         (low[0] - margin, -high[1] - margin, width, height),
-        tag("title", escape(f"{drawing.title}, {scale}")),
+        tag("title", escape(f"{drawing.title}, {SCALE}")),
         tag("rect", x=low[0] - margin, y=-high[1] - margin, width=width, height=height, fill=PAPER),
         *_shapes(drawing),
         *(_text(text) for text in drawing.texts),

@@ -138,17 +138,6 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     return drawing + pencil.done("", "", size)
 
 
-def on_a_page(drawing: Drawing) -> Drawing:
-    """A drawing for a page, which shows it in any size: its title claims no scale, only its bar is right there."""
-    return replace(
-        drawing,
-        texts=tuple(
-            replace(text, text=text.text.removesuffix(TRUE_SIZE)) if text.layer == "TITLE" and text.bold else text
-            for text in drawing.texts
-        ),
-    )
-
-
 def write_entries(
     pencil: Pencil, block: TitleBlock, left: float, y: float, width: float, size: float, line: float
 ) -> float:
