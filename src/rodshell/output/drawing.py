@@ -4,7 +4,7 @@ import pathlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import compress, pairwise
 from math import cos, sin
 from typing import Literal, NamedTuple
 
@@ -202,13 +202,17 @@ class Drawing:
 
     @cached_property
     def _box(self) -> tuple[Floats, Floats]:
-        parts = [np.zeros((0, 2)), *(path.points for path in self.paths if path.flat)]
-        if self.marks:
-            at, radius = np.array([mark.at for mark in self.marks]), np.array([[mark.radius] for mark in self.marks])
-            parts += [at - radius, at + radius]
-        parts += [text.box() for text in self.texts]
-        cloud = np.concatenate(parts)
+        corners = [corner for extents in self._extents for corner in extents]
+        cloud = np.concatenate([*corners, *(path.points for path in self.paths if path.flat)])
         return (cloud.min(axis=0), cloud.max(axis=0)) if len(cloud) else (np.zeros(2), np.ones(2))
+
+    @cached_property
+    def _extents(self) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+        """Lowest and highest x and y of each mark (m, 2), (m, 2), and of each text's room (t, 2), (t, 2) [mm]."""
+        at = np.array([mark.at for mark in self.marks]).reshape(-1, 2)
+        radius = np.array([mark.radius for mark in self.marks]).reshape(-1, 1)
+        boxes = np.array([text.box() for text in self.texts]).reshape(-1, 4, 2)
+        return (at - radius, at + radius), (boxes.min(axis=1), boxes.max(axis=1))
 
     def placed(self, scale: float, shift: Floats) -> "Drawing":
         """The drawing scaled about the origin, with its pens and texts, then shifted. Paths in space are left out.
@@ -259,11 +263,10 @@ class Drawing:
             elif x1 >= left and y1 >= bottom and x0 <= right and y0 <= top:
                 points = np.vstack([path.points, path.points[:1]]) if path.closed else path.points
                 paths += [replace(path, points=part, closed=False) for part in _inside(points, low, high)]
-        texts = tuple(text for text in self.texts if within(text.box(), low, high))
-        radii = np.array([[mark.radius] for mark in self.marks])
-        at = np.array([mark.at for mark in self.marks]).reshape(-1, 2)
-        kept = np.flatnonzero(((at - radii >= low) & (at + radii <= high)).all(axis=1)) if len(at) else ()
-        return replace(self, paths=tuple(paths), marks=tuple(self.marks[k] for k in kept), texts=texts)
+        marks, texts = (np.all((lowest >= low) & (highest <= high), axis=1) for lowest, highest in self._extents)
+        return replace(
+            self, paths=tuple(paths), marks=tuple(compress(self.marks, marks)), texts=tuple(compress(self.texts, texts))
+        )
 
     def __add__(self, other: "Drawing") -> "Drawing":
         """This one with the other's content on top."""
