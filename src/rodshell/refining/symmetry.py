@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.layout import GridMesh
@@ -94,6 +93,8 @@ def symmetries(mesh: GridMesh, shape: Floats) -> tuple[Operation, ...]:
 
 def _rods_there(mesh: GridMesh, there: Floats, flat: Floats, near: float) -> tuple[Ints, Bools] | None:
     """The rod that lies where each rod is moved, and whether it runs the other way; None if one has no such rod."""
+    from scipy.spatial import cKDTree  # here: it takes a tenth of a second to import
+
     goals, moved = flat[mesh.ends].reshape(-1, 6), there[mesh.ends]
     tree = cKDTree(goals)
     same, rods = tree.query(moved.reshape(-1, 6))
