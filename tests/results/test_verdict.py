@@ -317,9 +317,10 @@ LATHS = [
     # 5 x 15 mm: (15/10)^2 at least, (5/3) of 40 %; then sqrt(1.05 / factor) times as thick, and as much of 40 %
     [(0.5, "made of 5 x 15 mm, it would carry about 1.12 times its own weight or more with clamped ends, using 67 % of "
            "larch's permanent design strength"),
-     (0.2, "made of rods about 2.3 times as thick, it would carry its own weight with clamped ends, using 92 % of"),
-     (0.1, "made of rods about 3.2 times as thick, it would carry its own weight with clamped ends, but they would use "
-           "130 % of larch's permanent design strength: support it, or take another material")],
+     (0.2, "made of rods about 2.3 times as thick, it would just carry its own weight with clamped ends, by "
+           "an estimate, using 92 % of"),
+     (0.1, "made of rods about 3.2 times as thick, it would just carry its own weight with clamped ends, by "
+           "an estimate, but they would use 130 % of larch's permanent design strength: support it, or take another material")],
 )  # fmt: skip
 def test_rods_that_would_carry_their_own_weight_are_named(factor: float, words: str) -> None:
     weights = [("self_weight.pinned.load_factor", factor / 2), ("self_weight.clamped.load_factor", factor)]

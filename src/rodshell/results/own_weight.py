@@ -118,7 +118,8 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> str:
                 f"weight or more with {ends} ends{_share(results, ends, sharper)}"
             )
     thicker = sqrt(ENOUGH / factor)
-    made = f"; made of rods about {rounded(thicker, 2)} times as thick, it would carry its own weight with {ends} ends"
+    rods = f"rods about {rounded(thicker, 2)} times as thick"
+    made = f"; made of {rods}, it would just carry its own weight with {ends} ends, by an estimate"
     if too_much := _too_much(results, ends, thicker):
         return (
             f"{made}, but they would {too_much}: support it, or take another material; rodshell check finds what "
