@@ -320,7 +320,8 @@ LATHS = [
      (0.2, "made of rods about 2.3 times as thick, it would just carry its own weight with clamped ends, by "
            "an estimate, using 92 % of"),
      (0.1, "made of rods about 3.2 times as thick, it would just carry its own weight with clamped ends, by "
-           "an estimate, but they would use 130 % of larch's permanent design strength: support it, or take another material")],
+           "an estimate, but they would use 130 % of larch's permanent design strength: support it, or take "
+           "another material")],
 )  # fmt: skip
 def test_rods_that_would_carry_their_own_weight_are_named(factor: float, words: str) -> None:
     weights = [("self_weight.pinned.load_factor", factor / 2), ("self_weight.clamped.load_factor", factor)]
