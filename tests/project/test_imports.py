@@ -55,9 +55,7 @@ def test_a_form_imports_no_writers_and_no_targets_that_it_does_not_use(tmp_path:
 
 
 @pytest.mark.slow
-def test_drawings_and_the_report_import_no_writer_of_dxf_and_no_network(
-    tmp_path: Path, of_numba: set[str]
-) -> None:
+def test_drawings_and_the_report_import_no_writer_of_dxf_and_no_network(tmp_path: Path, of_numba: set[str]) -> None:
     modules = imported(FORM.replace("csv", "svg,report"), tmp_path) - of_numba
     assert (tmp_path / "out" / "cap" / "report.html").is_file()
     assert "scipy" not in packages(modules)
