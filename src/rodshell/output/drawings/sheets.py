@@ -465,11 +465,11 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         along, up = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         words = f"match line to part {_part(*neighbour)}"
         steps = np.arange(4, int(np.linalg.norm(line[1] - line[0])) - 50, 2)[:, None] * along
-        places = np.concatenate([steps + off, steps - off - TEXT * up])
+        shifts = np.concatenate([steps + off, steps - off - TEXT * up])
         written = Text(words, line[0], TEXT, "TITLE", angle=angle, colour=pen.colour)
-        crossed = np.ceil(length_beneath(written.box(), places, drawn) / TEXT)
-        for place in places[np.argsort(crossed, kind="stable")]:
-            placed = replace(written, at=line[0] + place)
+        crossed = np.ceil(length_beneath(written.box(), shifts, drawn) / TEXT)
+        for shift in shifts[np.argsort(crossed, kind="stable")]:
+            placed = replace(written, at=line[0] + shift)
             if free.claim(placed.box()):
                 pencil.texts.append(placed)
                 break
