@@ -435,9 +435,9 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
 def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, part: Drawing) -> Drawing:
     """Lines along which a sheet meets its neighbours, with their names clear of the texts of its `part` of the drawing.
 
-    A name is on either side of its line, where it has the least length of drawn lines beneath it: none, or a few that
-    cross it, rather than a rod that it lies along. Of equal places the first is taken, those outside before those
-    inside; lengths count in steps of the text's size, so that each line across the name counts as one.
+    A name is next to its line, a row farther out, or inside, where it has the least length of drawn lines beneath it:
+    none, or a few that cross it, rather than a rod that it lies along. Of equal positions the first is taken, in this
+    order of rows; lengths count in steps of the text's size, so that each line across the name counts as one.
     """
     pencil, (row, column), free = Pencil(), here, Room(20.0)
     for text in part.texts:
@@ -465,7 +465,8 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         along, up = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         words = f"match line to part {_part(*neighbour)}"
         steps = np.arange(4, int(np.linalg.norm(line[1] - line[0])) - 50, 2)[:, None] * along
-        shifts = np.concatenate([steps + off, steps - off - TEXT * up])
+        middle = off + 0.5 * TEXT * up  # of the name's height, from its line
+        shifts = np.concatenate([steps + share * middle - 0.5 * TEXT * up for share in (1, 2, -1)])
         written = Text(words, line[0], TEXT, "TITLE", angle=angle, colour=pen.colour)
         crossed = np.ceil(length_beneath(written.box(), shifts, drawn) / TEXT)
         for shift in shifts[np.argsort(crossed, kind="stable")]:
