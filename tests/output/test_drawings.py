@@ -22,7 +22,7 @@ from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan, st
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, laid_out, room, tiled
 from rodshell.output.drawings.shell import SAME, bracing_drawing, elevations_drawing, erection_drawing, rod_curves
 from rodshell.output.grid import joint_places, rods_of
-from rodshell.output.labels import boxes_meet, lines_meet, spread
+from rodshell.output.labels import boxes_meet, length_beneath, lines_meet, spread
 from rodshell.output.options import DrawingStyle, OutputOptions
 from rodshell.results import Archive
 from rodshell.results.wording import rounding_of
@@ -133,6 +133,34 @@ def test_names_of_match_lines_are_clear_of_the_drawing_where_there_is_room() -> 
         drawn = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
         names += [text for text in sheet.content.texts if not lines_meet(text.box(), drawn)]
     assert sorted(text.text for text in names) == ["match line to part A1", "match line to part A2"]
+
+
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_names_of_match_lines_that_find_no_free_place_cross_few_lines_and_lie_along_none(share: float) -> None:
+    """Lines cross the sheets' common edge closer than a name is long; a rod runs next to the edge, where the name would
+    be first, over the lower half of the sheet or all of it."""
+    low, high = room(PAPER)
+    wide, tall = 1.5 * (high[0] - low[0]), high[1] - low[1] - 2 * OVERLAP
+    across = [np.array([[0.0, y], [wide, y]]) for y in (*np.arange(0.0, tall - 10.0, 30.0), tall)]
+    beside = [np.array([[x, 0.0], [x, share * tall]]) for x in (0.5 * wide + 4.0,)]
+    for sheet in tiled(Drawing("", "", 1.0, tuple(Line(points, "CUT") for points in (*across, *beside))), PAPER):
+        drawn = np.array([path.points for path in sheet.content.paths if path.layer == "CUT"])
+        (name,) = sheet.content.texts
+        met = np.array([line for line in drawn if lines_meet(name.box(), line[None])])
+        assert len(met) == 1
+        assert np.ptp(met[0], axis=0)[1] == 0.0
+
+
+def test_length_beneath_is_that_within_the_box() -> None:
+    """Across, along, oblique through a corner's sides, and past it; all of a turned box and its lines is the same."""
+    box = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 2.0], [0.0, 2.0]])
+    lines = np.array([[[5, -3], [5, 9]], [[-4, 1], [7, 1]], [[1, -1], [-1, 1]], [[8, 1], [12, 4]], [[-1, 5], [11, 5]]])
+    turn = np.array([[np.cos(0.7), np.sin(0.7)], [-np.sin(0.7), np.cos(0.7)]])
+    expected = 2.0 + 7.0 + 0.0 + 5.0 / 3.0
+    shifts = np.array([[0.0, 0.0], [0.0, 20.0]])
+    for axes in (np.eye(2), turn):
+        found = length_beneath(box @ axes, shifts @ axes, lines @ axes)
+        assert found == pytest.approx([expected, 0.0], abs=1e-9)
 
 
 def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:

@@ -298,8 +298,8 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     return bool(runs_through((lines - box.sum(axis=0) / 4) @ axes).any())
 
 
-def lines_meet_moved(box: Floats, shifts: Floats, lines: Floats) -> Bools:
-    """(k,) whether one of the lines runs through the rectangle where it is after each shift, as of `lines_meet`.
+def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:
+    """(k,) length of all lines together that is within the rectangle where it is after each shift.
 
     Parameters
     ----------
@@ -309,8 +309,13 @@ def lines_meet_moved(box: Floats, shifts: Floats, lines: Floats) -> Bools:
     lines = lines_near(lines, corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf))
     sides = box[[1, 3]] - box[0]
     axes = (2.0 * sides / (sides**2).sum(axis=1)[:, None]).T
-    seen = (lines - box.sum(axis=0) / 4) @ axes - (shifts @ axes)[:, None, None]
-    return np.asarray(runs_through(seen).any(axis=1))
+    start = (lines[:, 0] - box.sum(axis=0) / 4) @ axes - (shifts @ axes)[:, None]  # the rectangle is from -1 to 1
+    along = (lines[:, 1] - lines[:, 0]) @ axes
+    along = np.where(np.abs(along) < 1e-12, 1e-12, along)
+    low, high = (-1.0 - start) / along, (1.0 - start) / along  # shares of each line at which it meets the sides
+    enter, leave = np.minimum(low, high).max(axis=-1), np.maximum(low, high).min(axis=-1)
+    shares = np.maximum(np.minimum(leave, 1.0) - np.maximum(enter, 0.0), 0.0)
+    return np.asarray(shares @ np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1))
 
 
 def lines_near(lines: Floats, low: Floats, high: Floats) -> Floats:
