@@ -174,6 +174,21 @@ def test_every_stage_of_a_path_forwards_is_a_stable_equilibrium_with_its_ends_on
         np.testing.assert_allclose(found.state, state, atol=1e-8)
 
 
+def test_a_path_forwards_that_snaps_often_is_not_given_up_before_it_arrives() -> None:
+    """Backwards it ends next to the final shape, so that all stages are those of the path forwards."""
+    _, target, layout, anchor = random_case(12)
+    form = rs.find_form(target, layout, ROD, anchor=anchor, ends=("pinned",))
+    way = deployed(form, 8)
+    assert way.reached_from_flat
+    assert way.lost_at is None
+    assert way.snaps
+    for share, (shell, state) in zip(way.share[1:], way.shells, strict=True):
+        supports, forces = Supports(shell.held_ends()), shell.stretch.stiffness * shell.stretch.strains(state)
+        found = find_equilibrium(Problem(shell.elements, shell.stretch, supports, 0.2), state, forces)
+        assert found.report.stable, share
+        np.testing.assert_allclose(found.state, state, atol=1e-8)
+
+
 def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Backwards it ends at 56 %, and forwards nothing is found."""
     trace = module.trace
