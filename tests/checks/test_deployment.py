@@ -9,12 +9,14 @@ import pytest
 import rodshell as rs
 from rodshell.checks import Deployment, check, curvatures, deploy
 from rodshell.checks import deployment as module
+from rodshell.checks.deployment import LOWEST
 from rodshell.formfinding.popup import laid_below
 from rodshell.formfinding.trim import Boundary
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import find_equilibrium
-from rodshell.solve.path import relax
+from rodshell.solve.path import relax, trace
 from rodshell.solve.problem import Problem, Supports
+from rodshell.units import percent_text
 from tests.acceptance.targets_random import random_case
 from tests.checks.shells import ROD, dome, wave
 
@@ -174,6 +176,26 @@ def test_every_stage_of_a_path_forwards_is_a_stable_equilibrium_with_its_ends_on
         np.testing.assert_allclose(found.state, state, atol=1e-8)
 
 
+@cache
+def frequent() -> rs.Form:
+    """A shell that snaps several times between flat and its final shape."""
+    _, target, layout, anchor = random_case(12)
+    return rs.find_form(target, layout, ROD, anchor=anchor, ends=("pinned",))
+
+
+def test_a_path_forwards_that_snaps_often_is_not_given_up_before_it_arrives() -> None:
+    """Backwards it ends next to the final shape, so that all stages are those of the path forwards."""
+    way = deployed(frequent(), 8)
+    assert way.reached_from_flat
+    assert way.lost_at is None
+    assert way.snaps
+    for share, (shell, state) in zip(way.share[1:], way.shells, strict=True):
+        supports, forces = Supports(shell.held_ends()), shell.stretch.stiffness * shell.stretch.strains(state)
+        found = find_equilibrium(Problem(shell.elements, shell.stretch, supports, 0.2), state, forces)
+        assert found.report.stable, share
+        np.testing.assert_allclose(found.state, state, atol=1e-8)
+
+
 def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Backwards it ends at 56 %, and forwards nothing is found."""
     trace = module.trace
@@ -189,10 +211,32 @@ def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPat
     assert len(way.positions) == 3
     assert way.lost_at == 0.5625
     assert way.reached_from_flat is None
-    assert way.warnings == (
-        "the deployment from flat could not be followed below 56 % of the deployment: stages are missing, and whether "
-        "the shell reaches its final shape from flat is not known",
+    (words,) = way.warnings
+    assert words == (
+        "the deployment from flat could not be followed: forwards up to 1.6 % of it only, and back from the final "
+        "shape down to 1.6 %; stages are missing, and whether the shell reaches its final shape from flat is not known"
     )
+
+
+def test_a_lost_path_says_from_both_ends_where_and_in_what_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The limit point by arc length, against steps of the share that shrink until Newton's method fails."""
+    popped = frequent().popped["pinned"]
+    monkeypatch.setattr(module, "MOST", 300)
+    way = deploy(popped.shell, popped.equilibrium, stages=8)
+    assert way.lost_at == 1.0
+    assert way.gap is not None
+    assert way.gap.limit == "limit point"
+    path = module._Path(popped.shell, popped.equilibrium, lambda share: None)
+    (stage,) = path.backwards(popped.equilibrium, [1.0])
+    short = trace(
+        lambda share: path._problem(share, popped.shell.elements), stage[1], 1.0, 0.5,
+        shortest=1e-4, snap=False, most_factorizations=1000,
+    )  # fmt: skip
+    assert way.gap.left == pytest.approx(short.t, abs=4e-4)
+    assert LOWEST < way.gap.reached < 1
+    (words,) = way.warnings
+    assert f"forwards up to {percent_text(way.gap.reached)} of it only" in words
+    assert f"down to {percent_text(way.gap.left)}, where the path ends in a limit point" in words
 
 
 @pytest.mark.slow

@@ -384,6 +384,7 @@ def _merged_stages(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Dep
         shells=(),
         snaps=tuple(sorted({snap for way in ways for snap in way.snaps}, key=lambda snap: snap.start)),
         lost_at=max(lost, default=None),
+        gap=max((way.gap for way in ways if way.gap is not None), key=lambda gap: gap.left, default=None),
         reached_from_flat=_all([way.reached_from_flat for way in ways]),
         elsewhere=max(elsewhere, key=lambda shape: shape.distance, default=None),
         guided=max((way.guided for way in ways if way.guided is not None), default=None),

@@ -11,7 +11,7 @@ clamps after the deployment.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 from math import prod
 
@@ -24,8 +24,10 @@ from rodshell.model import Shell
 from rodshell.model.shell import last_edges
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
+from rodshell.solve.load import Load
+from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.path import EASY, Snap, Trace, follow, relax, trace, unaccounted
-from rodshell.solve.problem import Problem, half_width
+from rodshell.solve.problem import Problem, Supports, half_width
 from rodshell.units import length_text, percent_text
 
 Progress = Callable[[float], None]
@@ -35,7 +37,7 @@ DEGREE = 3  # at most, of the polynomials by which the next shape is guessed
 SAME = 1e-3  # of the shell's size: shapes further apart are different ones
 LOWEST = 1 / 64  # share of the deployment at which the grid has left its plane: by about an eighth of its final height
 SHORTEST = 0.01  # share of the deployment: a snap is located to this
-MOST = 1000  # factorisations of a path forwards; those that arrive take 30 to 750
+MOST = 4000  # factorisations of a path forwards; those that arrive take 30 to 2200, of which one snap may take 900
 SHORTEST_TURN = 0.02  # share of the clamps' angles: a snap is located to this
 MOST_TURNING = 400  # factorisations of turning the clamps; the paths that arrive take 3 to 33
 AT_ONCE = 40  # iterations from the lifted grid to an equilibrium, before the energy is followed down
@@ -62,6 +64,28 @@ class Elsewhere:
 
 
 @dataclass(frozen=True)
+class Gap:
+    """Where a deployment was lost, seen from flat and from the final shape.
+
+    Parameters
+    ----------
+    reached : share up to which the path forwards was followed, on whichever branch; 0 where none was found from flat.
+    left : share down to which the path backwards is stable.
+    limit : what ends it there, as of a `LoadPath`.
+    """
+
+    reached: float
+    left: float
+    limit: Limit
+
+    @property
+    def words(self) -> str:
+        forwards = f"forwards up to {percent_text(self.reached)} of it only" if self.reached else "not at all forwards"
+        ends = f", where the path ends in a {self.limit}" if self.limit in ("limit point", "bifurcation") else ""
+        return f"{forwards}, and back from the final shape down to {percent_text(self.left)}{ends}"
+
+
+@dataclass(frozen=True)
 class Deployment:
     """Stages of a deployment, in the order of the building site.
 
@@ -72,7 +96,8 @@ class Deployment:
     shells : at each stage but the flat grid, with its state (N, 3), whose twist angles belong to that shell's source
         frames; none where ways of several shells were joined.
     snaps : between stages, each in shares of the deployment: there the shell snaps forward by itself.
-    lost_at : share below which no equilibrium was found, or None; only the flat grid then stands before it.
+    lost_at : share of the lowest stage that was found, or None; only the flat grid then stands before it.
+    gap : where it was lost, or None.
     reached_from_flat : whether the shell comes to its final shape when it is lifted a little towards it and its ends
         are driven on straight lines; None where that could not be followed.
     elsewhere : where it comes to rest instead.
@@ -85,6 +110,7 @@ class Deployment:
     shells: tuple[tuple[Shell, Floats], ...]
     snaps: tuple[Snap, ...] = ()
     lost_at: float | None = None
+    gap: Gap | None = None
     reached_from_flat: bool | None = None
     elsewhere: Elsewhere | None = None
     guided: tuple[float, float] | None = None
@@ -107,15 +133,10 @@ class Deployment:
                 f"lifted from flat and driven by its ends alone, the shell comes to rest in another shape{where}: "
                 "it has to be guided into its final shape"
             )
-        if self.lost_at is not None:
-            below = (
-                "at all"
-                if len(self.shells) <= 1
-                else f"below {percent_text(self.lost_at)} of the deployment: stages are missing"
-            )
+        if self.gap is not None:
             words.append(
-                f"the deployment from flat could not be followed {below}, and whether the shell reaches its final "
-                "shape from flat is not known"
+                f"the deployment from flat could not be followed: {self.gap.words}; stages are missing, and whether "
+                "the shell reaches its final shape from flat is not known"
             )
         return tuple(words)
 
@@ -139,7 +160,7 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
     shares = ((np.arange(stages, 0, -1) / stages) ** 2).tolist()
     every = shares if shares[-1] <= LOWEST else [*shares, LOWEST]
     upper = path.backwards(found, every)
-    lower, lost, elsewhere, guided = _Forwards([], (), True), None, None, None
+    lower, lost, gap, elsewhere, guided = _Forwards([], (), True), None, None, None, None
     down_to, final = upper[-1][0], upper[0][1]
     if len(upper) < len(every):
         lower = path.forwards(upper, path.lifted(upper[-1], every[-1]), every[::-1])
@@ -147,6 +168,7 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
             other = path.forwards(upper, low, every[::-1])
             lower = other if other.arrived or lower.arrived is None else lower
     if lower.arrived is None:
+        gap = Gap(lower.reached, *path.end(upper[-1], every[-1]))
         lower, lost = _Forwards([], (), None), down_to
     elif lower.arrived and lower.stages:
         down_to = lower.stages[-1][0]  # where it meets the path backwards
@@ -161,17 +183,19 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
         np.array([path.flat, *(shell.positions(there.state) for _, there in wanted)]),
         tuple((shell.with_elements(there.elements), there.state) for _, there in wanted),
         tuple(snap for snap in lower.snaps if guided is None or snap.stop <= guided[0]),
-        lost, lower.arrived, elsewhere, guided, path.factorizations,
+        lost, gap, lower.arrived, elsewhere, guided, path.factorizations,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Forwards:
-    """Stages and snaps of a path forwards; whether it arrived at a stage of the path backwards, None if it was lost."""
+    """Stages and snaps of a path forwards; whether it arrived at a stage of the path backwards, None if it was lost;
+    and the share that was reached."""
 
     stages: list[Stage]
     snaps: tuple[Snap, ...]
     arrived: bool | None
+    reached: float = 0.0
 
 
 class _Path:
@@ -217,7 +241,7 @@ class _Path:
             here, left = way.found, left - way.factorizations
             snaps.extend(way.snaps)
             if way.t < share:
-                return _Forwards(found, tuple(snaps), None)
+                return _Forwards(found, tuple(snaps), None, way.t)
             found.append((share, here))
             if share in known and self.apart(here, known[share]) <= SAME:
                 return _Forwards(found, tuple(snaps), True)
@@ -233,6 +257,23 @@ class _Path:
         )
         self._counted(found)
         return found if found.report.stable else None
+
+    def end(self, last: Stage, share: float) -> tuple[float, Limit]:
+        """Where the stable path backwards from a stage ends, above a small share, and in what kind of point.
+
+        By its arc length, which converges right up to a limit point, whereas steps of the share fail before it.
+        """
+        (start, here), motions = last, np.zeros_like(last[1].state)
+        if not here.report.stable:
+            return start, "unstable unloaded"
+        motions[self.shell.ends] = start * (self._first - self._last)
+        at_rest = replace(here, problem=replace(here.problem, constraint=Supports(self.shell.held_ends())))
+        way = load_path(
+            at_rest, Load(motions=motions), most=1 - share / start, stations=(),
+            progress=lambda count, factor: self._progress(start * (1 - factor)),
+        )  # fmt: skip
+        self.factorizations += way.factorizations
+        return start * (1 - way.factor), way.limit
 
     def apart(self, here: Equilibrium, there: Equilibrium) -> float:
         """Distance of two shapes over half the shell's width."""
