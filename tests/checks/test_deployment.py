@@ -213,8 +213,8 @@ def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPat
     assert way.reached_from_flat is None
     (words,) = way.warnings
     assert words == (
-        "the deployment from flat could not be followed: forwards up to 1.6 % of it only, and back from the final "
-        "shape down to 1.6 %; stages are missing, and whether the shell reaches its final shape from flat is not known"
+        "the deployment could not be followed all the way: from flat up to 1.6 %, and from the final shape back down "
+        "to 1.6 %; stages are missing, and whether the shell reaches its final shape from flat is not known"
     )
 
 
@@ -235,7 +235,7 @@ def test_a_lost_path_says_from_both_ends_where_and_in_what_point(monkeypatch: py
     assert way.gap.left == pytest.approx(short.t, abs=4e-4)
     assert LOWEST < way.gap.reached < 1
     (words,) = way.warnings
-    assert f"forwards up to {percent_text(way.gap.reached)} of it only" in words
+    assert f"from flat up to {percent_text(way.gap.reached)}, " in words
     assert f"down to {percent_text(way.gap.left)}, where the path ends in a limit point" in words
 
 

@@ -80,9 +80,9 @@ class Gap:
 
     @property
     def words(self) -> str:
-        forwards = f"forwards up to {percent_text(self.reached)} of it only" if self.reached else "not at all forwards"
+        from_flat = f"up to {percent_text(self.reached)}" if self.reached else "not at all"
         ends = f", where the path ends in a {self.limit}" if self.limit in ("limit point", "bifurcation") else ""
-        return f"{forwards}, and back from the final shape down to {percent_text(self.left)}{ends}"
+        return f"from flat {from_flat}, and from the final shape back down to {percent_text(self.left)}{ends}"
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class Deployment:
             )
         if self.gap is not None:
             words.append(
-                f"the deployment from flat could not be followed: {self.gap.words}; stages are missing, and whether "
+                f"the deployment could not be followed all the way: {self.gap.words}; stages are missing, and whether "
                 "the shell reaches its final shape from flat is not known"
             )
         return tuple(words)

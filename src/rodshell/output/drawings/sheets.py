@@ -13,7 +13,7 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text
+from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
 from rodshell.output.labels import Room, length_beneath
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
@@ -435,14 +435,15 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
 def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, part: Drawing) -> Drawing:
     """Lines along which a sheet meets its neighbours, with their names clear of the texts of its `part` of the drawing.
 
-    A name is next to its line, a row farther out, or inside, where it has the least length of drawn lines beneath it:
-    none, or a few that cross it, rather than a rod that it lies along. Of equal positions the first is taken, in this
-    order of rows; lengths count in steps of the text's size, so that each line across the name counts as one.
+    A name is next to its line or a row farther out, where it has the least length of drawn lines beneath it: none, or a
+    few that cross it, rather than a rod that it lies along. Of equal positions the first is taken, in this order of
+    rows; lengths count in steps of the text's size, so that each line across the name counts as one.
     """
     pencil, (row, column), free = Pencil(), here, Room(20.0)
     for text in part.texts:
-        free.take(text.box())
-    paths = [path.points for path in part.paths]
+        if not within(text.box(), low, high):
+            free.take(text.box())
+    paths = [path.points for path in part.paths if not within(path.points, low, high)]
     ends = [points[:-1] for points in paths], [points[1:] for points in paths]
     drawn = np.stack([np.concatenate([np.empty((0, 2)), *points]) for points in ends], axis=1)
     pen = Pen("#b3372c", 0.25, (6.0, 1.5, 1.0, 1.5))
@@ -466,7 +467,7 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         words = f"match line to part {_part(*neighbour)}"
         steps = np.arange(4, int(np.linalg.norm(line[1] - line[0])) - 50, 2)[:, None] * along
         middle = off + 0.5 * TEXT * up  # of the name's height, from its line
-        shifts = np.concatenate([steps + share * middle - 0.5 * TEXT * up for share in (1, 2, -1)])
+        shifts = np.concatenate([steps + share * middle - 0.5 * TEXT * up for share in (1, 2)])
         written = Text(words, line[0], TEXT, "TITLE", angle=angle, colour=pen.colour)
         crossed = np.ceil(length_beneath(written.box(), shifts, drawn) / TEXT)
         for shift in shifts[np.argsort(crossed, kind="stable")]:
