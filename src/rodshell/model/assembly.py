@@ -155,10 +155,11 @@ class Assembly:
         numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
         flat = np.concatenate([np.arange(0), *(blocks.ravel() for blocks in element_blocks)])
         indptr, indices, above, every = _pattern(flat, numbers, widths, freedom.count)
-        stops = np.cumsum(numbers * widths**2)[:-1]
-        each = zip(np.split(every, stops), element_blocks, strict=True) if len(widths) else ()
-        slots = tuple(slots.reshape(len(blocks), blocks.shape[1], blocks.shape[1]) for slots, blocks in each)
-        return Assembly(indptr, indices, freedom.count, above, slots)
+        slots, stop = list[Ints](), 0
+        for number, width in zip(numbers.tolist(), widths.tolist(), strict=True):
+            begin, stop = stop, stop + number * width**2
+            slots.append(every[begin:stop].reshape(number, width, width))
+        return Assembly(indptr, indices, freedom.count, above, tuple(slots))
 
     def has_pattern_of(self, other: "Assembly") -> bool:
         """Whether the matrices of another assembly have the same pattern, whatever elements they are summed from."""
@@ -203,6 +204,8 @@ class Assembly:
     def _parts(self) -> list[tuple[int, int]]:
         """Ranges of blocks in whose columns about as many values are stored, one for each thread."""
         count = threads() if len(self.indices) >= WORTHWHILE else 1
+        if count == 1:
+            return [(0, len(self._count))]
         columns = np.searchsorted(self.indptr, np.linspace(0, len(self.indices), count + 1))
         stops = np.searchsorted(np.cumsum(self._count), columns).tolist()
         return list(pairwise([0, *stops[1:-1], len(self._count)]))
@@ -221,12 +224,12 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
     The blocks of all elements lie in a row in `flat`, of each set `numbers` of elements with `widths` of blocks.
     """
     n, sets = len(count), len(widths)
-    touching = np.zeros(n, dtype=np.int64)
-    for at in flat:
-        touching[at] += 1
     start, filled, pairs = np.zeros(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), 0
+    for at in flat:
+        start[at + 1] += 1
     for j in range(n):
-        start[j + 1], filled[j] = start[j] + touching[j], start[j]
+        start[j + 1] += start[j]
+        filled[j] = start[j]
     elements = np.empty((len(flat), 4), dtype=np.int64)  # that touch each block: its place there, blocks, width, slots
     begin = 0
     for s in range(sets):
@@ -235,11 +238,9 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
             for b in range(k):
                 e = filled[flat[begin + b]]
                 elements[e, 0], elements[e, 1], elements[e, 2], elements[e, 3] = b, begin, k, pairs
-                filled[flat[begin + b]] += 1
+                filled[flat[begin + b]] = e + 1
             begin, pairs = begin + k, pairs + k * k
     slots = np.empty(pairs, dtype=np.int64)
-    for e in range(pairs):
-        slots[e] = -1
     rows, kept, above = (
         np.empty(pairs + n, dtype=np.int64),
         np.empty(n + 1, dtype=np.int64),
@@ -250,41 +251,41 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
         mark[j] = -1
     used, values, unknowns = 0, 0, 0
     for j in range(n):  # block column by block column: its rows ascending, once each, a few dozen at most
-        kept[j], above[j] = used, 0
-        if count[j] == 0:
-            continue
-        for e in range(start[j], start[j + 1]):
+        first, high = used, 0
+        for e in range(start[j], start[j + 1] if count[j] > 0 else start[j]):
+            begin = elements[e, 1]
             for a in range(elements[e, 2]):
-                i = flat[elements[e, 1] + a]
+                i = flat[begin + a]
                 if i < j and mark[i] != j and count[i] > 0:
                     mark[i], k = j, used
-                    while k > kept[j] and rows[k - 1] > i:
+                    while k > first and rows[k - 1] > i:
                         rows[k] = rows[k - 1]
                         k -= 1
                     rows[k] = i
                     used += 1
-        for e in range(kept[j], used):
-            place[rows[e]] = values + above[j]
-            above[j] += count[rows[e]]
-        place[j], mark[j] = values + above[j], j
+        for e in range(first, used):
+            place[rows[e]] = values + high
+            high += count[rows[e]]
+        if count[j] > 0:
+            place[j], mark[j] = values + high, j
+        kept[j], above[j] = first, high
         for e in range(start[j], start[j + 1]):
-            b, k = elements[e, 0], elements[e, 2]
+            b, begin, k, slot = elements[e, 0], elements[e, 1], elements[e, 2], elements[e, 3]
             for a in range(k):
-                i = flat[elements[e, 1] + a]
-                if (i < j or a == b) and count[i] > 0:
-                    slots[elements[e, 3] + a * k + b] = place[i]
-        values += count[j] * above[j] + count[j] * (count[j] + 1) // 2
+                i = flat[begin + a]
+                slots[slot + a * k + b] = place[i] if mark[i] == j and (i < j or a == b) else -1
+        values += count[j] * high + count[j] * (count[j] + 1) // 2
         unknowns += count[j]
     kept[n] = used
     indptr, indices = np.zeros(unknowns + 1, dtype=np.int64), np.empty(values, dtype=np.int64)
-    for j in range(n):
-        filled[j] = 0 if j == 0 else filled[j - 1] + count[j - 1]
     value, unknown = 0, 0
     for j in range(n):
+        filled[j] = unknown
         for c in range(count[j]):
             for e in range(kept[j], kept[j + 1]):
-                for r in range(count[rows[e]]):
-                    indices[value] = filled[rows[e]] + r
+                i = rows[e]
+                for r in range(filled[i], filled[i] + count[i]):
+                    indices[value] = r
                     value += 1
             for r in range(c + 1):
                 indices[value] = filled[j] + r

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
+from math import isfinite
 
 import numpy as np
 
@@ -201,7 +202,7 @@ def find_equilibrium(
         except SingularError:
             status = Status.DIVERGED
             break
-        if not (np.isfinite(moved) and np.isfinite(forces_next).all()):
+        if not (isfinite(moved) and np.isfinite(forces_next).all()):
             status = Status.DIVERGED
             break
         state, forces = state_next, forces_next

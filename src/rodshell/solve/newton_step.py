@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all
 from rodshell.solve.problem import NO_CURVATURE, Problem
@@ -160,7 +161,7 @@ class NewtonStep:
         motion = free.expand(direction)
         if prescribed is not None:
             motion += prescribed
-        reach = float(np.sqrt(np.einsum("ij,ij->i", motion, motion).max()))
+        reach = float(np.sqrt(dot(motion, motion).max()))
         if self._chord and not reach <= SLOW * self._last[0] * problem.length:  # of no use: Newton's step instead
             self._chord = False
             return self.take(state, forces, descend)
@@ -239,7 +240,7 @@ class NewtonStep:
         """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated."""
         self._shift_until_definite()
         mode = self._free.expand(self._inverse_iteration(12)[0])
-        return np.asarray(mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max()))
+        return np.asarray(mode / np.sqrt(dot(mode, mode).max()))
 
     def _direction(self, right: Floats, descend: bool) -> Floats | None:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None

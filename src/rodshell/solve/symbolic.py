@@ -116,28 +116,26 @@ def start_after(count, start):  # type: ignore[no-untyped-def]
 @njit()
 def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
     """The other blocks to which each block of unknowns is coupled (see `Blocks`); first, whether these are blocks."""
-    n = len(begin) - 1
-    block = np.empty(begin[n], dtype=np.int64)
-    for b in range(n):
-        for k in range(begin[b], begin[b + 1]):
-            block[k] = b
-    count, start, above = np.zeros(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
-    whole = True
+    n, other = len(begin) - 1, 0  # entries that are not where those of blocks are
+    block, above = np.empty(begin[n], dtype=np.int64), np.empty(n, dtype=np.int64)
+    count, start = np.zeros(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64)
     for b in range(n):
         j, last = begin[b], begin[b + 1] - 1
+        e = indptr[j]
         above[b] = indptr[last + 1] - indptr[last] - (last + 1 - j)
+        stop = e + above[b]
         for k in range(j, last + 1):  # every column has the rows of the first, and the block's own
-            whole = whole and indptr[k + 1] - indptr[k] == above[b] + k - j + 1
-        if not whole:
+            block[k] = b
+            other += indptr[k + 1] - indptr[k] != above[b] + k - j + 1
+        if other > 0:
             break
         for k in range(j + 1, last + 1):
-            for e in range(above[b]):
-                whole = whole and indices[indptr[k] + e] == indices[indptr[j] + e]
-        e = indptr[j]
-        while e < indptr[j] + above[b]:
+            for d in range(above[b]):
+                other += indices[indptr[k] + d] != indices[e + d]
+        while e < stop:
             a = block[indices[e]]
             for k in range(begin[a], begin[a + 1]):
-                whole = whole and e < indptr[j + 1] - 1 and indices[e] == k
+                other += e == stop or indices[e] != k
                 e += 1
             count[a] += 1
             count[b] += 1
@@ -145,16 +143,17 @@ def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
     neighbours, source, place = np.empty(start[n], dtype=np.int64), np.empty(start[n], dtype=np.int64), count
     for b in range(n):
         place[b] = start[b]
-    for b in range(n if whole else 0):
+    for b in range(n if other == 0 else 0):
         e = indptr[begin[b]]
-        while e < indptr[begin[b]] + above[b]:
+        stop = e + above[b]
+        while e < stop:
             a = block[indices[e]]
             neighbours[place[a]], neighbours[place[b]] = b, a
             source[place[a]] = source[place[b]] = e
             place[a] += 1
             place[b] += 1
             e += begin[a + 1] - begin[a]
-    return whole, start, neighbours, source, above
+    return other == 0, start, neighbours, source, above
 
 
 @njit()
