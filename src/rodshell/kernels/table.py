@@ -43,6 +43,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_cut": "i2 i1 f1 i2 i1 i f1",
         "_divided": "f2 i1 f1 i1 i1 i",
         "_edges_and_bends": "i1 i1 f1",
+        "_fixed": "i2 f2 f1 i1",
         "_spans": "i1 i1 f1 f2",
     },
     "model.assembly": {
@@ -50,6 +51,10 @@ KERNELS: dict[str, dict[str, str]] = {
         "_pattern": "i1 i1 i1 i1",
         "_reduce": "f2 f3 i1 i",
         "_scatter": "f3 i2 i3 i1 i1 f3 i i f1",
+    },
+    "nets.apron": {
+        "_prolong": "f1 i2 b2 i1 f2",
+        "_stretches": "f1 f1 b2 f2 f",
     },
     "nets.chebyshev": {
         "_interpolate": "f1 f1 f3 i1 b1 i1 f1 f2",

@@ -274,45 +274,103 @@ def _fixed_points(grid: FlatGrid, marks: Sequence[Sequence[float]]) -> tuple[Int
 
     The start, the marks and the end of each rod get a new node each, unless there is a joint or an earlier one of them.
     """
-    every, sides = np.arange(len(grid.rods)), 2 * len(grid.crossings)
-    given = np.array([s for rod, more in zip(grid.rods, marks, strict=True) for s in (rod.start, *more, rod.end)])
-    counts = np.array([len(more) + 2 for more in marks])
-    last = np.cumsum(counts) - 1
-    lengths = given[last] - given[last + 1 - counts]
-    rod = np.concatenate([grid.crossings.rods.ravel(), np.repeat(every, counts)])
-    s = np.concatenate([grid.crossings.at.ravel(), given])
-    order = np.lexsort((s, rod))
-    along = order[order < sides]
-    joint_nodes = _merge_joints(along // 2, rod[along], s[along], 1e-7 * lengths.max(initial=0.0))
-    node = np.append(np.repeat(joint_nodes, 2), np.full(len(s) - sides, -1))
-    again = np.flatnonzero((np.diff(rod[along]) == 0) & (np.diff(node[along]) == 0))
-    if len(again):  # each joint once on each of its rods: three rods make three crossings
-        order = order[np.isin(order, along[again + 1], invert=True)]
-    rod, s, node, rank = rod[order], s[order], node[order], np.where(order < sides, -1, order)
-    apart = (rod[1:] != rod[:-1]) | (s[1:] - s[:-1] > 1e-9 * lengths[rod[1:]])
-    begin = np.flatnonzero(np.append(True, apart))  # of points of a rod at one place the first is kept, and every joint
-    kept = rank == np.repeat(np.minimum.reduceat(rank, begin), np.diff(np.append(begin, len(rank))))
-    joints, fresh = int(joint_nodes.max(initial=-1)) + 1, np.flatnonzero(kept & (rank >= 0))
-    node[fresh[np.argsort(rank[fresh])]] = joints + np.arange(len(fresh))
-    first = np.searchsorted(rod[kept], np.append(every, len(every)))
-    return first, s[kept], node[kept], joints + len(fresh), joint_nodes
+    given, begin = list[float](), [0]
+    for rod, more in zip(grid.rods, marks, strict=True):
+        given += (rod.start, *more, rod.end)
+        begin.append(len(given))
+    found: tuple[Ints, Floats, Ints, int, Ints] = _fixed(
+        grid.crossings.rods, grid.crossings.at, np.array(given, dtype=float), np.array(begin)
+    )
+    return found
 
 
-def _merge_joints(joint: Ints, rod: Ints, at: Floats, tiny: float) -> Ints:
-    """Node of each crossing: crossings at one point (of three rods or more) share their node.
+@njit()
+def _fixed(crossings, at, given, begin):  # type: ignore[no-untyped-def]
+    """See `_fixed_points`: `crossings` (c, 2) and where they are (c, 2); the `given` points, rod by rod, of which those
+    of each rod `begin` (m + 1,) there."""
+    rods, sides, longest = len(begin) - 1, 2 * len(crossings), 0.0
+    size = sides + len(given)  # both sides of each crossing, then the given points
+    rod, s, first = np.empty(size, dtype=np.int64), np.empty(size), np.zeros(rods + 1, dtype=np.int64)
+    for k in range(sides):
+        rod[k], s[k] = crossings[k // 2, k % 2], at[k // 2, k % 2]
+    for r in range(rods):
+        longest = max(longest, given[begin[r + 1] - 1] - given[begin[r]])
+        for k in range(begin[r], begin[r + 1]):
+            rod[sides + k], s[sides + k] = r, given[k]
+    for k in range(size):
+        first[rod[k] + 1] += 1
+    for r in range(rods):
+        first[r + 1] += first[r]
+    order, stop = np.empty(size, dtype=np.int64), first[:rods].copy()
+    for k in range(size):  # sorted along each rod by insertion: crossings mostly come in order
+        n = stop[rod[k]]
+        stop[rod[k]] += 1
+        while n > first[rod[k]] and s[order[n - 1]] > s[k]:
+            order[n] = order[n - 1]
+            n -= 1
+        order[n] = k
+    joint_nodes, joints = _merge_joints(order, rod, s, sides, 1e-7 * longest)
+    node, kept = np.empty(size, dtype=np.int64), np.zeros(size, dtype=np.bool_)
+    for r in range(rods):
+        tiny, last, before, best = 1e-9 * (given[begin[r + 1] - 1] - given[begin[r]]), -np.inf, -1, -1
+        for n in range(first[r], first[r + 1]):
+            k = order[n]
+            if k < sides:
+                node[k] = joint_nodes[k // 2]
+                again, before = node[k] == before, node[k]
+                if again:  # each joint once on each of its rods: three rods make three crossings
+                    continue
+            if s[k] - last > tiny:
+                best = size
+            # of points at one place the first is kept, and every joint
+            if k < sides or k < best:
+                if sides <= best < size:
+                    kept[best] = False
+                kept[k], best = True, min(best, k)
+            last = s[k]
+    count = joints
+    for k in range(sides, size):
+        if kept[k]:
+            node[k] = count
+            count += 1
+    stations, nodes, used = np.empty(size), np.empty(size, dtype=np.int64), 0
+    for r in range(rods):
+        start, first[r] = first[r], used
+        for n in range(start, first[r + 1]):
+            if kept[order[n]]:
+                stations[used], nodes[used] = s[order[n]], node[order[n]]
+                used += 1
+    first[rods] = used
+    return first, stations[:used], nodes[:used], count, joint_nodes
+
+
+@njit()
+def _merge_joints(order, rod, s, sides, tiny):  # type: ignore[no-untyped-def]
+    """The node of each crossing, and their number: crossings at one point (of three rods or more) share their node.
 
     They are neighbours along each of their rods, with no more than round-off between them: less than `tiny` [m].
-
-    Parameters
-    ----------
-    joint, rod, at : (2c,) crossings along one rod after the other, the rod, and where they are on it [m].
+    `order` has the points along one rod after the other, see `_fixed`.
     """
-    node, together = np.arange(len(joint) // 2), (np.diff(rod) == 0) & (np.diff(at) < tiny)
-    if not together.any():
-        return node
-    for a, b in zip(joint[:-1][together], joint[1:][together], strict=True):
-        node[node == node[b]] = node[a]
-    return np.unique(node, return_inverse=True)[1].astype(np.intp)
+    node, before = np.arange(sides // 2), -1
+    used = np.zeros(len(node), dtype=np.int64)
+    for k in order:
+        if k < sides:
+            if before >= 0 and rod[k] == rod[before] and s[k] - s[before] < tiny:
+                old, new = node[k // 2], node[before // 2]
+                for c in range(len(node)):
+                    if node[c] == old:
+                        node[c] = new
+            before = k
+    for c in range(len(node)):
+        used[node[c]] = 1
+    joints = 0
+    for c in range(len(node)):
+        if used[c]:
+            used[c] = joints
+            joints += 1
+    for c in range(len(node)):
+        node[c] = used[node[c]]
+    return node, joints
 
 
 @njit(error_model="numpy")

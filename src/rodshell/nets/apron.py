@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
+from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets.compass import Net
 
@@ -34,12 +35,11 @@ def with_apron(rods: Sequence[FlatRod], net: Net, lines: tuple[Floats, Floats], 
     rows, columns = np.searchsorted(net.u, u - 1e-12), np.searchsorted(net.v, v - 1e-12)
     alive = np.isfinite(net.points[rows[:, None], columns, 0])
     families = [
-        _Family(name, stations, offsets, live, [rod for rod in rods if rod.family == name])
+        _Family(name, stations, offsets, np.ascontiguousarray(live), rods, clearance)
         for name, stations, offsets, live in (("u", u, v, alive.T), ("v", v, u, alive))
     ]
-    joints = [family.joints(clearance) for family in families]
-    both = joints[0] | joints[1].T
-    return FlatGrid.of([*families[0].prolonged(both), *families[1].prolonged(both.T)])
+    both = families[0].joints.T | families[1].joints
+    return FlatGrid.of([*families[0].prolonged(np.ascontiguousarray(both.T)), *families[1].prolonged(both)])
 
 
 class _Family:
@@ -51,45 +51,89 @@ class _Family:
     stations : (n,) where the lines are crossed [m].
     offsets : (m,) of the lines [m].
     live : (m, n) where the net has nodes.
-    rods : of this family.
+    rods : of both families.
+    clearance : see `with_apron` [m].
+
+    Attributes
+    ----------
+    joints : (m, n) the nodes of all rods, and of `RINGS` more past their ends.
     """
 
-    def __init__(self, name: str, stations: Floats, offsets: Floats, live: Bools, rods: list[FlatRod]) -> None:
-        self.name, self.stations, self.offsets, self.live, self.rods = name, stations, offsets, live, rods
-        lines, nodes = live.shape
-        self.stretches = np.cumsum(~live, axis=1) + (nodes + 1) * np.arange(lines)[:, None]
-        offset, start, end = np.array([(rod.offset, rod.start, rod.end) for rod in rods]).reshape(-1, 3).T
-        line = np.abs(offsets - offset[:, None]).argmin(axis=1)
-        away = np.where(live[line], np.abs(stations - 0.5 * (start + end)[:, None]), np.inf)
-        stretch = self.stretches[line, away.argmin(axis=1)]
-        # of each stretch its first rod, or -1, and where its rods start and end
-        self.first_rod = np.full(lines * (nodes + 1), -1)
-        self.first_rod[stretch[::-1]] = np.arange(len(rods))[::-1]
-        self.start, self.end = np.full(len(self.first_rod), np.inf), np.full(len(self.first_rod), -np.inf)
-        np.minimum.at(self.start, stretch, start)
-        np.maximum.at(self.end, stretch, end)
-
-    def joints(self, clearance: float) -> Bools:
-        """(m, n) the nodes of all rods, and of `RINGS` more past their ends."""
-        spanned = np.flatnonzero(self.first_rod >= 0)
-        first = np.searchsorted(self.stations, self.start[spanned] - clearance, side="right") - RINGS
-        last = np.searchsorted(self.stations, self.end[spanned] + clearance, side="left") + RINGS - 1
-        node, result = np.arange(len(self.stations)), np.zeros_like(self.live)
-        within = (node >= first[:, None]) & (node <= last[:, None])
-        np.logical_or.at(result, spanned // (len(node) + 1), within)
-        return np.asarray(result & self.live)
+    def __init__(
+        self, name: str, stations: Floats, offsets: Floats, live: Bools, rods: Sequence[FlatRod], clearance: float
+    ) -> None:
+        self.name, self.stations, self.offsets = name, stations, offsets
+        self.rods = [rod for rod in rods if rod.family == name]
+        laid = np.array([(rod.offset, rod.start, rod.end) for rod in self.rods]).reshape(-1, 3)
+        found = _stretches(stations, offsets, live, laid, clearance)
+        self.stretches, self.line_of, self.first_rod, self.ends, self.joints = found
 
     def prolonged(self, joints: Bools) -> list[FlatRod]:
         """A rod for each stretch with rods on it, or with at least two `joints` (m, n): from the first to the last
         joint, its own ends included."""
-        start, end, stretch = self.start.copy(), self.end.copy(), self.stretches[joints]
-        at = np.broadcast_to(self.stations, joints.shape)[joints]
-        np.minimum.at(start, stretch, at)
-        np.maximum.at(end, stretch, at)
-        kept = np.flatnonzero((self.first_rod >= 0) | (np.bincount(stretch, minlength=len(start)) > 1))
-        columns = self.first_rod[kept], self.offsets[kept // (len(self.stations) + 1)], start[kept], end[kept]
+        kept, ends = _prolong(self.stations, self.stretches, joints, self.first_rod, self.ends)
+        columns = self.first_rod[kept].tolist(), self.offsets[self.line_of[kept]].tolist(), ends.tolist()
         make = FlatRod.u if self.name == "u" else FlatRod.v
         return [
             self.rods[rod].cut(a, b) if rod >= 0 else make(f"apron {self.name.upper()} {c:+.4f}", c, a, b, virtual=True)
-            for rod, c, a, b in zip(*(column.tolist() for column in columns), strict=True)
+            for rod, c, (a, b) in zip(*columns, strict=True)
         ]
+
+
+@njit()
+def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-untyped-def]
+    """Of each node (m, n) its stretch; of each stretch (k,) its line, its first rod, or -1, and where its rods start
+    and end (k, 2); and the joints (m, n), see `_Family`. Each of `rods` (r, 3) has an offset, a start and an end."""
+    (lines, nodes), count = live.shape, 0
+    stretches, joints = np.empty((lines, nodes), dtype=np.int64), np.zeros((lines, nodes), dtype=np.bool_)
+    line_of = np.empty(lines * (nodes + 1), dtype=np.int64)
+    for m in range(lines):
+        line_of[count] = m
+        for n in range(nodes):
+            if not live[m, n]:
+                count += 1
+                line_of[count] = m
+            stretches[m, n] = count
+        count += 1
+    first_rod, ends = np.full(count, -1), np.empty((count, 2))
+    for k in range(count):
+        ends[k, 0], ends[k, 1] = np.inf, -np.inf
+    for rod in range(len(rods)):
+        line, node, middle, least = 0, 0, 0.5 * (rods[rod, 1] + rods[rod, 2]), np.inf
+        for m in range(1, lines):
+            if abs(offsets[m] - rods[rod, 0]) < abs(offsets[line] - rods[rod, 0]):
+                line = m
+        for n in range(nodes):
+            if live[line, n] and abs(stations[n] - middle) < least:
+                node, least = n, abs(stations[n] - middle)
+        k = stretches[line, node]
+        if first_rod[k] < 0:
+            first_rod[k] = rod
+        ends[k, 0], ends[k, 1] = min(ends[k, 0], rods[rod, 1]), max(ends[k, 1], rods[rod, 2])
+    for k in range(count):
+        if first_rod[k] >= 0:
+            first, stop = -RINGS, RINGS
+            for n in range(nodes):
+                first += stations[n] <= ends[k, 0] - clearance
+                stop += stations[n] < ends[k, 1] + clearance
+            for n in range(max(first, 0), min(stop, nodes)):
+                joints[line_of[k], n] |= live[line_of[k], n]
+    return stretches, line_of, first_rod, ends, joints
+
+
+@njit()
+def _prolong(stations, stretches, joints, first_rod, ends):  # type: ignore[no-untyped-def]
+    """The stretches (k,) with rods, or with at least two `joints` (m, n), and their ends (k, 2), moved to these."""
+    count, kept, used = np.zeros(len(ends), dtype=np.int64), np.empty(len(ends), dtype=np.int64), 0
+    ends = ends.copy()
+    for m in range(len(joints)):
+        for n in range(len(stations)):
+            if joints[m, n]:
+                k, at = stretches[m, n], stations[n]
+                ends[k, 0], ends[k, 1] = min(ends[k, 0], at), max(ends[k, 1], at)
+                count[k] += 1
+    for k in range(len(ends)):
+        if first_rod[k] >= 0 or count[k] > 1:
+            kept[used], ends[used, 0], ends[used, 1] = k, ends[k, 0], ends[k, 1]
+            used += 1
+    return kept[:used], ends[:used]
