@@ -312,26 +312,26 @@ def _scatter(hessians, blocks, slots, count, above, directions, low, high, data)
                 base = slots[m, a, b]
                 if base < 0:
                     continue
-                i = blocks[m, a]
+                i, p, q = blocks[m, a], 3 * a, 3 * b
                 if whole[i] and whole[j]:
                     for c in range(3):
-                        begin = base + c * above[j] + c * (c + 1) // 2
                         for r in range(3 if i != j else c + 1):
-                            data[begin + r] += hessians[m, 3 * a + r, 3 * b + c]
+                            data[base + r] += hessians[m, p + r, q + c]
+                        base += above[j] + c + 1
                     continue
+                h00, h01, h02 = hessians[m, p, q], hessians[m, p, q + 1], hessians[m, p, q + 2]
+                h10, h11, h12 = hessians[m, p + 1, q], hessians[m, p + 1, q + 1], hessians[m, p + 1, q + 2]
+                h20, h21, h22 = hessians[m, p + 2, q], hessians[m, p + 2, q + 1], hessians[m, p + 2, q + 2]
                 for c in range(count[j]):
                     d0, d1, d2 = directions[j, c, 0], directions[j, c, 1], directions[j, c, 2]
-                    w0 = hessians[m, 3 * a, 3 * b] * d0 + hessians[m, 3 * a, 3 * b + 1] * d1
-                    w0 += hessians[m, 3 * a, 3 * b + 2] * d2
-                    w1 = hessians[m, 3 * a + 1, 3 * b] * d0 + hessians[m, 3 * a + 1, 3 * b + 1] * d1
-                    w1 += hessians[m, 3 * a + 1, 3 * b + 2] * d2
-                    w2 = hessians[m, 3 * a + 2, 3 * b] * d0 + hessians[m, 3 * a + 2, 3 * b + 1] * d1
-                    w2 += hessians[m, 3 * a + 2, 3 * b + 2] * d2
-                    begin = base + c * above[j] + c * (c + 1) // 2
+                    w0 = h00 * d0 + h01 * d1 + h02 * d2
+                    w1 = h10 * d0 + h11 * d1 + h12 * d2
+                    w2 = h20 * d0 + h21 * d1 + h22 * d2
                     for r in range(count[i] if i != j else c + 1):
-                        data[begin + r] += (
+                        data[base + r] += (
                             directions[i, r, 0] * w0 + directions[i, r, 1] * w1 + directions[i, r, 2] * w2
                         )
+                    base += above[j] + c + 1
 
 
 @njit()
