@@ -249,7 +249,7 @@ def linear_solver(indptr: Longs, indices: Longs, free: Freedom, flat_coordinates
 
 def half_width(points: Floats) -> float:
     """Half of the largest extent of points (k, 3) along x, y or z [m]: the characteristic length of a shape."""
-    return 0.5 * float(np.ptp(points, axis=0).max())
+    return 0.5 * float(np.ptp(np.ascontiguousarray(points.T), axis=1).max())
 
 
 class Force(Protocol):
