@@ -113,6 +113,11 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
             if not low <= s[n] <= high:
                 result[m, n, 0] = result[m, n, 1] = result[m, n, 2] = np.nan
                 continue
+            at = right[n]
+            if first <= at <= last and knots[at] == s[n]:  # itself
+                for d in range(3):
+                    result[m, n, d] = points[at, m, d]
+                continue
             row, window, x, y, z = n, windows[n], 0.0, 0.0, 0.0
             if window < first or window + most - 1 > last:
                 row, window = spare, _window(knots, s[n], right[n], first, last, shares, spare)
