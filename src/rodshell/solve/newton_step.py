@@ -72,7 +72,7 @@ class NewtonStep:
         self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
         self._factors: Factors | None = None  # their memory serves for all factorisations of this iteration
         *sets, _ = self._blocks
-        self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in sets]
+        self._hessians = [np.empty((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in sets]
         self._curvature, self._curved = NO_CURVATURE, True  # until the constraint says that it is not
         self._no_forces = np.zeros(len(problem.stretch.blocks))
         self._least_force = LEAST_FORCE * float(problem.stretch.stiffness.max())
