@@ -156,7 +156,7 @@ class Crossings:
 
     def select(self, keep: Bools) -> "Crossings":
         """The crossings marked in `keep` (c,)."""
-        return Crossings(self.rods[keep], self.at[keep])
+        return Crossings(self.rods.compress(keep, axis=0), self.at.compress(keep, axis=0))
 
 
 @dataclass(frozen=True)

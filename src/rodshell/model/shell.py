@@ -157,7 +157,7 @@ class Shell:
         angles = np.empty((0, 2))
         if self.angles:
             angles = np.vstack([flat[self.mesh.edges].mean(axis=1), ghosts])[: self.angles]
-        return np.vstack([flat, ghosts, angles]).take(self.like, axis=0)
+        return np.concatenate([flat, ghosts, angles]).take(self.like, axis=0)
 
     @cached_property
     def mass(self) -> Floats:
@@ -185,9 +185,9 @@ class Shell:
         normals : (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
             None: the directors are those of the flat grid, moved by the smallest rotation.
         """
-        shared = np.zeros((self.like.max() + 1, 3))
+        shared = np.zeros((int(self.like.max()) + 1, 3))
         shared[: len(positions)] = positions
-        state = shared[self.like]
+        state = shared.take(self.like, axis=0)
         if len(self.ghosts):
             assert tangents is not None
             state[self.ghosts] = state[self.ends] + last_edges(self.mesh)[:, None] * tangents
