@@ -155,9 +155,11 @@ class Assembly:
         numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
         flat = np.concatenate([np.arange(0), *(blocks.ravel() for blocks in element_blocks)])
         indptr, indices, above, every = _pattern(flat, numbers, widths, freedom.count)
-        stops = np.cumsum(numbers * widths**2)[:-1]
-        each = zip(np.split(every, stops), element_blocks, strict=True) if len(widths) else ()
-        slots = tuple(slots.reshape(len(blocks), blocks.shape[1], blocks.shape[1]) for slots, blocks in each)
+        stops = np.append(0, np.cumsum(numbers * widths**2)).tolist()
+        slots = tuple(
+            every[begin:stop].reshape(len(blocks), blocks.shape[1], blocks.shape[1])
+            for (begin, stop), blocks in zip(pairwise(stops), element_blocks, strict=True)
+        )
         return Assembly(indptr, indices, freedom.count, above, slots)
 
     def has_pattern_of(self, other: "Assembly") -> bool:
@@ -203,6 +205,8 @@ class Assembly:
     def _parts(self) -> list[tuple[int, int]]:
         """Ranges of blocks in whose columns about as many values are stored, one for each thread."""
         count = threads() if len(self.indices) >= WORTHWHILE else 1
+        if count == 1:
+            return [(0, len(self._count))]
         columns = np.searchsorted(self.indptr, np.linspace(0, len(self.indices), count + 1))
         stops = np.searchsorted(np.cumsum(self._count), columns).tolist()
         return list(pairwise([0, *stops[1:-1], len(self._count)]))
