@@ -55,7 +55,7 @@ class Covering(Net):
         """
         result = list[float]()
         for s, touched in ((self.u, self.inside.any(axis=1)), (self.v, self.inside.any(axis=0))):
-            on = touched.nonzero()[0]
+            on = np.flatnonzero(touched)
             first, last = (on[0], on[-1]) if len(on) else (0, len(s) - 1)
             result += [-s[max(first - past, 0)], s[min(last + past, len(s) - 1)]]
         return np.array(result)
