@@ -15,7 +15,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rodshell.errors import InputError
-from rodshell.units import as_float, shown
+from rodshell.units import NUMBER, as_float, shown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -119,7 +119,7 @@ def numbers(name: str, value: object, wanted: str, count: int) -> tuple[float, .
 
 
 def _real(name: str, value: object, unit: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real):
+    if isinstance(value, bool) or not isinstance(value, NUMBER):
         raise InputError(f"{name} must be a number{unit and ' in ' + unit}, not {described(value)}")
     return as_float(value)
 
@@ -203,7 +203,7 @@ def direction(name: str, given: "ArrayLike") -> "Floats":
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool) and isfinite(as_float(value))
+    return isinstance(value, NUMBER) and not isinstance(value, bool) and isfinite(as_float(value))
 
 
 def described(value: object) -> str:

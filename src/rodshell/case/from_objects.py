@@ -12,14 +12,9 @@ from numpy.typing import ArrayLike
 
 from rodshell.case.case import Case
 from rodshell.case.rod_ends import RodEnds
-from rodshell.case.rod_tables import JointKinds, JointTable, RodTable
-from rodshell.case.stage_tables import (
-    DrapeTable,
-    LayoutTable,
-    PopUpTable,
-    SeamsTable,
-)
-from rodshell.case.target_tables import HeldTarget, TargetTable
+from rodshell.case.rod_tables import JointTable, RodTable
+from rodshell.case.stage_tables import DrapeTable, LayoutTable, PopUpTable
+from rodshell.case.target_tables import HeldTarget
 from rodshell.case.values import Held, Table
 from rodshell.formfinding import Bound, Fall, Method
 from rodshell.formfinding.patches import PatchLayout
@@ -52,85 +47,91 @@ def case_of(
     options: OutputOptions,
 ) -> Case:
     """The case of a target, a layout and a rod; arguments as of `rodshell.Job`, each of its kind."""
-    heading = layout.rotate if rotate is None else rotate
-    tables: dict[str, Any] = {
-        "target": _target_table(target),
-        "layout": _layout_table(layout, heading),
-        "rod": rod_table(rod),
-        "joint": joint_table(joint),
-        "drape": _drape_table(method, anchor, objective),
-        "pop_up": _pop_up_table(ends),
-        "seams": SeamsTable.model_validate(
-            {
-                "lines": [Seam.of(line).points.tolist() for line in seams],
-                "patches": [{"name": name, **_given(patch)} for name, patch in patches.items()],
-            }
-        ),
+    heading, shape = layout.rotate if rotate is None else rotate, target.parameters()
+    given: dict[str, Any] = {
+        "layout": _layout_keys(layout, heading),
+        "rod": rod.parameters(),
+        "joint": _joint_keys(joint),
+        "drape": _drape_keys(method, anchor, objective),
+        "pop_up": {"ends": ends[0] if len(ends) == 1 else "both"},
+        "seams": {
+            "lines": [Seam.of(line).points.tolist() for line in seams],
+            "patches": [{"name": name, **_given(patch)} for name, patch in patches.items()],
+        },
+        **options.parameters(),
     }
-    return Case.model_validate(options.parameters()).model_copy(update=tables)
+    unknown = _without_keys(shape)
+    if not unknown:
+        given["target"] = _target_keys(shape)
+    case = Case.model_validate(given)
+    tables: dict[str, Table] = {
+        "layout": _layout_table(case.layout, layout, heading),
+        "rod": _rod_table(case.rod, rod),
+        "joint": _joint_table(case.joint, joint),
+        "drape": _drape_table(case.drape, method),
+        "pop_up": _pop_up_table(case.pop_up, ends),
+    }
+    if unknown:
+        tables["target"] = HeldTarget(kind="python").holding(Held(target, unknown, by_value=False))
+    return case.model_copy(update=tables)
 
 
 def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint, options: OutputOptions) -> Case:
     """The case of rods that a table gives by where their ends lie flat and in the end."""
-    update = {"target": table_target(ends), "joint": joint_table(joint), "pop_up": PopUpTable(ends="pinned")}
+    given: dict[str, Any] = {"joint": _joint_keys(joint), "pop_up": {"ends": "pinned"}, **options.parameters()}
     if rod is not None:
-        update["rod"] = rod_table(rod)
-    return Case.model_validate(options.parameters()).model_copy(update=update)
+        given["rod"] = rod.parameters()
+    case = Case.model_validate(given)
+    target = HeldTarget(kind="table").holding(Held(ends, f"a table of {len(ends.final)} rods"))
+    tables: dict[str, Table] = {"target": target, "joint": _joint_table(case.joint, joint)}
+    if rod is not None:
+        tables["rod"] = _rod_table(case.rod, rod)
+    return case.model_copy(update=tables)
 
 
-def rod_table(rod: Rod) -> RodTable:
-    """[rod] with section and material spelled out."""
-    table = RodTable.model_validate(rod.parameters())
+def _rod_table(table: RodTable, rod: Rod) -> RodTable:
+    """[rod] with section and material spelled out, or held."""
     return table if table.build() == rod else table.holding(Held(rod, f"the rod {rod}"))
 
 
-def joint_table(joint: Joint) -> JointTable:
+def _joint_keys(joint: Joint) -> dict[str, object]:
+    keys = joint_parameters(joint)
+    keys.pop("rod", None)
+    return keys
+
+
+def _joint_table(table: JointTable, joint: Joint) -> JointTable:
     """[joint] of any joint; linkers of a rod of their own are held."""
-    parameters = joint_parameters(joint)
-    linkers = parameters.pop("rod", None)
-    table: JointTable = _JointCase.model_validate({"joint": parameters}).joint
-    return table if linkers is None else table.holding(Held(joint, "joints with linkers of another rod"))
+    own = getattr(joint, "rod", None)
+    return table if own is None else table.holding(Held(joint, "joints with linkers of another rod"))
 
 
-def table_target(ends: RodEnds) -> HeldTarget:
-    """[target] of a table of rods."""
-    return HeldTarget(kind="table").holding(Held(ends, f"a table of {len(ends.final)} rods"))
-
-
-class _JointCase(Table):
-    joint: JointKinds
-
-
-class _TargetCase(Table):
-    target: TargetTable
-
-
-def _target_table(target: Target) -> Table:
-    shape: dict[str, Any] = target.parameters()
+def _without_keys(shape: Mapping[str, object]) -> str:
+    """What a target with these parameters is that no key describes; "" where keys do."""
     if "function" in shape:
-        what = f"the Python function {shape['function']} as a target"
-        return HeldTarget(kind="python").holding(Held(target, what, by_value=False))
-    if "vertices" in shape:
-        what = f"a mesh of {shape['vertices']} vertices made in Python as a target"
-        return HeldTarget(kind="python").holding(Held(target, what, by_value=False))
-    if "turn" in shape:
-        shape = {**shape, "turn": [_within_a_turn(angle) for angle in shape["turn"]]}
-    table: Table = _TargetCase.model_validate({"target": shape}).target
-    return table
+        return f"the Python function {shape['function']} as a target"
+    return f"a mesh of {shape['vertices']} vertices made in Python as a target" if "vertices" in shape else ""
 
 
-def _layout_table(layout: GridLayout, rotate: float | Auto) -> LayoutTable:
-    heading = "auto" if rotate == "auto" else _within_a_turn(rotate)
-    given = {**layout.parameters(), "rotate": heading, "left_out": layout.left_out}
-    table = LayoutTable.model_validate(given)
-    if any(layout.lines):
-        turned = layout if rotate == "auto" else replace(layout, rotate=rotate)
-        return table.holding(Held(turned, "a layout with lines at unequal spacing"))
-    return table
+def _target_keys(shape: dict[str, Any]) -> dict[str, Any]:
+    return {**shape, "turn": [_within_a_turn(angle) for angle in shape["turn"]]} if "turn" in shape else shape
 
 
-def _drape_table(method: Method, anchor: Point | Auto | None, objective: Objective) -> DrapeTable:
-    """[drape] of a method, in SI; the folder of a fall's frames, which may be none of the next result's, is held."""
+def _layout_keys(layout: GridLayout, heading: float | Auto) -> dict[str, object]:
+    rotate = "auto" if heading == "auto" else _within_a_turn(heading)
+    return {**layout.parameters(), "rotate": rotate, "left_out": layout.left_out}
+
+
+def _layout_table(table: LayoutTable, layout: GridLayout, rotate: float | Auto) -> LayoutTable:
+    """[layout]; one with lines at unequal spacing is held, with its heading."""
+    if not any(layout.lines):
+        return table
+    turned = layout if rotate == "auto" else replace(layout, rotate=rotate)
+    return table.holding(Held(turned, "a layout with lines at unequal spacing"))
+
+
+def _drape_keys(method: Method, anchor: Point | Auto | None, objective: Objective) -> dict[str, Any]:
+    """[drape] of a method, in SI."""
     given: dict[str, Any] = {"method": method.name, "objective": objective}
     if anchor is not None:
         given["anchor"] = anchor
@@ -141,7 +142,11 @@ def _drape_table(method: Method, anchor: Point | Auto | None, objective: Objecti
         known = {name: getattr(method, name) for name in ("height", "time_step", "duration", "friction", "drag")}
         given |= {name: value for name, value in (known | ties).items() if value is not None}
         given["coupling"] = method.coupling.name
-    table = DrapeTable.model_validate(given)
+    return given
+
+
+def _drape_table(table: DrapeTable, method: Method) -> DrapeTable:
+    """[drape]; the folder of a fall's frames, which may be none of the next result's, is held."""
     described = table.build()
     if described == method:
         return table
@@ -152,11 +157,11 @@ def _drape_table(method: Method, anchor: Point | Auto | None, objective: Objecti
     return table.holding(Held(method, "a fall with options that only Python has"))
 
 
-def _pop_up_table(ends: Sequence[Ends]) -> PopUpTable:
+def _pop_up_table(table: PopUpTable, ends: Sequence[Ends]) -> PopUpTable:
     if ends:
-        return PopUpTable(ends=ends[0] if len(ends) == 1 else "both")
+        return table
     note = "the grid was not popped up; a case file always asks for a pop-up"
-    return PopUpTable().holding(Held((), "a grid that is not popped up", writable=True, note=note))
+    return table.holding(Held((), "a grid that is not popped up", writable=True, note=note))
 
 
 def _given(patch: PatchLayout) -> dict[str, object]:

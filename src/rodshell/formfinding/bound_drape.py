@@ -91,8 +91,7 @@ def bound_drape(
         progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
     touching = np.zeros(mesh.node_count, dtype=bool)
-    for first, last in spans.tolist():
-        touching[mesh.rod_nodes[first : last + 1]] = True
+    touching[np.concatenate([mesh.rod_nodes[first : last + 1] for first, last in spans.tolist()])] = True
     on_target = np.flatnonzero(touching)
     value, gradient = target.level(found.state)
     steep = np.sqrt(dot(gradient, gradient))
@@ -214,7 +213,9 @@ def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats) -> Boun
         if line.offset == 0.0:
             nodes = mesh.nodes_of(k)
             count[nodes] -= 1
-            guides[nodes] = start[np.append(nodes[1:], nodes[-1])] - start[np.append(nodes[0], nodes[:-1])]
+            along = start[nodes]
+            along = np.concatenate([along[:1], along, along[-1:]])
+            guides[nodes] = along[2:] - along[:-2]
     return BoundToTarget(target, count, guides)
 
 

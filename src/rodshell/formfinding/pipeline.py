@@ -5,7 +5,7 @@ The last stage is the agreement: how far the popped-up shell is from the target,
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import degrees, pi
+from math import degrees, pi, sqrt
 
 import numpy as np
 
@@ -81,13 +81,11 @@ class Agreement:
 def agreement(popped: PopUp, target: Target) -> Agreement:
     """Distance of the popped-up rods to the target, continued smoothly past its end."""
     nodes, mesh = popped.positions, popped.footprint.mesh
-    points = np.vstack([nodes, edge_middles(mesh, nodes)])
-    gaps = target.distance(points) - np.append(mesh.heights, mesh.heights[mesh.edges[:, 0]])
-    k = int(np.argmax(np.abs(gaps)))
+    points = np.concatenate([nodes, edge_middles(mesh, nodes)])
+    gaps = target.distance(points) - np.concatenate([mesh.heights, mesh.heights[mesh.edges[:, 0]]])
+    k = int(np.abs(gaps).argmax())
     x, y, z = points[k].tolist()
-    return Agreement(
-        gaps[: len(nodes)], float(np.abs(gaps[k])), float(np.sqrt(np.mean(gaps**2))), (x, y, z), target.size
-    )
+    return Agreement(gaps[: len(nodes)], abs(float(gaps[k])), sqrt((gaps * gaps).mean()), (x, y, z), target.size)
 
 
 def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:

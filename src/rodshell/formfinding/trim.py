@@ -158,9 +158,9 @@ def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     positions : (n, 3) of the mesh's nodes [m].
     """
     first, last = mesh.rod_start, mesh.rod_stop - 1
-    inwards = np.minimum(np.arange(3)[:, None], last - first)  # a rod of one edge counts it twice
-    rows = np.stack([first + inwards, last - inwards], axis=2).reshape(3, -1)
-    x, at = positions[mesh.rod_nodes[rows]], mesh.stations[rows]
+    inwards, rows = np.minimum(np.arange(3)[:, None], last - first), np.empty((3, 2 * len(first)), dtype=np.intp)
+    rows[:, ::2], rows[:, 1::2] = first + inwards, last - inwards  # a rod of one edge counts it twice
+    x, at = positions.take(mesh.rod_nodes[rows], axis=0), mesh.stations[rows]
     h, h_before = np.abs(at[0] - at[1]), np.abs(at[1] - at[2])
     tangents = unit(x[0] - x[1])
     bent = h_before > 0

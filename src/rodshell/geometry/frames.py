@@ -10,7 +10,7 @@ _ALONG = 1e-6  # [rad]: a director closer to its tangent does not define a frame
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Cross products (..., 3) of arrays (..., 3); several times faster than numpy's on short arrays."""
-    result = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    result = np.empty(np.broadcast(a, b).shape)
     result[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     result[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     result[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -15,7 +15,7 @@ each two. Where a joint is free, its stiffness is exactly zero.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import inf, pi
 from typing import Literal, Protocol
 
@@ -235,7 +235,7 @@ def require_joint(joint: object) -> None:
 
 def joint_parameters(joint: Joint) -> dict[str, object]:
     """The joint's kind and values in SI, as they stand in a case file."""
-    values = {"kind": joint.name, **asdict(joint)}  # type: ignore[call-overload]
+    values = {"kind": joint.name, **vars(joint)}
     linker = values.pop("rod", None)
     if linker is not None:
         values["rod"] = joint.rod.parameters()  # type: ignore[attr-defined]

@@ -1,6 +1,5 @@
 """Straight rods in a plane, their crossings, and the layers in which they lie."""
 
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -112,14 +111,14 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
     ------
     ValueError : a piece belongs to no rod.
     """
-    on_line = defaultdict[tuple[object, ...], list[tuple[int, float, float]]](list)
+    on_line: dict[tuple[object, object], list[tuple[int, FlatRod]]] = {}
     for k, rod in enumerate(rods):
-        tiny = 1e-9 * (rod.end - rod.start)
-        on_line[rod.origin, rod.direction].append((k, rod.start - tiny, rod.end + tiny))
+        on_line.setdefault((rod.origin, rod.direction), []).append((k, rod))
     found = list[int]()
     for piece in pieces:
-        for k, start, end in on_line[piece.origin, piece.direction]:
-            if start <= piece.start and piece.end <= end:
+        for k, rod in on_line.get((piece.origin, piece.direction), ()):
+            tiny = 1e-9 * (rod.end - rod.start)
+            if rod.start - tiny <= piece.start and piece.end <= rod.end + tiny:
                 found.append(k)
                 break
         else:
@@ -156,7 +155,7 @@ class Crossings:
 
     def select(self, keep: Bools) -> "Crossings":
         """The crossings marked in `keep` (c,)."""
-        return Crossings(self.rods[keep], self.at[keep])
+        return Crossings(self.rods.compress(keep, axis=0), self.at.compress(keep, axis=0))
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod
+from rodshell.units import NUMBER
 from rodshell.validation import instance, number, numbers, positive
 
 Auto = Literal["auto"]
@@ -125,7 +126,7 @@ class GridLayout:
         ------
         InputError : as `GridLayout` does.
         """
-        instance("layout spacing", spacing, Real | tuple | list, "one or two lengths in m")
+        instance("layout spacing", spacing, tuple | list | Real, "one or two lengths in m")
         pair = spacing if isinstance(spacing, tuple | list) else (spacing, spacing)
         _require_two("spacing", pair)
         pair = (positive("layout spacing", pair[0], "m"), positive("layout spacing", pair[1], "m"))
@@ -210,7 +211,7 @@ def _is_auto(value: object) -> bool:
 
 def _require_two(name: str, pair: object) -> None:
     """Refuse what is not a pair of numbers [m]."""
-    if not isinstance(pair, tuple | list) or len(pair) != 2 or not all(isinstance(value, Real) for value in pair):
+    if not isinstance(pair, tuple | list) or len(pair) != 2 or not all(isinstance(value, NUMBER) for value in pair):
         raise InputError(f"layout {name} must be two lengths in m, not {short(pair)}")
 
 

@@ -419,8 +419,9 @@ def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
     """
     rods, count = grid.rods, len(mesh.grid.rods)
     index = whole_rods(mesh.grid.rods, rods)
-    pairs = np.sort(index[grid.crossings.rods], axis=1) @ [count, 1]
-    known = np.append(mesh.grid.crossings.rods @ [count, 1], -1)  # the last is not a pair: there may be none
+    (a, b), (first, second) = index[grid.crossings.rods].T, mesh.grid.crossings.rods.T
+    pairs = count * np.minimum(a, b) + np.maximum(a, b)
+    known = np.append(count * first + second, -1)  # the last is not a pair: there may be none
     order = np.argsort(known, kind="stable")
     found = order[np.minimum(np.searchsorted(known, pairs, sorter=order), len(known) - 1)]
     kept = known[found] == pairs

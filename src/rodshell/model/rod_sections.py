@@ -51,11 +51,10 @@ class RodSections:
         ------
         InputError : a profile changes a length that the section does not have.
         """
-        rod_of = mesh.rod_of
-        of_rods = _uniform(rods)
-        nodes = of_rods[:, :3].take(rod_of, axis=0)
-        edges, *rest = (column.take(mesh.edge_rods, axis=0) for column in (of_rods[:, :3], *of_rods[:, 3:].T))
-        stretch, mass, rotary = rest
+        rod_of, of_rods = mesh.rod_of, _uniform(rods)
+        nodes = of_rods[:3].T.take(rod_of, axis=0)
+        of_edges = of_rods.take(mesh.edge_rods, axis=1)
+        edges, (stretch, mass, rotary) = of_edges[:3].T, of_edges[3:]
         for rod, profile, entries in varied_rods(mesh, rods):
             inner = rod_of[entries[1:]] == rod_of[entries[:-1]]
             here = (entries - rod_of[entries])[:-1][inner]  # edges are counted rod by rod
@@ -75,16 +74,16 @@ class RodSections:
 
 
 def _uniform(rods: Sequence[Rod]) -> Floats:
-    """(m, 6) EI1, EI2, GJ, EA, mass and rotary inertia per length of each rod; computed once for each that differs."""
+    """(6, m) EI1, EI2, GJ, EA, mass and rotary inertia per length of each rod; computed once for each that differs."""
     different = (rods[0],) if rods and rods.count(rods[0]) == len(rods) else tuple(dict.fromkeys(rods))
     values = np.array([
         (*rod.bend_stiffnesses, rod.twist_stiffness, rod.stretch_stiffness, rod.mass_per_length, rod.rotary_inertia)
         for rod in different
-    ]).reshape(-1, 6)  # fmt: skip
+    ]).reshape(-1, 6).T  # fmt: skip
     if len(different) == 1:
-        return np.tile(values, (len(rods), 1))
-    row = {rod: k for k, rod in enumerate(different)}
-    return np.asarray(values[[row[rod] for rod in rods]])
+        return np.repeat(values, len(rods), axis=1)
+    column = {rod: k for k, rod in enumerate(different)}
+    return np.asarray(values[:, [column[rod] for rod in rods]])
 
 
 def _inverse(rod: Rod, varies: str, factors: Floats) -> Floats:

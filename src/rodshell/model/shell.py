@@ -157,7 +157,7 @@ class Shell:
         angles = np.empty((0, 2))
         if self.angles:
             angles = np.vstack([flat[self.mesh.edges].mean(axis=1), ghosts])[: self.angles]
-        return np.vstack([flat, ghosts, angles]).take(self.like, axis=0)
+        return np.concatenate([flat, ghosts, angles]).take(self.like, axis=0)
 
     @cached_property
     def mass(self) -> Floats:
@@ -185,9 +185,9 @@ class Shell:
         normals : (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
             None: the directors are those of the flat grid, moved by the smallest rotation.
         """
-        shared = np.zeros((self.like.max() + 1, 3))
+        shared = np.zeros((int(self.like.max()) + 1, 3))
         shared[: len(positions)] = positions
-        state = shared[self.like]
+        state = shared.take(self.like, axis=0)
         if len(self.ghosts):
             assert tangents is not None
             state[self.ghosts] = state[self.ends] + last_edges(self.mesh)[:, None] * tangents
@@ -290,9 +290,9 @@ class _Builder:
         self.angles = (len(mesh.edges) + (0 if self.isotropic else len(self.ghosts))) if self.twist else 0
         self.size = self.first_angle + self.angles
         self.rod_nodes = RodNodes(mesh, self.parts.rod_nodes, self.first_angle)
-        shared = mesh.node_count
-        rest = shared + np.arange(len(self.ghosts) + self.angles)
-        self.like = np.append(mesh.rod_nodes if self.apart else np.arange(shared), rest)
+        self.like = np.arange(mesh.node_count + len(self.ghosts) + self.angles)
+        if self.apart:
+            self.like = np.append(mesh.rod_nodes, self.like[mesh.node_count :])
 
     def _of_joints(self, value: Callable[[Joint], object], kind: type = float) -> NDArray[Any]:
         """A value of each joint (c,), float or bool."""
@@ -369,9 +369,10 @@ class _Builder:
 
     def _elastic(self) -> tuple[Elements, ...]:
         """Joints other than linkers."""
-        crossings = np.flatnonzero(
-            self._of_joints(lambda joint: isinstance(joint, Elastic) and joint.turns_frames, bool)
-        )
+        elastic = [isinstance(joint, Elastic) and joint.turns_frames for joint in self.joints]
+        if not any(elastic):
+            return ()
+        crossings = np.flatnonzero(np.array(elastic)[self.joint_of])
         joints = [self.joints[kind] for kind in self.joint_of[crossings].tolist()]
         return elastic_joints(self.rod_nodes, crossings, joints, self.stiffness, self.size)
 

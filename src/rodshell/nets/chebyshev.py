@@ -234,7 +234,8 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
         raise _hole(net)
     along, across = net.points[i + 1, j] - net.points[i - 1, j], net.points[i, j + 1] - net.points[i, j - 1]
     x, y, z = net.points[i, j].tolist()
-    return float(np.arctan2(np.linalg.norm(cross(along, across)), abs(along @ across))), (x, y, z)
+    normal = cross(along, across)
+    return float(np.arctan2(np.sqrt(normal @ normal), abs(along @ across))), (x, y, z)
 
 
 @njit(error_model="numpy")

@@ -250,7 +250,7 @@ def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: 
     below = np.minimum(target.margin(lagrange(knots, points, outer)), 0.0)
     above = target.margin(lagrange(knots, points, inner))
     found, index, there = inner.copy(), np.arange(len(inner)), np.empty((len(inner), 3))
-    bracket = np.stack([outer, inner, below, above, np.zeros(len(inner)), 1e-15 * (np.abs(outer) + np.abs(inner))])
+    bracket = np.array([outer, inner, below, above, np.zeros(len(inner)), 1e-15 * (np.abs(outer) + np.abs(inner))])
     left = _narrow(above, knots, points, found, index, bracket, there, True)
     for _ in range(MOST_STEPS):
         if left == 0:

@@ -55,8 +55,9 @@ class Covering(Net):
         """
         result = list[float]()
         for s, touched in ((self.u, self.inside.any(axis=1)), (self.v, self.inside.any(axis=0))):
-            on = np.flatnonzero(touched).tolist() or [0, len(s) - 1]
-            result += [-s[max(on[0] - past, 0)], s[min(on[-1] + past, len(s) - 1)]]
+            on = np.flatnonzero(touched)
+            first, last = (on[0], on[-1]) if len(on) else (0, len(s) - 1)
+            result += [-s[max(first - past, 0)], s[min(last + past, len(s) - 1)]]
         return np.array(result)
 
 
@@ -219,7 +220,7 @@ def find_lines(
         if not near.inside.any():
             raise InputError("no node of the net is inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare
-        if np.all(needed <= reach + 1e-12):
+        if (needed <= reach + 1e-12).all():
             break
         reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
     u, v = _lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3])

@@ -81,7 +81,7 @@ def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
     if coarse <= CLEARLY * fine:
         return near
     change = near.points - interpolated(coarser, near.u, near.v)
-    change[np.isnan(change)] = 0.0
+    np.copyto(change, 0.0, where=np.isnan(change))
     return Net(near.u, near.v, near.points + (fine - requested) / (coarse - fine) * change)
 
 
@@ -237,7 +237,7 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
         if furthest < limit:
             return bool(whole)
         rows = _rows_to_renew(net.points, row, moved, limit, new, models)
-        now = target.implicit(models[rows])
+        now = target.implicit(models.take(rows, axis=0))
         if not layered and np.abs(now.value).max() <= converged**3 * target.size:
             return bool(whole)  # models with F = 0 there were exact, as those of quadrics are
         value[rows], gradient[rows], hessian[rows] = now

@@ -4,7 +4,7 @@ The figures of a preset are characteristic, short-term values at the moisture an
 What building codes make of them for duration of load, moisture and safety is in `rods.design_strength`.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Literal, Self, get_args
 
 from rodshell.errors import InputError
@@ -195,7 +195,7 @@ class Material:
 
     def parameters(self) -> dict[str, object]:
         """The values in SI as they stand in a case file; with the preset's name, if it has one."""
-        values: dict[str, object] = asdict(self)
+        values: dict[str, object] = dict(vars(self))
         del values["poisson_ratio" if self.shear is not None else "shear"]
         name = values.pop("name")
         return values if name is None else {"preset": name, **values}
