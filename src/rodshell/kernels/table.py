@@ -129,7 +129,7 @@ KERNELS: dict[str, dict[str, str]] = {
     "solve.symbolic": {
         "_children": "i1 i1",
         "_coupled": "i1 i1 i1",
-        "_fronts": "i1 i1 i1 i1 i1",
+        "_fronts": "i1 i1 i1 i1",
         "_maps": "i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1",
         "_supernodes": "i1 i1 i1",
         "_tree": "i1 i1 i1 i1",

@@ -97,10 +97,12 @@ def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan
     blocks : its graph, see `blocks_of`.
     order : (b,) blocks in the order of elimination.
     """
-    order, tree, weight, count = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
+    order, tree, weight, count, *coupled = _tree(
+        blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64)
+    )
     first = _supernodes(tree, count, weight)
     up, child_start, children = _children(tree, first)
-    row_start, rows = _fronts(first, order, blocks.start, blocks.neighbours, up)
+    row_start, rows = _fronts(first, *coupled, up)
     maps = _maps(indptr, *blocks, order, weight, first, up, row_start, rows, child_start, children)
     return Plan(*maps)
 
@@ -158,45 +160,64 @@ def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
 
 @njit()
 def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
-    """Blocks in a postorder of their elimination tree; and for each, its parent, unknowns, and rows of its columns."""
+    """Blocks in a postorder of their elimination tree; for each, its parent, unknowns, and rows of its columns; and the
+    earlier ones to which block k is coupled, earlier[first[k] : first[k + 1]]."""
     n = len(order)
-    place = np.empty(n, dtype=np.int64)
-    for k in range(n):
-        place[order[k]] = k
-    parent = _elimination_tree(start, neighbours, order, place)
+    first, earlier = _earlier(start, neighbours, order)
+    parent = _elimination_tree(first, earlier)
     post = _postorder(parent)
     back = np.empty(n, dtype=np.int64)
     for k in range(n):
         back[post[k]] = k
     sorted_order, above, weight = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     count, mark = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    sorted_first, sorted_earlier = np.zeros(n + 1, dtype=np.int64), np.empty(len(earlier), dtype=np.int64)
     for k in range(n):
-        b = order[post[k]]
-        sorted_order[k], place[b], mark[k] = b, k, -1
-        above[k] = back[parent[post[k]]] if parent[post[k]] >= 0 else -1
-        weight[k] = count[k] = begin[b + 1] - begin[b]
-    order, parent = sorted_order, above
+        j, used = post[k], sorted_first[k]
+        sorted_order[k], mark[k] = order[j], -1
+        above[k] = back[parent[j]] if parent[j] >= 0 else -1
+        weight[k] = count[k] = begin[order[j] + 1] - begin[order[j]]
+        for e in range(first[j], first[j + 1]):
+            sorted_earlier[used] = back[earlier[e]]
+            used += 1
+        sorted_first[k + 1] = used
     for k in range(n):  # every nonzero of row k of the factor once
         mark[k] = k
-        for e in range(start[order[k]], start[order[k] + 1]):
-            j = place[neighbours[e]]
-            while j < k and mark[j] != k:
+        for e in range(sorted_first[k], sorted_first[k + 1]):
+            j = sorted_earlier[e]
+            while mark[j] != k:
                 mark[j] = k
                 count[j] += weight[k]
-                j = parent[j]
-    return order, parent, weight, count
+                j = above[j]
+    return sorted_order, above, weight, count, sorted_first, sorted_earlier
 
 
 @njit(inline="always")
-def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyped-def]
+def _earlier(start, neighbours, order):  # type: ignore[no-untyped-def]
+    """The blocks before the k-th in the order to which that is coupled, earlier[first[k] : first[k + 1]]."""
+    n, used = len(order), 0
+    place = np.empty(n, dtype=np.int64)
+    for k in range(n):
+        place[order[k]] = k
+    first, earlier = np.zeros(n + 1, dtype=np.int64), np.empty(len(neighbours) // 2, dtype=np.int64)
+    for k in range(n):
+        for e in range(start[order[k]], start[order[k] + 1]):
+            if place[neighbours[e]] < k:
+                earlier[used] = place[neighbours[e]]
+                used += 1
+        first[k + 1] = used
+    return first, earlier
+
+
+@njit(inline="always")
+def _elimination_tree(first, earlier):  # type: ignore[no-untyped-def]
     """Parent of each permuted block (Liu 1990), -1 for roots."""
-    n = len(order)
+    n = len(first) - 1
     parent, ancestor = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     for k in range(n):
         parent[k] = ancestor[k] = -1
-    for k in range(n):
-        for e in range(start[order[k]], start[order[k] + 1]):
-            j = place[neighbours[e]]
+        for e in range(first[k], first[k + 1]):
+            j = earlier[e]
             while j != -1 and j < k:
                 above = ancestor[j]
                 ancestor[j] = k
@@ -298,15 +319,14 @@ def _children(parent, first):  # type: ignore[no-untyped-def]
 
 
 @njit()
-def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def]
+def _fronts(first, start, earlier, up):  # type: ignore[no-untyped-def]
     """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]].
 
-    Block i is in its own front, and in all those between that of an earlier block it is coupled to and its own.
+    Block i is in its own front, and in all those between that of an `earlier` block it is coupled to (see `_tree`, where
+    those of block i `start`) and its own.
     """
-    supers, n = len(first) - 1, len(order)
-    place, owner, mark = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(supers, dtype=np.int64)
-    for k in range(n):
-        place[order[k]] = k
+    supers, n = len(first) - 1, len(start) - 1
+    owner, mark = np.empty(n, dtype=np.int64), np.empty(supers, dtype=np.int64)
     for s in range(supers):
         for k in range(first[s], first[s + 1]):
             owner[k] = s
@@ -320,10 +340,9 @@ def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def
             if sweep == 1:
                 rows[used[s]] = i
             used[s] += 1
-            for e in range(start[order[i]], start[order[i] + 1]):
-                j = place[neighbours[e]]
-                s = owner[j]
-                while j < i and mark[s] != i:
+            for e in range(start[i], start[i + 1]):
+                s = owner[earlier[e]]
+                while mark[s] != i:
                     mark[s] = i
                     if sweep == 1:
                         rows[used[s]] = i
