@@ -21,7 +21,7 @@ from rodshell.solve.sparse_ldl import Factors, SingularError
 from rodshell.solve.tangent import subspace_iteration
 
 TOLERANCE = 1e-13  # of the length: estimate of the error that is left
-FORCE_TOLERANCE = 1e-10  # of the largest axial force: the same for the forces
+FORCE_TOLERANCE = 1e-9  # of the largest axial force: the same for the forces, of which round-off leaves as much
 LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
 CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
 MULTIPLIERS = 5e-3  # of the last change is left in forces that are multipliers of a penalty: 2e-4 to 1e-3 measured
