@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -155,10 +155,10 @@ class Assembly:
         numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
         flat = np.concatenate([np.arange(0), *(blocks.ravel() for blocks in element_blocks)])
         indptr, indices, above, every = _pattern(flat, numbers, widths, freedom.count)
-        stops = np.append(0, np.cumsum(numbers * widths**2)).tolist()
+        stops = pairwise(accumulate((blocks.size * blocks.shape[1] for blocks in element_blocks), initial=0))
         slots = tuple(
-            every[begin:stop].reshape(len(blocks), blocks.shape[1], blocks.shape[1])
-            for (begin, stop), blocks in zip(pairwise(stops), element_blocks, strict=True)
+            every[begin:stop].reshape(*blocks.shape, blocks.shape[1])
+            for (begin, stop), blocks in zip(stops, element_blocks, strict=True)
         )
         return Assembly(indptr, indices, freedom.count, above, slots)
 
