@@ -118,7 +118,7 @@ def bound_drape(
             f"the families meet at only {degrees(net.min_angle):.1f} degrees near ({x:.4g}, {y:.4g}, {z:.4g}) m: "
             "the joints there nearly close; another anchor or heading, a smaller part or a seam may open them"
         )
-    built = [not piece.virtual for piece in net.rods]
+    built = np.flatnonzero([not piece.virtual for piece in net.rods])
     figures = DrapeFigures(
         max_gap=float(np.abs(value / steep)[on_target].max()),  # to first order
         contact_pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -155,11 +155,12 @@ class Assembly:
         numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
         flat = np.concatenate([np.arange(0), *(blocks.ravel() for blocks in element_blocks)])
         indptr, indices, above, every = _pattern(flat, numbers, widths, freedom.count)
-        slots, stop = list[Ints](), 0
-        for number, width in zip(numbers.tolist(), widths.tolist(), strict=True):
-            begin, stop = stop, stop + number * width**2
-            slots.append(every[begin:stop].reshape(number, width, width))
-        return Assembly(indptr, indices, freedom.count, above, tuple(slots))
+        stops = pairwise(accumulate((blocks.size * blocks.shape[1] for blocks in element_blocks), initial=0))
+        slots = tuple(
+            every[begin:stop].reshape(*blocks.shape, blocks.shape[1])
+            for (begin, stop), blocks in zip(stops, element_blocks, strict=True)
+        )
+        return Assembly(indptr, indices, freedom.count, above, slots)
 
     def has_pattern_of(self, other: "Assembly") -> bool:
         """Whether the matrices of another assembly have the same pattern, whatever elements they are summed from."""

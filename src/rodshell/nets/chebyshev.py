@@ -86,10 +86,10 @@ class ChebyshevNet:
     def _along(self, rods: Sequence[FlatRod], start: Ints, s: Floats) -> Floats:
         """Points (k, 3) [m] at the material coordinates `s` (k,) [m] of rods one after the other, which begin at
         `start` (m,) in `s`."""
-        offset, across = np.array([(rod.offset, rod.family == "v") for rod in rods]).T
-        line = np.where(across > 0, _nearest(self.net.u, offset), _nearest(self.net.v, offset))
+        offset, across = np.array([rod.offset for rod in rods]), np.array([rod.family == "v" for rod in rods])
+        line = np.where(across, _nearest(self.net.u, offset), _nearest(self.net.v, offset))
         result = np.empty((len(s), 3))
-        _interpolate(self.net.u, self.net.v, self.net.points, line, across > 0, np.append(start, len(s)), s, result)
+        _interpolate(self.net.u, self.net.v, self.net.points, line, across, np.append(start, len(s)), s, result)
         return result
 
     def __repr__(self) -> str:

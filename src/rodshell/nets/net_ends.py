@@ -1,6 +1,7 @@
 """Where the lines of a net end on a target: runs of inside nodes, and the cuts between nodes."""
 
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -175,7 +176,7 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
     count = 2 * sum(len(run) for run in runs)
     knots, points = np.empty((count, 4)), np.empty((count, 4, 3))
     outer, inner = np.empty(count), np.empty(count)
-    stops = np.cumsum([0, *(2 * len(run) for run in runs)]).tolist()
+    stops = list(accumulate((2 * len(run) for run in runs), initial=0))
     for (s, nodes, _), run, begin, stop in zip(sets, runs, stops, stops[1:], strict=False):
         here = slice(begin, stop)
         _around_ends(s, nodes, run, knots[here], points[here], outer[here], inner[here])
@@ -205,6 +206,8 @@ def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float)
     """Of the runs (k, 3) of each set those that are `depth` [m] inside somewhere."""
     middles = [lines.points[run[:, 0], (run[:, 1] + run[:, 2]) // 2] for lines, run in zip(sets, runs, strict=True)]
     deep = target.margin(np.concatenate(middles)) > depth
+    if deep.all():
+        return runs
     kept, done = list[Ints](), 0
     for lines, run in zip(sets, runs, strict=True):
         here = deep[done : done + len(run)]
