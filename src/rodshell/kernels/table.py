@@ -128,7 +128,8 @@ KERNELS: dict[str, dict[str, str]] = {
     },
     "solve.symbolic": {
         "_children": "i1 i1",
-        "_coupled": "i1 i1 i1",
+        "_block_rows": "i1 i1 i1",
+        "_coupled": "i1 i1 i1 i1",
         "_fronts": "i1 i1 i1 i1",
         "_maps": "i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1",
         "_supernodes": "i1 i1 i1",

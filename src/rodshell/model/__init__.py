@@ -1,6 +1,6 @@
 """The assembled shell: free directions of its nodes, and the sum of its energies in them."""
 
-from rodshell.model.assembly import Assembly, Freedom
+from rodshell.model.assembly import Assembly, BlockRows, Freedom
 from rodshell.model.shell import Shell
 
-__all__ = ["Assembly", "Freedom", "Shell"]
+__all__ = ["Assembly", "BlockRows", "Freedom", "Shell"]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -122,6 +123,15 @@ class Freedom:
         return np.asarray(np.einsum("ij,ij->i", diagonal[block], self.directions[block, k] ** 2))
 
 
+class BlockRows(NamedTuple):
+    """A pattern in blocks of unknowns: those of block k `begin` (b + 1,) one after the other, and in its columns there
+    are the blocks rows[start[k] : start[k + 1]] above itself, ascending."""
+
+    begin: Longs
+    start: Longs
+    rows: Longs
+
+
 @dataclass(frozen=True, eq=False)
 class Assembly:
     """Position of each block of each element's Hessian in a sparse matrix; made once per pattern. Build it with `of`.
@@ -132,10 +142,12 @@ class Assembly:
     Parameters
     ----------
     indptr, indices : the pattern (CSC, upper triangle).
+    rows : the same in blocks.
     """
 
     indptr: Longs
     indices: Longs
+    rows: BlockRows
     _count: Ints
     _above: Ints  # (n,) rows above the diagonal block in a block's columns
     _slots: tuple[Ints, ...]  # per element set (m, k, k): where the block begins in the data, -1 if not stored
@@ -154,13 +166,13 @@ class Assembly:
         widths = np.array([blocks.shape[1] for blocks in element_blocks], dtype=np.int64)
         numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
         flat = np.concatenate([np.arange(0), *(blocks.ravel() for blocks in element_blocks)])
-        indptr, indices, above, every = _pattern(flat, numbers, widths, freedom.count)
+        indptr, indices, above, every, *rows = _pattern(flat, numbers, widths, freedom.count)
         stops = pairwise(accumulate((blocks.size * blocks.shape[1] for blocks in element_blocks), initial=0))
         slots = tuple(
             every[begin:stop].reshape(*blocks.shape, blocks.shape[1])
             for (begin, stop), blocks in zip(stops, element_blocks, strict=True)
         )
-        return Assembly(indptr, indices, freedom.count, above, slots)
+        return Assembly(indptr, indices, BlockRows(*rows), freedom.count, above, slots)
 
     def has_pattern_of(self, other: "Assembly") -> bool:
         """Whether the matrices of another assembly have the same pattern, whatever elements they are summed from."""
@@ -219,8 +231,9 @@ class Assembly:
 
 @njit()
 def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
-    """The pattern by unknowns, every diagonal present; rows above each diagonal block; and where the values of each
-    pair of an element's blocks begin, those of all elements in a row, (k, k) of each, -1 if they are not stored.
+    """The pattern by unknowns, every diagonal present; rows above each diagonal block; where the values of each pair of
+    an element's blocks begin, those of all elements in a row, (k, k) of each, -1 if they are not stored; and the
+    `BlockRows` of those with unknowns.
 
     The blocks of all elements lie in a row in `flat`, of each set `numbers` of elements with `widths` of blocks.
     """
@@ -279,7 +292,8 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
         unknowns += count[j]
     kept[n] = used
     indptr, indices = np.zeros(unknowns + 1, dtype=np.int64), np.empty(values, dtype=np.int64)
-    value, unknown = 0, 0
+    block_begin, block_start = np.empty(n + 1, dtype=np.int64), np.empty(n + 1, dtype=np.int64)
+    value, unknown, blocks = 0, 0, 0
     for j in range(n):
         filled[j] = unknown
         for c in range(count[j]):
@@ -293,7 +307,14 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
                 value += 1
             unknown += 1
             indptr[unknown] = value
-    return indptr, indices, above, slots
+        if count[j] > 0:
+            block_begin[blocks], block_start[blocks], place[j] = filled[j], kept[j], blocks
+            blocks += 1
+            for e in range(kept[j], kept[j + 1]):
+                rows[e] = place[rows[e]]
+    block_begin[blocks], block_start[blocks] = unknown, used
+    begins, starts = block_begin[: blocks + 1].copy(), block_start[: blocks + 1].copy()
+    return indptr, indices, above, slots, begins, starts, rows[:used].copy()
 
 
 @njit(error_model="numpy", nogil=True)
@@ -329,9 +350,7 @@ def _scatter(hessians, blocks, slots, count, above, directions, low, high, data)
                     w1 = h10 * d0 + h11 * d1 + h12 * d2
                     w2 = h20 * d0 + h21 * d1 + h22 * d2
                     for r in range(count[i] if i != j else c + 1):
-                        data[base + r] += (
-                            directions[i, r, 0] * w0 + directions[i, r, 1] * w1 + directions[i, r, 2] * w2
-                        )
+                        data[base + r] += directions[i, r, 0] * w0 + directions[i, r, 1] * w1 + directions[i, r, 2] * w2
                     base += above[j] + c + 1
 
 

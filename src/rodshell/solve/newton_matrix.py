@@ -15,7 +15,8 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.kernels import njit
 from rodshell.model import Assembly, Freedom
-from rodshell.solve.sparse_ldl import Factors, LinearSolver, Multifrontal, Qdldl, SingularError
+from rodshell.solve.problem import linear_solver
+from rodshell.solve.sparse_ldl import Factors, SingularError
 
 WIDEST = 64  # half bandwidth beyond which a fill-reducing ordering wins over the band
 LANES = 4  # rows of the band are as long as whole vectors of so many numbers
@@ -151,16 +152,21 @@ class Banded:
 
 
 class SparseSum:
-    """A matrix of any pattern, by a sparse solver."""
+    """A matrix of any pattern, by a sparse solver.
 
-    def __init__(
-        self, element_blocks: Sequence[Ints], free: Freedom, solver: Callable[..., LinearSolver] = Qdldl
-    ) -> None:
+    Parameters
+    ----------
+    element_blocks : (m, k) blocks of each element, for each set of elements.
+    free : the free directions.
+    coordinates : (N, d) where the blocks lie [m], by which they are ordered, if that is known.
+    """
+
+    def __init__(self, element_blocks: Sequence[Ints], free: Freedom, coordinates: Floats | None = None) -> None:
         everywhere = np.arange(len(free.count))[:, None]
         self._last = len(element_blocks)
         self._everywhere = everywhere
         self._assembly = Assembly.of([*element_blocks, everywhere], free)
-        self._solver = solver(self._assembly.indptr, self._assembly.indices)
+        self._solver = linear_solver(self._assembly, free, coordinates)
         self._data = np.zeros(len(self._assembly.indices))
         self._factors: Factors | None = None
 
@@ -217,8 +223,7 @@ def narrow_or_dissected(coordinates: Floats) -> Callable[[Sequence[Ints], Freedo
         banded = Banded(element_blocks, free, widest=WIDEST)
         if banded.half_bandwidth <= WIDEST:
             return banded
-        of_unknowns = np.repeat(coordinates, free.count, axis=0)
-        return SparseSum(element_blocks, free, lambda start, rows: Multifrontal(start, rows, of_unknowns))
+        return SparseSum(element_blocks, free, coordinates)
 
     return make
 

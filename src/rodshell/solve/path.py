@@ -24,7 +24,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
 from rodshell.solve.newton_matrix import SparseSum
-from rodshell.solve.problem import Problem, Supports, linear_solver
+from rodshell.solve.problem import Problem, Supports
 
 EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25
@@ -285,11 +285,7 @@ def relax(
     motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, ())
     if problem.load is not None:
         motion = replace(motion, forces=(_Dead(problem.load),))
-    stepper = ImplicitEuler(
-        lambda blocks, free: SparseSum(
-            blocks, free, lambda indptr, indices: linear_solver(indptr, indices, free, problem.flat_coordinates)
-        )
-    )
+    stepper = ImplicitEuler(lambda blocks, free: SparseSum(blocks, free, problem.flat_coordinates))
     still, length, factorizations, number = np.zeros_like(state), FIRST, 0, 0
     for number in range(1, MOST_STEPS + 1):
         taken = stepper.take(motion, state, still, time=0.0, step=length)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rodshell.arrays import Floats, Ints, Longs
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.elements import Elements, Stretch
@@ -219,7 +219,7 @@ class Problem:
         if self.pattern is not None and assembly.has_pattern_of(self.pattern.assembly):
             solver = self.pattern.solver
         else:
-            solver = linear_solver(assembly.indptr, assembly.indices, free, self.flat_coordinates)
+            solver = linear_solver(assembly, free, self.flat_coordinates)
         return Pattern(blocks, free.count, assembly, solver)
 
     def refreshed(self, state: Floats) -> Self:
@@ -233,18 +233,18 @@ class Problem:
         return elastic - (0.0 if self.load is None else float(np.sum(self.load * state)))
 
 
-def linear_solver(indptr: Longs, indices: Longs, free: Freedom, flat_coordinates: Floats | None) -> LinearSolver:
+def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | None) -> LinearSolver:
     """The solver for a pattern, ordered by where the blocks lie in the flat grid if that is known.
 
     Parameters
     ----------
-    indptr, indices : the pattern, upper triangle in compressed columns.
+    assembly : of the matrices.
     free : the free directions of the blocks.
     flat_coordinates : (n, 2) of the blocks [m]; None: ordered by approximate minimum degree.
     """
     if flat_coordinates is None:
-        return Qdldl(indptr, indices)
-    return Multifrontal(indptr, indices, np.repeat(flat_coordinates, free.count, axis=0))
+        return Qdldl(assembly.indptr, assembly.indices)
+    return Multifrontal(assembly.indptr, assembly.indices, flat_coordinates[free.count > 0], blocks=assembly.rows)
 
 
 def half_width(points: Floats) -> float:

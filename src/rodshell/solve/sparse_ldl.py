@@ -18,6 +18,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
+from rodshell.model import BlockRows
 from rodshell.solve.dense import (
     OVERWRITTEN,
     add_rows,
@@ -29,7 +30,7 @@ from rodshell.solve.dense import (
     subtract_product,
     workspace,
 )
-from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
+from rodshell.solve.symbolic import Plan, blocks_of, coupled, plan_of
 from rodshell.threads import in_threads, threads
 
 if TYPE_CHECKING:  # imported where they are used: most forms need neither, and they take longer than the forms
@@ -150,17 +151,26 @@ class Multifrontal:
     Parameters
     ----------
     indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
-    coordinates : (n, d) where each unknown lies, for nested dissection; None orders by approximate minimum degree.
+    coordinates : (n, d) where each unknown lies, or (b, d) where each of the `blocks` does, for nested dissection; None
+        orders by approximate minimum degree.
+    blocks : of unknowns that lie at one place; None: they are looked for.
     """
 
-    def __init__(self, indptr: Longs, indices: Longs, coordinates: Floats | None = None) -> None:
+    def __init__(
+        self, indptr: Longs, indices: Longs, coordinates: Floats | None = None, *, blocks: BlockRows | None = None
+    ) -> None:
         indptr, indices = (np.ascontiguousarray(part, dtype=np.int64) for part in (indptr, indices))
         self.indptr, self.indices = indptr, indices
-        size = len(indptr) - 1
-        begin = np.arange(size + 1) if coordinates is None else _block_begins(coordinates)
-        blocks = blocks_of(indptr, indices, begin)
-        order = _minimum_degree(indptr, indices) if coordinates is None else _dissected(coordinates, blocks)
-        self.plan = plan_of(indptr, indices, blocks, order)
+        if coordinates is None:
+            graph = coupled(indptr, blocks_of(indptr, indices, np.arange(len(indptr))))
+            order = _minimum_degree(indptr, indices)
+        else:
+            if blocks is None:
+                blocks = blocks_of(indptr, indices, _block_begins(coordinates))
+                coordinates = coordinates[blocks.begin[:-1]]
+            graph = coupled(indptr, blocks)
+            order = dissect(coordinates, graph.start, graph.neighbours)
+        self.plan = plan_of(indptr, graph, order)
         self.parts, self.levels = self.plan.each, self.plan.levels
         self._spare = list[_Scratch]()  # scratch memory that no factorisation is using
 
@@ -306,11 +316,6 @@ def _eliminate_all(
         if not all(regular):
             return False
     return True
-
-
-def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:
-    """Blocks in the order of a nested dissection of their coordinates."""
-    return dissect(coordinates[blocks.begin[:-1]], blocks.start, blocks.neighbours)
 
 
 def _block_begins(coordinates: Floats) -> Longs:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rodshell.arrays import Longs
 from rodshell.kernels import njit
+from rodshell.model import BlockRows
 from rodshell.solve.dense import padded
 
 
@@ -73,36 +74,43 @@ class Blocks(NamedTuple):
     above: Longs
 
 
-def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> Blocks:
-    """The graph of blocks of a pattern (upper triangle, compressed columns); of single unknowns, where some unknown of
-    a block is not coupled as the others are.
+def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> BlockRows:
+    """The blocks of a pattern (upper triangle, compressed columns); single unknowns, where some unknown of a block is
+    not coupled as the others are.
 
     Parameters
     ----------
     indptr, indices : the pattern of the upper triangle, in compressed columns.
     begin : (b + 1,) first unknown of each block, and the number of unknowns.
     """
-    whole, *graph = _coupled(indptr, indices, begin)
-    if whole:
-        return Blocks(begin, *graph)
-    return blocks_of(indptr, indices, np.arange(begin[-1] + 1))
+    whole, start, rows = _block_rows(indptr, indices, begin)
+    return BlockRows(begin, start, rows) if whole else blocks_of(indptr, indices, np.arange(begin[-1] + 1))
 
 
-def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan:
+def coupled(indptr: Longs, blocks: BlockRows) -> Blocks:
+    """The graph of blocks.
+
+    Parameters
+    ----------
+    indptr : where columns begin in the pattern of the upper triangle.
+    blocks : see `BlockRows`.
+    """
+    return Blocks(blocks.begin, *_coupled(indptr, *blocks))
+
+
+def plan_of(indptr: Longs, blocks: Blocks, order: Longs) -> Plan:
     """Of a pattern whose `blocks` are eliminated in `order` (b,), except what the tree leaves open.
 
     Parameters
     ----------
-    indptr, indices : the pattern of the upper triangle, in compressed columns.
-    blocks : its graph, see `blocks_of`.
+    indptr : where columns begin in the pattern of the upper triangle.
+    blocks : its graph.
     order : (b,) blocks in the order of elimination.
     """
-    order, tree, weight, count, *coupled = _tree(
-        blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64)
-    )
+    order, tree, weight, count, *earlier = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
     first = _supernodes(tree, count, weight)
     up, child_start, children = _children(tree, first)
-    row_start, rows = _fronts(first, *coupled, up)
+    row_start, rows = _fronts(first, *earlier, up)
     maps = _maps(indptr, *blocks, order, weight, first, up, row_start, rows, child_start, children)
     return Plan(*maps)
 
@@ -116,46 +124,56 @@ def start_after(count, start):  # type: ignore[no-untyped-def]
 
 
 @njit()
-def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
-    """The other blocks to which each block of unknowns is coupled (see `Blocks`); first, whether these are blocks."""
-    n, other = len(begin) - 1, 0  # entries that are not where those of blocks are
-    block, above = np.empty(begin[n], dtype=np.int64), np.empty(n, dtype=np.int64)
-    count, start = np.zeros(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64)
+def _block_rows(indptr, indices, begin):  # type: ignore[no-untyped-def]
+    """Whether these are blocks that are coupled as wholes; and their `BlockRows`."""
+    n, used, other = len(begin) - 1, 0, 0  # entries that are not where those of blocks are
+    block, start, rows = np.empty(begin[n], dtype=np.int64), np.zeros(n + 1, dtype=np.int64), np.empty_like(indices)
     for b in range(n):
         j, last = begin[b], begin[b + 1] - 1
-        e = indptr[j]
-        above[b] = indptr[last + 1] - indptr[last] - (last + 1 - j)
-        stop = e + above[b]
+        e, above = indptr[j], indptr[last + 1] - indptr[last] - (last + 1 - j)
+        stop = e + above
         for k in range(j, last + 1):  # every column has the rows of the first, and the block's own
             block[k] = b
-            other += indptr[k + 1] - indptr[k] != above[b] + k - j + 1
+            other += indptr[k + 1] - indptr[k] != above + k - j + 1
         if other > 0:
             break
         for k in range(j + 1, last + 1):
-            for d in range(above[b]):
+            for d in range(above):
                 other += indices[indptr[k] + d] != indices[e + d]
         while e < stop:
-            a = block[indices[e]]
-            for k in range(begin[a], begin[a + 1]):
+            rows[used] = block[indices[e]]
+            for k in range(begin[rows[used]], begin[rows[used] + 1]):
                 other += e == stop or indices[e] != k
                 e += 1
-            count[a] += 1
-            count[b] += 1
+            used += 1
+        start[b + 1] = used
+    return other == 0, start, rows[:used].copy()
+
+
+@njit()
+def _coupled(indptr, begin, row_start, rows):  # type: ignore[no-untyped-def]
+    """The other blocks to which each block of unknowns is coupled, and more: see `Blocks`."""
+    n = len(begin) - 1
+    count, start, above = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for b in range(n):
+        count[b] = row_start[b + 1] - row_start[b]
+        above[b] = indptr[begin[b] + 1] - indptr[begin[b]] - 1
+    for a in rows:
+        count[a] += 1
     start_after(count, start)
     neighbours, source, place = np.empty(start[n], dtype=np.int64), np.empty(start[n], dtype=np.int64), count
     for b in range(n):
         place[b] = start[b]
-    for b in range(n if other == 0 else 0):
-        e = indptr[begin[b]]
-        stop = e + above[b]
-        while e < stop:
-            a = block[indices[e]]
+    for b in range(n):
+        at = indptr[begin[b]]
+        for e in range(row_start[b], row_start[b + 1]):
+            a = rows[e]
             neighbours[place[a]], neighbours[place[b]] = b, a
-            source[place[a]] = source[place[b]] = e
+            source[place[a]] = source[place[b]] = at
             place[a] += 1
             place[b] += 1
-            e += begin[a + 1] - begin[a]
-    return other == 0, start, neighbours, source, above
+            at += begin[a + 1] - begin[a]
+    return start, neighbours, source, above
 
 
 @njit()
@@ -322,8 +340,8 @@ def _children(parent, first):  # type: ignore[no-untyped-def]
 def _fronts(first, start, earlier, up):  # type: ignore[no-untyped-def]
     """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]].
 
-    Block i is in its own front, and in all those between that of an `earlier` block it is coupled to (see `_tree`, where
-    those of block i `start`) and its own.
+    Block i is in its own front, and in all those between that of an `earlier` block it is coupled to (see `_tree`) and
+    its own.
     """
     supers, n = len(first) - 1, len(start) - 1
     owner, mark = np.empty(n, dtype=np.int64), np.empty(supers, dtype=np.int64)
