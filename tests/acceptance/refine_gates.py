@@ -200,8 +200,10 @@ def with_errors(form: PatchForm, seed: int) -> float:
     factor = 1 + random.uniform(-0.05, 0.05, len(mesh.grid.rods))
     ei, ea, gj = form.rod.bend_stiffnesses, form.rod.stretch_stiffness, form.rod.twist_stiffness
     plain = [rod.profile for rod in mesh.grid.rods]
-    lines = tuple(replace(rod, start=float(stations[mesh.rod_slice(k)][0]), end=float(stations[mesh.rod_slice(k)][-1]))
-                  for k, rod in enumerate(mesh.grid.rods))  # fmt: skip
+    lines = tuple(
+        rod.cut(float(stations[mesh.rod_slice(k)][0]), float(stations[mesh.rod_slice(k)][-1]))
+        for k, rod in enumerate(mesh.grid.rods)
+    )
     wrong = replace(mesh, stations=stations, grid=replace(mesh.grid, rods=lines).with_profiles(plain))
     if any(profile is not None and profile.varies != "size" for profile in plain):
         raise ValueError("only tapers by size are tried here")

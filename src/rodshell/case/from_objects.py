@@ -95,6 +95,7 @@ def _rod_table(table: RodTable, rod: Rod) -> RodTable:
 
 
 def _joint_keys(joint: Joint) -> dict[str, object]:
+    """[joint] without the rod of linkers, which no key describes."""
     keys = joint_parameters(joint)
     keys.pop("rod", None)
     return keys
@@ -102,8 +103,8 @@ def _joint_keys(joint: Joint) -> dict[str, object]:
 
 def _joint_table(table: JointTable, joint: Joint) -> JointTable:
     """[joint] of any joint; linkers of a rod of their own are held."""
-    own = getattr(joint, "rod", None)
-    return table if own is None else table.holding(Held(joint, "joints with linkers of another rod"))
+    described = getattr(joint, "rod", None) is None
+    return table if described else table.holding(Held(joint, "joints with linkers of another rod"))
 
 
 def _without_keys(shape: Mapping[str, object]) -> str:

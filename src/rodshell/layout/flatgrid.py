@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from reprlib import repr as short
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +19,7 @@ Family = Literal["u", "v", "free"]
 PARALLEL = 1e-9  # sine of the angle between lines that do not cross
 
 
-@dataclass(frozen=True)
-class FlatRod:
+class FlatRod(NamedTuple):
     """A straight rod in the flat state: the points `origin + s * direction` for `start <= s <= end`.
 
     Rods of family "u" run along the layout's x axis at y = `offset`, rods of family "v" along y at x = `offset`, and s
@@ -212,7 +211,7 @@ class FlatGrid:
             raise InputError(
                 f"the grid has {len(self.rods)} rods: give one profile for all, or one for each, not {len(each)}"
             )
-        rods = tuple(replace(rod, profile=profile) for rod, profile in zip(self.rods, each, strict=True))
+        rods = tuple(rod._replace(profile=profile) for rod, profile in zip(self.rods, each, strict=True))
         return replace(self, rods=rods)
 
     def without(self, leave_out: Callable[["FlatGrid"], Bools]) -> tuple["FlatGrid", list[str]]:

@@ -579,10 +579,10 @@ def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
     label, by = f"{name}-{rod.name}", _along(rod, shift)
     if rod.family == "free":
         x, y = np.array(rod.origin) + shift
-        return replace(rod, name=label, origin=(float(x), float(y)))
+        return rod._replace(name=label, origin=(float(x), float(y)))
     make, across = (FlatRod.u, shift[1]) if rod.family == "u" else (FlatRod.v, shift[0])
     moved = make(label, rod.offset + float(across), rod.start + by, rod.end + by)
-    return replace(moved, profile=rod.profile)
+    return moved._replace(profile=rod.profile)
 
 
 def _merged(meshes: list[GridMesh]) -> GridMesh:

@@ -268,32 +268,34 @@ def _interpolate(u, v, points, line, across, start, s, result):  # type: ignore[
     line, across : (m,) index of each line in its family, and whether that is family v.
     start : (m + 1,) where each line begins in `s`.
     """
-    known, shares = np.empty(max(len(u), len(v)), dtype=np.intp), np.empty(4)
+    most = max(len(u), len(v))
+    at, there, shares = np.empty(most), np.empty((most, 3)), np.empty(4)  # the known nodes of a line
     for m in range(len(line)):
         knots, count = (v if across[m] else u), 0
         for n in range(len(knots)):
-            if np.isfinite(points[line[m], n, 0] if across[m] else points[n, line[m], 0]):
-                known[count] = n
+            i, j = (line[m], n) if across[m] else (n, line[m])
+            if np.isfinite(points[i, j, 0]):
+                at[count] = knots[n]
+                for d in range(3):
+                    there[count, d] = points[i, j, d]
                 count += 1
         near, after = min(4, count), 0
         for e in range(start[m], start[m + 1]):
-            while after > 0 and knots[known[after - 1]] >= s[e]:
+            while after > 0 and at[after - 1] >= s[e]:
                 after -= 1
-            while after < count and knots[known[after]] < s[e]:
+            while after < count and at[after] < s[e]:
                 after += 1
             first = min(max(after - near // 2, 0), count - near)
             for j in range(near):
-                at_j, above, below = knots[known[first + j]], 1.0, 1.0
+                above, below = 1.0, 1.0
                 for k in range(near):
                     if j != k:
-                        at_k = knots[known[first + k]]
-                        above, below = above * (s[e] - at_k), below * (at_j - at_k)
+                        above, below = above * (s[e] - at[first + k]), below * (at[first + j] - at[first + k])
                 shares[j] = above / below
             for d in range(3):
                 value = 0.0
                 for j in range(near):
-                    n = known[first + j]
-                    value += shares[j] * (points[line[m], n, d] if across[m] else points[n, line[m], d])
+                    value += shares[j] * there[first + j, d]
                 result[e, d] = value
 
 

@@ -223,4 +223,4 @@ def _moved(rod: FlatRod, start: float, end: float, across: float) -> FlatRod:
     """A rod with other ends, its line moved across itself."""
     x, y = rod.origin
     origin = (x, y + across) if rod.family == "u" else (x + across, y)
-    return replace(rod, start=start, end=end, offset=rod.offset + across, origin=origin if across else rod.origin)
+    return rod._replace(start=start, end=end, offset=rod.offset + across, origin=origin if across else rod.origin)
