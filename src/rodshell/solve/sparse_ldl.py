@@ -382,11 +382,12 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     diagonal."""
     residual, left, size = right.copy(), 0.0, 0.0
     for j in range(len(x)):
-        last, total = indptr[j + 1] - 1, 0.0
+        last, total, here = indptr[j + 1] - 1, 0.0, x[j]
         for e in range(indptr[j], last):
-            residual[indices[e]] -= data[e] * x[j]
-            total += data[e] * x[indices[e]]
-        product = data[last] * x[j]
+            i = np.uint64(indices[e])  # unsigned, it need not be checked for a negative index: a third of the time
+            residual[i] -= data[e] * here
+            total += data[e] * x[i]
+        product = data[last] * here
         residual[j] -= total + product
         size = max(size, abs(product))
     for j in range(len(x)):
@@ -399,16 +400,19 @@ def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, 
     """Forward substitution in place, supernode by supernode of a `part`. What goes to unknowns outside of the part is
     added to `sums` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
     for s in part:
-        size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        begin, at = first[s], row_start[s]
+        size, width = row_start[s + 1] - at, first[s + 1] - begin
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
-        for i in range(len(values)):
-            values[i] = x[first[s] + i] if i < width else 0.0
+        for i in range(width):
+            values[i] = x[begin + i]
+        for i in range(width, len(values)):
+            values[i] = 0.0
         forward(panel, values, aside)
         for i in range(width):
-            x[first[s] + i] = values[i]
+            x[begin + i] = values[i]
         for i in range(width, size):
-            row = rows[row_start[s] + i]
+            row = rows[at + i]
             if len(above) > 0 and above[row] >= 0:
                 sums[above[row]] += values[i]
             else:
@@ -420,14 +424,17 @@ def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, loca
     """Backward substitution in place, supernode by supernode of a `part`."""
     for k in range(len(part) - 1, -1, -1):
         s = part[k]
-        size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        begin, at = first[s], row_start[s]
+        size, width = row_start[s + 1] - at, first[s + 1] - begin
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
-        for i in range(len(values)):
-            values[i] = x[rows[row_start[s] + i]] if i < size else 0.0
-        backward(panel, pivots[first[s] : first[s + 1]], values, aside)
+        for i in range(size):
+            values[i] = x[rows[at + i]]
+        for i in range(size, len(values)):
+            values[i] = 0.0
+        backward(panel, pivots[begin : begin + width], values, aside)
         for i in range(width):
-            x[first[s] + i] = values[i]
+            x[begin + i] = values[i]
 
 
 LEAF = 12  # blocks that are not divided further
