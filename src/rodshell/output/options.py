@@ -2,7 +2,7 @@
 
 import datetime
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
@@ -58,7 +58,7 @@ class DrawingStyle:
 
     def parameters(self) -> dict[str, Any]:
         """As it is kept in a result."""
-        return asdict(self) | {"layers": dict(self.layers)}
+        return {**vars(self), "layers": dict(self.layers)}
 
 
 def _require_names(layers: Mapping[str, str]) -> None:
@@ -173,6 +173,6 @@ class OutputOptions:
         layers = {name.lower().replace("-", "_"): shown for name, shown in self.drawings.layers.items()}
         return {
             "checks": {"strength": self.strength, "stages": self.stages, "shear_strength": self.shear_strength},
-            "fabrication": asdict(self.fabrication),
+            "fabrication": dict(vars(self.fabrication)),
             "drawings": self.drawings.parameters() | {"layers": layers},
         }
