@@ -6,13 +6,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress, pairwise
 from math import cos, sin
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
 from rodshell.arrays import Floats
 
 Anchor = Literal["start", "middle", "end"]
+T = TypeVar("T", float, Floats)
 
 INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"
 LETTER = 0.62  # width of a capital or digit over the text size
@@ -76,8 +77,7 @@ class Pen(NamedTuple):
     fill: str = ""
 
 
-@dataclass(frozen=True)
-class Path:
+class Path(NamedTuple):
     """A polyline.
 
     Parameters
@@ -99,12 +99,6 @@ class Path:
     def flat(self) -> bool:
         return bool(self.points.shape[1] == 2)
 
-    @cached_property
-    def extent(self) -> tuple[float, float, float, float]:
-        """Lowest x and y, highest x and y [mm]."""
-        x, y = self.points.T.tolist()
-        return min(x), min(y), max(x), max(y)
-
 
 class Mark(NamedTuple):
     """A circle.
@@ -123,8 +117,7 @@ class Mark(NamedTuple):
     note: str = ""
 
 
-@dataclass(frozen=True)
-class Text:
+class Text(NamedTuple):
     """One line of text.
 
     Parameters
@@ -148,16 +141,19 @@ class Text:
 
     def box(self) -> Floats:
         """(4, 2) corners of the room that it takes [mm], each letter taken as wide as a broad one."""
-        return self._box
+        x, y = self.at.tolist()
+        return np.array(_corners(x, y, cos(self.angle), sin(self.angle), self.size, len(self.text), BACK[self.anchor]))
 
-    @cached_property
-    def _box(self) -> Floats:
-        (x, y), c, s = self.at.tolist(), cos(self.angle), sin(self.angle)
-        width = LETTER * self.size * len(self.text)
-        left = {"start": 0.0, "middle": -0.5, "end": -1.0}[self.anchor] * width
-        right, low, high = left + width, -BELOW * self.size, (LINE - BELOW) * self.size
-        corners = (left, low), (right, low), (right, high), (left, high)
-        return np.array([(x + c * u - s * v, y + s * u + c * v) for u, v in corners])
+
+BACK: dict[Anchor, float] = {"start": 0.0, "middle": -0.5, "end": -1.0}  # where a text begins, in its widths
+
+
+def _corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[T, T]]:
+    """x and y of the four corners of a text's room, or of many: of numbers, or of arrays (t,)."""
+    width = LETTER * size * letters
+    left = back * width
+    right, low, high = left + width, -BELOW * size, (LINE - BELOW) * size
+    return [(x + c * u - s * v, y + s * u + c * v) for u, v in ((left, low), (right, low), (right, high), (left, high))]
 
 
 @dataclass(frozen=True)
@@ -202,17 +198,24 @@ class Drawing:
 
     @cached_property
     def _box(self) -> tuple[Floats, Floats]:
-        corners = [corner for extents in self._extents for corner in extents]
-        cloud = np.concatenate([*corners, *(path.points for path in self.paths if path.flat)])
+        cloud = np.concatenate([corner for extents in self._extents for corner in extents])
         return (cloud.min(axis=0), cloud.max(axis=0)) if len(cloud) else (np.zeros(2), np.ones(2))
 
     @cached_property
-    def _extents(self) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
-        """Lowest and highest x and y of each mark (m, 2), (m, 2), and of each text's room (t, 2), (t, 2) [mm]."""
+    def _extents(self) -> tuple[tuple[Floats, Floats], ...]:
+        """Lowest and highest x and y (n, 2), (n, 2) of each path in the plane, each mark and each text's room [mm]."""
+        paths = [path.points for path in self.paths if path.flat]
+        starts = np.cumsum([0, *map(len, paths)])[:-1]
+        points = np.concatenate([np.empty((0, 2)), *paths])
         at = np.array([mark.at for mark in self.marks]).reshape(-1, 2)
         radius = np.array([mark.radius for mark in self.marks]).reshape(-1, 1)
-        boxes = np.array([text.box() for text in self.texts]).reshape(-1, 4, 2)
-        return (at - radius, at + radius), (boxes.min(axis=1), boxes.max(axis=1))
+        rows = [(*t.at.tolist(), cos(t.angle), sin(t.angle), t.size, len(t.text), BACK[t.anchor]) for t in self.texts]
+        boxes = np.array(_corners(*np.array(rows).reshape(-1, 7).T))
+        return (
+            (np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)),
+            (at - radius, at + radius),
+            (boxes.min(axis=0).T, boxes.max(axis=0).T),
+        )
 
     def placed(self, scale: float, shift: Floats) -> "Drawing":
         """The drawing scaled about the origin, with its pens and texts, then shifted. Paths in space are left out.
@@ -253,17 +256,17 @@ class Drawing:
         ----------
         low, high : (2,) lower left and upper right corner of the rectangle [mm].
         """
-        left, bottom, right, top = map(float, (*low, *high))
-
+        flat = [path for path in self.paths if path.flat]
+        extents = self._extents
+        inside, marks, texts = (np.all((lowest >= low) & (highest <= high), axis=1) for lowest, highest in extents)
+        near = np.all((extents[0][1] >= low) & (extents[0][0] <= high), axis=1)
         paths = list[Path]()
-        for path in self.paths:
-            x0, y0, x1, y1 = path.extent if path.flat else (np.inf, np.inf, -np.inf, -np.inf)
-            if left <= x0 and bottom <= y0 and x1 <= right and y1 <= top:
+        for path, whole in compress(zip(flat, inside.tolist(), strict=True), near):
+            if whole:
                 paths.append(path)
-            elif x1 >= left and y1 >= bottom and x0 <= right and y0 <= top:
+            else:
                 points = np.vstack([path.points, path.points[:1]]) if path.closed else path.points
-                paths += [replace(path, points=part, closed=False) for part in _inside(points, low, high)]
-        marks, texts = (np.all((lowest >= low) & (highest <= high), axis=1) for lowest, highest in self._extents)
+                paths += [path._replace(points=part, closed=False) for part in _inside(points, low, high)]
         return replace(
             self, paths=tuple(paths), marks=tuple(compress(self.marks, marks)), texts=tuple(compress(self.texts, texts))
         )

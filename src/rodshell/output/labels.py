@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,8 +18,7 @@ STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6
 THIN = 0.1  # what a line takes, over the size of its text
 
 
-@dataclass(frozen=True)
-class Label:
+class Label(NamedTuple):
     """A rod's label at one of its ends.
 
     Parameters

@@ -441,8 +441,9 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
     """
     pencil, (row, column), free = Pencil(), here, Room(20.0)
     for text in part.texts:
-        if not within(text.box(), low, high):
-            free.take(text.box())
+        box = text.box()
+        if not within(box, low, high):
+            free.take(box)
     paths = [path.points for path in part.paths if not within(path.points, low, high)]
     ends = [points[:-1] for points in paths], [points[1:] for points in paths]
     drawn = np.stack([np.concatenate([np.empty((0, 2)), *points]) for points in ends], axis=1)
@@ -471,7 +472,7 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         written = Text(words, line[0], TEXT, "TITLE", angle=angle, colour=pen.colour)
         crossed = np.ceil(length_beneath(written.box(), shifts, drawn) / TEXT)
         for shift in shifts[np.argsort(crossed, kind="stable")]:
-            placed = replace(written, at=line[0] + shift)
+            placed = written._replace(at=line[0] + shift)
             if free.claim(placed.box()):
                 pencil.texts.append(placed)
                 break
