@@ -295,7 +295,8 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     """
     sides = box[[1, 3]] - box[0]
     axes = (2.0 * sides / (sides**2).sum(axis=1)[:, None]).T
-    return bool(runs_through((lines - box.sum(axis=0) / 4) @ axes).any())
+    points = (lines - box.sum(axis=0) / 4).reshape(-1, 2) @ axes  # one product, not one for each line
+    return bool(runs_through(points.reshape(-1, 2, 2)).any())
 
 
 def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:

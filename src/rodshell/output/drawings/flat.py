@@ -185,7 +185,8 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
             off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
             label = Label(joint.id, mark + off * corner, 0.0, mark, moved=False)
             written = label.written(size)
-            if not lines_meet(written.box(), clear_of) and room.claim(written.box()):
+            box = written.box()
+            if not lines_meet(box, clear_of) and room.claim(box):
                 pencil.texts.append(written)
                 break
         else:
