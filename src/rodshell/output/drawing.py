@@ -374,11 +374,11 @@ def within(box: Floats, low: Floats, high: Floats) -> bool:
 
 def _inside(points: Floats, low: Floats, high: Floats) -> Iterator[Floats]:
     """The pieces of a polyline (k, 2) inside a rectangle [Liang and Barsky 1984]."""
-    piece: list[Floats] = []
-    for a, b in pairwise(points):
-        enter, leave = 0.0, 1.0
-        slopes, rooms = (*(a - b).tolist(), *(b - a).tolist()), (*(a - low).tolist(), *(high - a).tolist())
-        for slope, room in zip(slopes, rooms, strict=True):
+    (left, bottom), (right, top) = low.tolist(), high.tolist()
+    piece: list[tuple[float, float]] = []
+    for (ax, ay), (bx, by) in pairwise(points.tolist()):
+        x, y, enter, leave = bx - ax, by - ay, 0.0, 1.0
+        for slope, room in ((-x, ax - left), (-y, ay - bottom), (x, right - ax), (y, top - ay)):
             if slope == 0:
                 enter = enter if room >= 0 else 2.0
             elif slope < 0:
@@ -390,8 +390,8 @@ def _inside(points: Floats, low: Floats, high: Floats) -> Iterator[Floats]:
         if enter > 0 or not piece:
             if len(piece) > 1:
                 yield np.array(piece)
-            piece = [a + enter * (b - a)]
-        piece.append(a + leave * (b - a))
+            piece = [(ax + enter * x, ay + enter * y)]
+        piece.append((ax + leave * x, ay + leave * y))
         if leave < 1:
             yield np.array(piece)
             piece = []
