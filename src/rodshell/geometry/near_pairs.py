@@ -4,6 +4,7 @@ than all that a shell of usual size needs here."""
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.geometry.bounds import bounds
 
 MOST_CELLS = 2**20  # along an axis, so that a cell's number is a whole number of 64 bits
 PART = 2**15  # points that are looked at together, to bound the memory
@@ -22,7 +23,8 @@ def near_pairs(points: Floats, radius: float) -> Ints:
     """
     if len(points) < 2:
         return np.empty((0, 2), dtype=np.intp)
-    low, extent = points.min(axis=0), np.ptp(points, axis=0).max()
+    low, high = bounds(points)
+    extent = (high - low).max()
     cell = np.floor((points - low) / max(radius, extent / MOST_CELLS)).astype(np.int64) + 1
     rows = cell.max(axis=0) + 2  # one empty cell at each end: a neighbour's number is never that of another row
     number = (cell[:, 0] * rows[1] + cell[:, 1]) * rows[2] + cell[:, 2]

@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple, TypeVar
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.geometry.bounds import bounds
 
 Anchor = Literal["start", "middle", "end"]
 T = TypeVar("T", float, Floats)
@@ -199,7 +200,7 @@ class Drawing:
     @cached_property
     def _box(self) -> tuple[Floats, Floats]:
         cloud = np.concatenate([corner for extents in self._extents for corner in extents])
-        return (cloud.min(axis=0), cloud.max(axis=0)) if len(cloud) else (np.zeros(2), np.ones(2))
+        return bounds(cloud) if len(cloud) else (np.zeros(2), np.ones(2))
 
     @cached_property
     def _extents(self) -> tuple[tuple[Floats, Floats], ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.geometry.bounds import bounds
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
 from rodshell.output.drawing import Drawing, Path, Pen, Pencil
 from rodshell.output.grid import STAGE, GridRod, Shape, opens, outlines_of, rods_of, shape_names, shape_of
@@ -49,13 +50,14 @@ class View:
         points : (n, 3) all that is to be seen [m].
         width : of the picture [drawing units].
         """
-        low, high = points.min(axis=0), points.max(axis=0)
+        low, high = bounds(points)
         corners = np.array([[x, y, low[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
         corners = np.concatenate([corners, points])
         plane = np.column_stack([corners @ RIGHT, corners @ UP])
-        spread = np.ptp(plane, axis=0)
+        left_bottom, right_top = bounds(plane)
+        spread = right_top - left_bottom
         scale = width / max(spread[0], 1e-12)
-        left_top = np.array([plane[:, 0].min(), plane[:, 1].max()])
+        left_top = np.array([left_bottom[0], right_top[1]])
         return View(low, high, float(scale), -scale * left_top, scale * spread)
 
     def project(self, points: Floats) -> Floats:

@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.geometry.bounds import bounds
 from rodshell.output.drawing import (
     BELOW,
     INK,
@@ -67,7 +68,7 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
         for curve in apart(map(thinned, flat)):
             pencil.line(curve, "CUT", pen=pen)
         cloud = np.concatenate(flat)
-        low, high = cloud.min(axis=0), cloud.max(axis=0)
+        low, high = bounds(cloud)
         _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, rounding)
         _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, rounding)
         pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
@@ -97,7 +98,7 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     for way in ways.transpose(1, 0, 2):
         pencil.line(way, "DIM", pen=Pen("#b08a2e", 0.1 * text))
         pencil.mark(way[-1], 0.3 * text, "MARK", pen=thin)
-    low, high = ways.reshape(-1, 2).min(axis=0), ways.reshape(-1, 2).max(axis=0)
+    low, high = bounds(ways.reshape(-1, 2))
     pencil.write("Paths of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
     pencil.write("Closed lines: the ends at each stage", (low[0], low[1] - 4.8 * text), text, "LABEL")
     left, top = high[0] + 8 * text, high[1]
