@@ -11,6 +11,7 @@ from rodshell.arrays import Bools, Floats
 from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
 
 Extent = tuple[float, float, float, float]
+Corners = Sequence[tuple[float, float]]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
 CLOSE = 5  # positions that are tried on a label's line
@@ -76,7 +77,7 @@ class Room:
             for (x0, y0, x1, y1), other in self._taken.get(square, ())
             if x0 < right and left < x1 and y0 < high and low < y1
         ]
-        return not near or not boxes_meet(box, np.array(near))
+        return not boxes_meet(box, near)
 
     def take(self, box: Floats) -> None:
         self._boxes.append(box)
@@ -270,20 +271,25 @@ def upright(angle: float) -> float:
     return angle + (np.pi if angle < 0 else -np.pi)
 
 
-def boxes_meet(box: Floats, others: Floats) -> bool:
-    """Whether the rectangle (4, 2) covers a part of one of `others` (m, 4, 2): no axis separates them.
+def boxes_meet(box: Floats, others: Iterable[Floats]) -> bool:
+    """Whether the rectangle (4, 2) covers a part of one of the others.
 
     Parameters
     ----------
-    box : (4, 2) corners in a row; others : (m, 4, 2) the same.
+    box : (4, 2) corners in a row; others : the same of each.
     """
-    if not len(others):
-        return False
-    sides_of_box = np.broadcast_to(box[[1, 3]] - box[0], (len(others), 2, 2))
-    sides = np.concatenate([sides_of_box, others[:, [1, 3]] - others[:, :1]], axis=1)
-    p, q = np.einsum("mac,pc->map", sides, box), np.einsum("mac,mpc->map", sides, others)
-    apart = (p.max(-1) <= q.min(-1)) | (q.max(-1) <= p.min(-1))
-    return bool(np.any(~apart.any(axis=1)))
+    corners = box.tolist()
+    return any(not _apart(corners, other.tolist()) for other in others)
+
+
+def _apart(box: Corners, other: Corners) -> bool:
+    """Whether an axis along a side of one of two rectangles separates them; they may touch."""
+    for (ax, ay), (bx, by), _, (dx, dy) in (box, other):
+        for ux, uy in ((bx - ax, by - ay), (dx - ax, dy - ay)):
+            p, q = ([ux * x + uy * y for x, y in corners] for corners in (box, other))
+            if max(p) <= min(q) or max(q) <= min(p):
+                return True
+    return False
 
 
 def lines_meet(box: Floats, lines: Floats) -> bool:
