@@ -320,7 +320,8 @@ def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:
     along = (lines[:, 1] - lines[:, 0]) @ axes
     along = np.where(np.abs(along) < 1e-12, 1e-12, along)
     low, high = (-1.0 - start) / along, (1.0 - start) / along  # shares of each line at which it meets the sides
-    enter, leave = np.minimum(low, high).max(axis=-1), np.maximum(low, high).min(axis=-1)
+    enters, leaves = np.minimum(low, high), np.maximum(low, high)
+    enter, leave = np.maximum(enters[..., 0], enters[..., 1]), np.minimum(leaves[..., 0], leaves[..., 1])
     shares = np.maximum(np.minimum(leave, 1.0) - np.maximum(enter, 0.0), 0.0)
     return np.asarray(shares @ np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1))
 
