@@ -1,10 +1,13 @@
-"""Memory of arrays: what a solve frees serves the next."""
+"""Memory of arrays: what a solve frees serves the next; and the median."""
 
 import platform
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+
+from rodshell.arrays import median
 
 MEASURED = """
 import resource
@@ -29,3 +32,10 @@ def test_memory_that_was_freed_is_not_cleared_again_by_the_system():
     first, *later = map(int, said.split())
     assert first > 5000
     assert max(later) < 500
+
+
+@pytest.mark.parametrize("shape", [1, 2, 3, 10, 11, (4, 3), (5, 3)])
+def test_the_median_is_numpys(shape: int | tuple[int, int]) -> None:
+    values = np.random.default_rng(3).normal(size=shape)
+    assert median(values) == np.median(values)
+    assert median(values.tolist()) == np.median(values)

@@ -1,7 +1,7 @@
-"""Types of arrays: double precision, indices, 64-bit integers, booleans."""
+"""Types of arrays: double precision, indices, 64-bit integers, booleans; and what all need of them."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -13,3 +13,16 @@ Bools = NDArray[np.bool_]
 # M_TRIM_THRESHOLD), and how arrays happen to lie decides when. So it is shown a block that no page is ever asked for.
 _SHOWN = 31 << 20  # bytes: a little less than the most that it heeds, 32 MB; twice as much is kept
 np.empty(_SHOWN, dtype=np.uint8)
+
+
+def median(values: ArrayLike) -> float:
+    """The median of one or more finite values, as `np.median` finds it, which first loads NumPy's masked arrays.
+
+    Parameters
+    ----------
+    values : of any shape.
+    """
+    flat = np.asarray(values, dtype=float).ravel()
+    half = len(flat) // 2
+    parted = np.partition(flat, (~half, half))
+    return 0.5 * float(parted[~half] + parted[half])

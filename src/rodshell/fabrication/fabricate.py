@@ -6,7 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, median
 from rodshell.errors import InputError
 from rodshell.fabrication.cutting import Nesting, nest, splices
 from rodshell.layout import GridMesh, Profile
@@ -167,7 +167,7 @@ def _splices(
         shift = options.end_allowance - rod.start  # from material coordinates to the cut rod
         joints = crossings.at[crossings.rods == k] + shift
         cut = rod.length + 2 * options.end_allowance
-        apart = float(np.median(np.diff(np.sort(joints)))) if len(joints) > 1 else 0.0
+        apart = median(np.diff(np.sort(joints))) if len(joints) > 1 else 0.0
         found = splices(
             cut, joints, stock, stations=mesh.stations[here] + shift, curvature=bend[here], short=short * apart
         )

@@ -12,7 +12,7 @@ from math import degrees
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, median
 from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
@@ -156,10 +156,7 @@ def _within_surface(rod: Rod) -> Rod:
 
 def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
     """Edges as a penalty: stiff enough to outweigh bending, which grows with the square of the size over the edge."""
-    half = len(stretch.rest_lengths) // 2
-    lengths = np.partition(stretch.rest_lengths, (~half, half))  # as np.median does, which takes twice as long
-    median = 0.5 * float(lengths[~half] + lengths[half])
-    weight = max(LEAST_PENALTY, PENALTY * (target.size / median) ** 2)
+    weight = max(LEAST_PENALTY, PENALTY * (target.size / median(stretch.rest_lengths)) ** 2)
     stiffness = weight * rod.bend_stiffness / target.size**2
     return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
 

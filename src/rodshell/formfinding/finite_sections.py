@@ -14,7 +14,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, median
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
@@ -269,5 +269,5 @@ def _joint_distances(mesh: GridMesh) -> Floats:
     for rod in range(len(result)):
         gaps = np.diff(np.sort(crossings.at[crossings.rods == rod]))
         if len(gaps):
-            result[rod] = np.median(gaps)
+            result[rod] = median(gaps)
     return result

@@ -9,7 +9,7 @@ from math import degrees, pi, sqrt
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, median
 from rodshell.errors import InputError
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
@@ -357,7 +357,7 @@ def _spans(grid: FlatGrid) -> float:
     for rod in range(len(grid.rods)):
         on_rod = grid.crossings.at[grid.crossings.rods == rod]
         gaps += np.diff(np.sort(on_rod)).tolist()
-    return float(np.median(gaps)) if gaps else min(rod.length for rod in grid.rods)
+    return median(gaps) if gaps else min(rod.length for rod in grid.rods)
 
 
 def _stretched(draped: Draped) -> tuple[str, ...]:

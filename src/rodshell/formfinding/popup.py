@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, median
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
@@ -441,7 +441,7 @@ def _lattice_coordinates(mesh: GridMesh) -> Floats:
         in_family = np.array([rod.family == family for rod in rods])
         steps = np.diff(np.unique(offset[in_family]))
         if len(steps):
-            offset[in_family] /= np.median(steps)
+            offset[in_family] /= median(steps)
     return np.column_stack([offset, [0.5 * (rod.start + rod.end) for rod in rods]])
 
 

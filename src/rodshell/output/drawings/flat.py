@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, median
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
 from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
 from rodshell.output.labels import Label, Room, callouts, closed_segments, lines_meet, outward, place, spread, take
@@ -72,7 +72,7 @@ class FlatPlan:
         steps = [np.diff(np.sort([at for _, at in rod.joints])) for rod in self.rods]
         steps = [step[step > 1e-6] for step in steps]
         known = np.concatenate(steps) if steps else np.empty(0)
-        return float(1e3 * np.median(known)) if len(known) else self.extent / 10
+        return 1e3 * median(known) if len(known) else self.extent / 10
 
     @cached_property
     def notes(self) -> list[str]:
