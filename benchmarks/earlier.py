@@ -34,10 +34,9 @@ OF_BARE = {ALL_FILES: "at most 8", TABLES: "at most 3"}
 
 
 def earlier(pairs: int) -> Section:
-    """Commands now over then, the median of the pairs' ratios, and over `BARE`."""
+    """Commands now over then, and over `BARE`: medians of the ratios of runs that follow each other."""
     rows, title = list[Row](), "Compared with earlier commits"
     with tempfile.TemporaryDirectory() as folder:
-        bare = median(_cpu_seconds(ROOT, BARE) for _ in range(pairs))
         for commit, what, asked in LIMITS:
             try:
                 sources = earlier_source(Path(folder) / commit, commit), ROOT
@@ -45,15 +44,19 @@ def earlier(pairs: int) -> Section:
                 return Section(title, str(reason), ())
             for source in sources:  # kernels are compiled; a result is there to be exported
                 _run(source, COMMANDS[ALL_FILES], Path(folder), f"result-{source.name}")
-            runs = [[_run(source, COMMANDS[what], Path(folder)) for source in sources] for _ in range(pairs)]
-            ratios = [now / then for then, now in runs]
-            then, now = (median(seconds) for seconds in zip(*runs, strict=True))
+            runs = [
+                (*(_run(source, COMMANDS[what], Path(folder)) for source in sources), _cpu_seconds(ROOT, BARE))
+                for _ in range(pairs)
+            ]
+            ratios = [now / then for then, now, _ in runs]
+            then, now, _ = (median(seconds) for seconds in zip(*runs, strict=True))
             figure = (
                 f"{median(ratios):.2f} times ({min(ratios):.2f} to {max(ratios):.2f}; {now:.2f} s and {then:.2f} s)"
             )
             rows.append(Row(f"{what}, over commit {commit}", figure, asked))
             if commit == FIRST:
-                figure = f"{now / bare:.1f} times; of commit {commit} {then / bare:.1f}"
+                ours, theirs = (median(run[k] / run[2] for run in runs) for k in (1, 0))
+                figure = f"{ours:.1f} times; of commit {commit} {theirs:.1f}"
                 rows.append(Row(f"{what}, over `{BARE}`", figure, OF_BARE.get(what, "")))
     said = f"CPU seconds of whole processes, kernels compiled, one thread; {pairs} pairs in turn."
     return Section(title, said, rows)
