@@ -179,7 +179,7 @@ def test_inside_nodes_are_those_that_hang_together_with_the_anchor():
 def test_a_line_is_continued_from_the_nodes_that_hang_together_with_its_origin():
     """A cubic is its own interpolant, wherever it is known; other nodes, past a gap, do not count."""
     knots = np.array([-2.0, -1.5, -0.9, 0.0, 0.7, 1.2, 2.0, 2.6, 3.5])
-    at = np.sort(np.append(0.0, np.linspace(-4.013, 5.987, 181)))
+    at = np.sort(np.append(knots, np.linspace(-4.013, 5.987, 181)))
 
     def cubic(s):
         return np.stack([1 + s - 0.2 * s**3, s**2, 0.5 - s], axis=-1)
