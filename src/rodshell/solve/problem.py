@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.elements import Elements, Stretch
 from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl, product, upper_triangle
@@ -249,7 +250,8 @@ def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | 
 
 def half_width(points: Floats) -> float:
     """Half of the largest extent of points (k, 3) along x, y or z [m]: the characteristic length of a shape."""
-    return 0.5 * float(np.ptp(np.ascontiguousarray(points.T), axis=1).max())
+    low, high = bounds(points)
+    return 0.5 * float((high - low).max())
 
 
 class Force(Protocol):
