@@ -22,12 +22,12 @@ def figure() -> fig8.Fig8:
 
 
 @pytest.mark.slow
-def test_every_scheme_is_timed_and_costs_more_than_its_bare_solves() -> None:
+def test_every_scheme_is_timed_and_that_of_the_paper_is_counted_in_bare_solves() -> None:
     timings = figure().timings
     assert {one.method for one in timings} == {"explicit", "shared", "implicit", "ours"}
     for one in timings:
         assert one.seconds > 0
-        assert (one.in_lapack > 1) == (one.in_own > 1) == (one.method == "explicit")
+        assert (one.in_lapack > 0) == (one.in_own > 0) == (one.method == "explicit")
         # a step has a factorisation or more, so that it costs no less than one with all that belongs to it
         assert one.step_in_lapack >= one.in_lapack
     steps = {one.step: one for one in timings if one.method == "explicit" and one.edge == CASE.edge}
