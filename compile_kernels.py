@@ -114,11 +114,29 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
     pythonapi._boxers.functions[types.Array] = returned_array
     pythonapi.PythonAPI.get_c_object = c_object
     jit.kernels_are_kept = lambda: False
+    index_as_written()
     optimise_once()
     gc.disable()  # it takes a tenth of the time
     library = Kernels(library_name(level, unit), source_module="rodshell.kernels")
     library.output_dir, library.target_cpu = str(folder), level
     library.compile()
+
+
+def index_as_written() -> None:
+    """Let kernels use an index as it is. Numba asks of each whether it counts from the end of its array, which took a
+    fourteenth of a form: no kernel counts from an end, but by a constant. With NUMBA_BOUNDSCHECK=1 all are checked."""
+    from llvmlite import ir
+    from numba.core import types
+    from numba.np import arrayobj
+
+    as_numba_does = arrayobj.fix_integer_index
+
+    def index(context, builder, kind, value, size):  # type: ignore[no-untyped-def]
+        if isinstance(value, ir.Constant) or not kind.signed:
+            return as_numba_does(context, builder, kind, value, size)
+        return context.cast(builder, value, kind, types.intp)
+
+    arrayobj.fix_integer_index = index
 
 
 def optimise_once() -> None:
@@ -176,6 +194,9 @@ def checked_array(kind, given, code):  # type: ignore[no-untyped-def]
     """The array that a kernel is called with, or a TypeError. pycc checks nothing but the size of an element, and an
     array of other dimensions would overwrite memory.
 
+    The kernel does not count its references to the array, which whoever calls holds meanwhile: counting, which Numba
+    does with the other threads locked out of that memory, took a quarter of a factorisation.
+
     Parameters
     ----------
     kind : Numba's type of the argument, an array in C order.
@@ -195,7 +216,9 @@ def checked_array(kind, given, code):  # type: ignore[no-untyped-def]
     def field(of, offset, bits):  # type: ignore[no-untyped-def]
         return build.load(cgutils.pointer_add(build, of, offset, ir.IntType(bits).as_pointer()))
 
-    adapted = code.pyapi.nrt_adapt_ndarray_from_python(given, build.bitcast(room, code.pyapi.voidptr))
+    adapt_type = ir.FunctionType(ir.IntType(32), [code.pyapi.pyobj, code.pyapi.voidptr])
+    adapt = code.pyapi._get_function(adapt_type, name="numba_adapt_ndarray")
+    adapted = build.call(adapt, (given, build.bitcast(room, code.pyapi.voidptr)))
     with build.if_then(cgutils.is_null(build, adapted)):  # it is an array
         value = build.load(build.bitcast(room, native._getpointer().type))
         element = build.inttoptr(field(given, DTYPE, 64), code.pyapi.voidptr)
@@ -211,8 +234,6 @@ def checked_array(kind, given, code):  # type: ignore[no-untyped-def]
             wrong = build.or_(wrong, build.icmp_unsigned("!=", one, ir.Constant(one.type, expected)))
         build.store(wrong, failed)
         build.store(value, native._getpointer())
-        with build.if_then(wrong, likely=False):
-            code.context.nrt.decref(build, kind, value)
     with build.if_then(build.load(failed), likely=False):
         said = (
             f"a kernel needs an array of {dtype}, {kind.ndim} dimensions, in C order and in the processor's byte order"
@@ -222,8 +243,9 @@ def checked_array(kind, given, code):  # type: ignore[no-untyped-def]
 
 
 def returned_array(kind, value, code):  # type: ignore[no-untyped-def]
-    """An array that a kernel returns, as a Python object. pycc has pickle look up NumPy's class of arrays each time: a
-    microsecond, as long as a short kernel.
+    """An array that a kernel returns, as a Python object; a SystemError for a part of an array that it was given, which
+    nobody would hold. pycc has pickle look up NumPy's class of arrays each time: a microsecond, as long as a short
+    kernel.
 
     Parameters
     ----------
@@ -231,11 +253,19 @@ def returned_array(kind, value, code):  # type: ignore[no-untyped-def]
     value : what the kernel returns.
     code : what writes the LLVM code of the call.
     """
+    from numba.core import cgutils
     from numba.core.boxing import box_array
 
-    constants = code.env_manager
+    build, constants = code.builder, code.env_manager
     code.pyapi.unserialize = lambda _: constants.read_const(constants.add_const(kind.box_type))
-    return box_array(kind, value, code)
+    memory = code.context.make_array(kind)(code.context, build, value=value).meminfo
+    result = cgutils.alloca_once_value(build, code.pyapi.get_null_object())
+    with build.if_else(cgutils.is_null(build, memory), likely=False) as (given, made):
+        with given:
+            code.pyapi.err_set_string("PyExc_SystemError", "a kernel returns a part of an array that it was given")
+        with made:
+            build.store(box_array(kind, value, code), result)
+    return build.load(result)
 
 
 # Where NumPy keeps them: in an array, behind its head, data, number of dimensions, shape, strides, base, dtype, flags

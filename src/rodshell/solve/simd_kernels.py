@@ -5,8 +5,8 @@ leaving the registers (Goto and van de Geijn 2008). BLAS is slow on matrices of 
 factorisation is made of, and loops as short as theirs are hardly vectorised by a compiler. So these few are written in
 LLVM's vector types, which fit whatever processor they are compiled for.
 
-A kernel is called in compiled code, with integers: addresses, strides and counts, the last two in numbers of 8 bytes.
-Nothing is checked. Each has a twin in NumPy, which serves where nothing is compiled (NUMBA_DISABLE_JIT=1).
+Such a kernel is called in compiled code, with integers: addresses, strides and counts, the last two in numbers of 8
+bytes. Nothing is checked. Each has a twin in NumPy, which serves where nothing is compiled (NUMBA_DISABLE_JIT=1).
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ if COMPILED is None:
     from numba.core import cgutils, config, types
     from numba.core.codegen import get_host_cpu_features
     from numba.extending import intrinsic
+    from numba.np import arrayobj
 
     _features = get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
     if "+avx512f" in _features:
@@ -273,6 +274,44 @@ _TYPED: dict[int, Callable[..., object]] = {  # an intrinsic shows its arguments
     7: lambda signature, generate: lambda typing, a, b, c, d, e, f, g: (signature, generate),
     8: lambda signature, generate: lambda typing, a, b, c, d, e, f, g, h: (signature, generate),
 }
+
+
+def _view() -> Kernel:
+    """Part of an array (n,) of numbers as a matrix, without a copy: Numba's `reshape` takes as long as a short loop.
+
+    Arguments: the array, from which number on, rows, columns. It does not hold the memory.
+    """
+
+    def twin(memory: Floats, begin: int, rows: int, columns: int) -> Floats:
+        return memory[begin : begin + rows * columns].reshape(rows, columns)
+
+    if COMPILED is not None or config.DISABLE_JIT:
+        return twin
+
+    def view(typing, memory, begin, rows, columns):  # type: ignore[no-untyped-def]
+        kind = types.Array(types.float64, 2, "C")
+
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            given, first, *shape = arguments
+            numbers = context.make_array(memory)(context, builder, value=given).data
+            result, one = context.make_array(kind)(context, builder), ir.Constant(_INTEGER, BYTES)
+            arrayobj.populate_array(
+                result,
+                data=builder.gep(numbers, [first]),
+                shape=shape,
+                strides=[builder.mul(shape[1], one), one],
+                itemsize=one,
+                meminfo=None,
+            )
+            return result._getvalue()
+
+        return kind(memory, *[types.int64] * 3), generate
+
+    kernel: Kernel = intrinsic(view)
+    return kernel
+
+
+matrix_view = _view()
 
 
 def _matrix(address: int, rows: int, columns: int, stride: int) -> Floats:

@@ -30,6 +30,7 @@ from rodshell.solve.dense import (
     subtract_product,
     workspace,
 )
+from rodshell.solve.simd_kernels import matrix_view
 from rodshell.solve.symbolic import Plan, blocks_of, coupled, plan_of
 from rodshell.threads import in_threads, threads
 
@@ -350,14 +351,14 @@ def _numeric(  # type: ignore[no-untyped-def]
     for s in part:
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         stride = padded(size)
-        rows = unscaled[: width * stride].reshape(width, stride)
+        rows = matrix_view(unscaled, 0, width, stride)
         rows[:] = 0.0
         for e in range(entry_start[s], entry_start[s + 1]):
             unscaled[entry_place[e]] += data[entry_source[e]]
         for e in range(child_start[s], child_start[s + 1]):
             child = _update(children[e], first, row_start, update_start, stacks)
             add_rows(rows, child, runs[run_start[e] : run_start[e + 1]], width)
-        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, stride)
+        panel = matrix_view(panels, panel_start[s], width, stride)
         if not eliminate(rows, panel, pivots[first[s] : first[s + 1]], work):
             return False
         update = _update(s, first, row_start, update_start, stacks)
@@ -372,8 +373,7 @@ def _numeric(  # type: ignore[no-untyped-def]
 def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyped-def]
     """The update matrix (n, padded) of a front."""
     size = row_start[s + 1] - row_start[s] - (first[s + 1] - first[s])
-    stride = padded(size)
-    return stacks[update_start[s] : update_start[s] + size * stride].reshape(size, stride)
+    return matrix_view(stacks, update_start[s], size, padded(size))
 
 
 @njit(error_model="numpy")
@@ -384,7 +384,7 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     for j in range(len(x)):
         last, total, here = indptr[j + 1] - 1, 0.0, x[j]
         for e in range(indptr[j], last):
-            i = np.uint64(indices[e])  # unsigned, it need not be checked for a negative index: a third of the time
+            i = indices[e]
             residual[i] -= data[e] * here
             total += data[e] * x[i]
         product = data[last] * here
@@ -402,7 +402,7 @@ def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, 
     for s in part:
         begin, at = first[s], row_start[s]
         size, width = row_start[s + 1] - at, first[s + 1] - begin
-        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
+        panel = matrix_view(panels, panel_start[s], width, padded(size))
         values = local[: padded(size)]
         for i in range(width):
             values[i] = x[begin + i]
@@ -426,7 +426,7 @@ def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, loca
         s = part[k]
         begin, at = first[s], row_start[s]
         size, width = row_start[s + 1] - at, first[s + 1] - begin
-        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
+        panel = matrix_view(panels, panel_start[s], width, padded(size))
         values = local[: padded(size)]
         for i in range(size):
             values[i] = x[rows[at + i]]
@@ -461,7 +461,8 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     inner, kept, start, neighbours = _without_spans(start, neighbours)
     points = np.ascontiguousarray(coordinates[kept], dtype=np.float64)
     along = np.argsort(points.T, axis=1, kind="stable").astype(np.int64)
-    return np.concatenate([inner, kept[_dissect(points, along, start, neighbours)]])
+    _dissect(points, along, start, neighbours)
+    return np.concatenate([inner, kept[along[0]]])
 
 
 @njit()
@@ -563,7 +564,6 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
         begins[height], ends[height] = begin, middle
         begins[height + 1], ends[height + 1] = middle, stop
         height += 2
-    return along[0]
 
 
 @njit(inline="always")

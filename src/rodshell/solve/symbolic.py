@@ -19,12 +19,12 @@ from rodshell.solve.dense import padded
 class Plan(NamedTuple):
     """What the numeric phase needs; supernodes s in postorder, `n_s` of them."""
 
+    child_start: Longs  # (n_s + 1,) where the children of each supernode begin in `children`
+    children: Longs
     order: Longs  # (n,) original index of each permuted unknown
     first: Longs  # (n_s + 1,) first column of each supernode
     row_start: Longs  # (n_s + 1,) where its rows begin in `rows`
     rows: Longs  # permuted row indices of each front, its own columns first
-    child_start: Longs  # (n_s + 1,)
-    children: Longs
     run_start: Longs  # (c + 1,) where the runs of each of the `children` begin
     runs: (
         Longs  # (r, 2) rows of a child's update matrix that stay contiguous in the front: the first, and its row there
@@ -112,7 +112,7 @@ def plan_of(indptr: Longs, blocks: Blocks, order: Longs) -> Plan:
     up, child_start, children = _children(tree, first)
     row_start, rows = _fronts(first, *earlier, up)
     maps = _maps(indptr, *blocks, order, weight, first, up, row_start, rows, child_start, children)
-    return Plan(*maps)
+    return Plan(child_start, children, *maps)
 
 
 @njit()
@@ -376,7 +376,7 @@ def _fronts(first, start, earlier, up):  # type: ignore[no-untyped-def]
 def _maps(  # type: ignore[no-untyped-def]
     indptr, begin, start, neighbours, source, above, order, weight, first, up, row_start, rows, child_start, children
 ):
-    """From blocks to unknowns: all that `Plan` holds."""
+    """From blocks to unknowns: all that `Plan` holds but the children."""
     supers, n, unknowns, values = len(first) - 1, len(order), begin[len(begin) - 1], indptr[len(indptr) - 1]
     column, place = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
     start_after(weight, column)  # first permuted unknown of each block
@@ -438,8 +438,8 @@ def _maps(  # type: ignore[no-untyped-def]
     part_start, parts = parts_of(up, width_of, below)
     update_start, deepest = stacks_of(up, below, child_start, children, part_start, parts)
     return (
-        original, first_column, all_start, all_rows, child_start, children, run_start, runs, entry_start,
-        entry_source, entry_place, panel_start, update_start, part_start, parts, deepest, largest, widest,
+        original, first_column, all_start, all_rows, run_start, runs, entry_start, entry_source, entry_place,
+        panel_start, update_start, part_start, parts, deepest, largest, widest,
     )  # fmt: skip
 
 
