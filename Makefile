@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio ci-full house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio ci-full house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -21,6 +21,11 @@ test-fast: ## tests that are not marked slow, over every kind of input and outpu
 
 test:      ## all tests
 	python -m pytest -n 2
+
+test-indices: ## all tests, with kernels that refuse an index outside of its array (a C compiler; ten minutes)
+	mkdir -p build/indices
+	NUMBA_BOUNDSCHECK=1 python compile_kernels.py $(CURDIR)/build/indices
+	RODSHELL_KERNELS=$(CURDIR)/build/indices python -m pytest -n 2 -k "not the_same_bits_with_compiled_kernels"
 
 accept:    ## print the acceptance table
 	python -m tests.acceptance.accept
@@ -61,7 +66,7 @@ accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1
 
 ci-full:   ## what .ci/run does, and every acceptance table (hours; DESIGNS=1000 for a shorter sweep)
 	.ci/run
-	$(MAKE) --keep-going accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
+	$(MAKE) --keep-going test-indices accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
 		accept-house accept-loads accept-refine accept-sweep accept-studio
 
 house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
