@@ -294,13 +294,13 @@ def _view() -> Kernel:
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
             given, first, *shape = arguments
             numbers = context.make_array(memory)(context, builder, value=given).data
-            result, one = context.make_array(kind)(context, builder), ir.Constant(_INTEGER, BYTES)
+            result, size = context.make_array(kind)(context, builder), ir.Constant(_INTEGER, BYTES)
             arrayobj.populate_array(
                 result,
                 data=builder.gep(numbers, [first]),
                 shape=shape,
-                strides=[builder.mul(shape[1], one), one],
-                itemsize=one,
+                strides=[builder.mul(shape[1], size), size],
+                itemsize=size,
                 meminfo=None,
             )
             return result._getvalue()
