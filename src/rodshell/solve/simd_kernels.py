@@ -276,7 +276,7 @@ _TYPED: dict[int, Callable[..., object]] = {  # an intrinsic shows its arguments
 }
 
 
-def _view() -> Kernel:
+def _view() -> Callable[..., Floats]:
     """Part of an array (n,) of numbers as a matrix, without a copy: Numba's `reshape` takes as long as a short loop.
 
     Arguments: the array, from which number on, rows, columns. It does not hold the memory.
@@ -307,7 +307,7 @@ def _view() -> Kernel:
 
         return kind(memory, *[types.int64] * 3), generate
 
-    kernel: Kernel = intrinsic(view)
+    kernel: Callable[..., Floats] = intrinsic(view)
     return kernel
 
 
