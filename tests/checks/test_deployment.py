@@ -1,5 +1,7 @@
 """Deployment: equilibria, found the other way round too, and whether they lead from flat to the final shape."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -115,7 +117,8 @@ def test_a_shell_that_rises_by_itself_is_not_said_to_need_a_push() -> None:
     risen = rs.pop_up(form.footprint, form.trimmed.boundary, ROD, ends="pinned", start="flat")
     np.testing.assert_allclose(risen.positions, form.popped["pinned"].positions, atol=1e-8)
     assert way.reached_from_flat
-    assert way.warnings == ()
+    (words,) = way.warnings
+    assert words.startswith("at 82 % of the deployment from flat the shell snaps forward by itself, by up to 7.")
     np.testing.assert_allclose(way.positions[-1], form.popped["pinned"].positions, atol=1e-8)
 
 
@@ -126,32 +129,78 @@ def snapping() -> tuple[rs.Form, Deployment]:
     return form, deployed(form, 8)
 
 
+def driven(form: rs.Form, way: Deployment, stage: int, shares: Sequence[float]) -> list[np.ndarray]:
+    """Shapes of a stage and after it, its ends driven to each of the shares in turn, down the steepest descent."""
+    shell, state = way.shells[stage]
+    shapes, begin = [shell.positions(state)], float(way.share[stage + 1])
+    first, last = state[shell.ends], form.popped["pinned"].state[shell.ends]
+    for share in shares:
+        state = state.copy()
+        state[shell.ends] = first + (share - begin) / (1 - begin) * (last - first)
+        problem = Problem(
+            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.flat_coordinates
+        )
+        there = relax(problem, state)
+        assert there.report.stable
+        shell, state = shell.with_elements(there.elements), there.state
+        shapes.append(shell.positions(state))
+    return shapes
+
+
+def moved(shapes: Sequence[np.ndarray]) -> np.ndarray:
+    """How far the node goes that goes farthest, from each shape to the next [m]."""
+    return np.linalg.norm(np.diff(shapes, axis=0), axis=2).max(axis=1)
+
+
+@pytest.mark.slow
+def test_a_snap_of_little_energy_is_named_and_is_not_undone() -> None:
+    """In steps of 1/1000 down the steepest descent: one jump, where it is named, and on the way back another shape."""
+    form, way = wave(), deployed(wave(), 8)
+    (snap,) = way.snaps
+    stage = int(np.searchsorted(way.share, snap.start)) - 2
+    shares = np.arange(snap.start - 0.015, snap.stop + 0.01, 1e-3).tolist()
+    shapes = driven(form, way, stage, [*shares, *shares[::-1]])
+    ahead = moved(shapes[1 : len(shares) + 1])
+    jump = int(np.argmax(ahead))
+    assert snap.start <= shares[jump + 1] <= snap.stop + 1e-3
+    assert ahead[jump] == pytest.approx(snap.moved, rel=0.1)
+    assert ahead[jump] > 10 * np.sort(ahead)[-2]
+    assert np.linalg.norm(shapes[1] - shapes[-1], axis=1).max() > 0.5 * snap.moved
+
+
+@pytest.mark.slow
+def test_a_fork_next_to_flat_is_no_snap_and_is_undone() -> None:
+    """There the wave rises by 4 mm while its ends go 1 % of their way, and comes back the same way."""
+    form, way = wave(), deployed(wave(), 8)
+    shares = np.linspace(way.share[1], 0.036, 30).tolist()
+    shapes = driven(form, way, 0, [*shares, *shares[::-1]])
+    assert np.linalg.norm(shapes[30] - shapes[0], axis=1).max() > 4e-3
+    np.testing.assert_allclose(shapes[-1], shapes[0], atol=1e-6)
+    assert all(snap.start > 0.1 for snap in way.snaps)
+
+
 @pytest.mark.slow
 def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
     """From the stage before it, in steps of 1/200 down the steepest descent: it snaps there."""
     form, way = snapping()
     assert way.reached_from_flat
     (snap,) = way.snaps
-    shell, state = way.shells[-2]
-    first, last = (np.asarray(one)[shell.ends] for one in (state, form.popped["pinned"].state))
-    begin, jumps = float(way.share[-2]), list[tuple[float, float]]()
-    for share in [*np.linspace(begin, 0.98, 8).tolist()[1:], 0.985, 0.99, 0.995, 1.0]:
-        goals = first + (share - begin) / (1 - begin) * (last - first)
-        moved = state.copy()
-        moved[shell.ends] = goals
-        problem = Problem(
-            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.flat_coordinates
-        )
-        there = relax(problem, moved)
-        assert there.report.stable
-        nodes = shell.positions(there.state - state)
-        jumps.append((share, float(np.linalg.norm(nodes, axis=1).max())))
-        state, shell = there.state, shell.with_elements(there.elements)
-    np.testing.assert_allclose(shell.positions(state), form.popped["pinned"].positions, atol=1e-6)
+    begin = float(way.share[-2])
+    shares = [*np.linspace(begin, 0.98, 8).tolist()[1:], 0.985, 0.99, 0.995, 1.0]
+    shapes = driven(form, way, len(way.shells) - 2, shares)
+    jumps = list(zip(shares, moved(shapes), strict=True))
+    np.testing.assert_allclose(shapes[-1], form.popped["pinned"].positions, atol=1e-6)
     share, moved_by = max(jumps[7:], key=lambda one: one[1])
     assert snap.start <= share <= snap.stop
     assert moved_by == pytest.approx(snap.moved, rel=0.3)  # the steps begin and end elsewhere
     assert moved_by > 5 * jumps[7][1]
+
+
+def test_many_snaps_are_counted() -> None:
+    (words,) = deployed(frequent(), 8).warnings
+    many, *_ = re.findall(r"^(\d+) times from (\d+) % to (\d+) % of the deployment", words)
+    assert int(many[0]) == len(deployed(frequent(), 8).snaps)
+    assert words.endswith("; its way is one of several, which smallest differences decide")
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ import pytest
 import rodshell as rs
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.model import Shell
+from rodshell.solve import path as module
 from rodshell.solve.equilibrium import find_stable
 from rodshell.solve.path import trace
 from rodshell.solve.problem import Problem, Supports
@@ -43,7 +44,7 @@ def snapping():
     return mu, sqrt(SHORT) * np.abs(upper - lower).max()
 
 
-def turned_to(most, *, snap):
+def turned_to(most, *, snap, shortest=SHORTEST):
     """The right clamp of the buckled strip turned from mu = 0 to `most`; the shell and the path."""
     mesh = rs.mesh_grid(FlatGrid.of([FlatRod.u("U01", 0.0, -0.5, 0.5)]), 1.0 / EDGES)
     shell = Shell.of(mesh, ROD, clamped=True)
@@ -63,7 +64,7 @@ def turned_to(most, *, snap):
     arch[:, 2] = 2 / pi * sqrt(SHORT) * np.sin(pi * share) ** 2
     start = find_stable(problem(0.0), shell.state(arch, np.array([[-1.0, 0, 0], [1.0, 0, 0]])), np.zeros(EDGES))
     assert start.report.stable
-    return shell, trace(problem, start, 0.0, 1.0, shortest=SHORTEST, snap=snap, most_factorizations=500)
+    return shell, trace(problem, start, 0.0, 1.0, shortest=shortest, snap=snap, most_factorizations=500)
 
 
 def test_the_closed_form_is_the_published_one():
@@ -95,3 +96,22 @@ def test_below_its_limit_point_it_does_not_snap_either_way():
     assert path.t == 1.0
     assert path.snaps == ()
     assert path.found.state[shell.mesh.nodes_of(0)[EDGES // 2], 2] > 0
+
+
+def test_a_branch_that_goes_on_is_no_snap_where_it_cannot_be_followed(monkeypatch):
+    """Every step ahead is taken for one that leaves the branch, so that the energy is followed down at each."""
+    fallen, calls = module._fallen, list[object]()
+
+    def noted(*given, **options):
+        calls.append(given)
+        return fallen(*given, **options)
+
+    def ahead(here, there):
+        return bool(there.problem.constraint.goals[-1, 2] > here.problem.constraint.goals[-1, 2])
+
+    monkeypatch.setattr(module, "_fallen", noted)
+    monkeypatch.setattr(module, "unaccounted", ahead)
+    _, path = turned_to(1.7, snap=True, shortest=0.2)
+    assert path.t == 1.0
+    assert len(calls) >= 2
+    assert path.snaps == ()

@@ -33,6 +33,9 @@ SNAP = 0.01  # step over which a structure may snap
 MOST_OF_ALL = 400  # iterations of the whole path; the paths that arrive take 30 to 100
 UNACCOUNTED = 0.02  # of the energy: more than the trapezoidal rule leaves of a short step along one branch
 MOST_A_STEP = 8  # iterations of a step along a branch
+SAME = 1e-3  # of the length: equilibria further apart are different ones
+FINER = 10  # steps on the way back after a snap, at most, for each of the shortest ahead
+MOST_BACK = 300  # factorisations of the way back: 2 are usual
 TINY = 1e-300
 DISTURBANCE = 1e-3  # of the length, along the mode of an unstable equilibrium, from where the energy falls
 
@@ -143,6 +146,9 @@ def trace(
 ) -> Trace:  # fmt: skip
     """Go from the stable equilibrium `here` at t = `start` towards `stop`, up or down, branch by branch.
 
+    Where a branch ends, the structure snaps, unless the way back undoes that: a path that rises too steeply for the
+    shortest step, as where it forks, goes back to where it came from.
+
     Parameters
     ----------
     problem_at : the problem at t, its constraint being `Supports` with prescribed blocks; source frames as in `follow`.
@@ -173,7 +179,11 @@ def trace(
             done += found.report.factorizations
             if not found.report.stable:
                 break
-            if surplus(here, found) < -UNACCOUNTED:
+            back = trace(
+                problem_at, found, there, t, shortest=shortest / FINER, snap=False, most_factorizations=MOST_BACK
+            )
+            done += back.factorizations
+            if back.t != t or farthest(here, back.found) > SAME * problem.length:
                 snaps.append(Snap(t, there, farthest(here, found)))
             step = 4 * shortest
         elif found.report.iterations <= EASY:
