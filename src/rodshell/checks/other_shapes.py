@@ -13,13 +13,14 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
-from rodshell.checks.deployment import SAME, Deployment
+from rodshell.checks.deployment import Deployment
 from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.geometry.frames import parallel_transport, signed_angle, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
+from rodshell.solve.path import SAME
 from rodshell.solve.problem import half_width
 from rodshell.solve.sparse_ldl import Multifrontal
 from rodshell.validation import brief
