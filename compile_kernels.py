@@ -194,8 +194,8 @@ def checked_array(kind, given, code):  # type: ignore[no-untyped-def]
     """The array that a kernel is called with, or a TypeError. pycc checks nothing but the size of an element, and an
     array of other dimensions would overwrite memory.
 
-    The kernel does not count its references to the array, which whoever calls holds meanwhile: counting, which Numba
-    does with the other threads locked out of that memory, took a quarter of a factorisation.
+    The kernel does not count its references to the array, which its caller holds meanwhile: Numba's counting, by atomic
+    operations, took an eighth of a factorisation.
 
     Parameters
     ----------
