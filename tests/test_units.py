@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rodshell.errors import InputError
-from rodshell.units import Kind, length_text, parse_quantity
+from rodshell.units import Kind, length_text, parse_quantity, places_text
 
 
 @pytest.mark.parametrize(
@@ -112,3 +112,16 @@ def test_a_length_is_shown_in_the_unit_that_reads_well(length: float, text: str)
 def test_degrees_without_their_unit_are_no_radians(value: object, written: str) -> None:
     with pytest.raises(InputError, match=f'= .*: a plain number is in radians, .* full turn; write "{written}"'):
         parse_quantity(value, "angle", "layout.rotate")
+
+
+@pytest.mark.parametrize(
+    ("shares", "words"),
+    [
+        ([0.8214], "at 82 %"),
+        ([0.2, 0.344], "at 20 % and 34 %"),
+        ([0.016, 0.2, 0.344, 0.998], "at 2 %, 20 %, 34 % and 99 %"),
+        ([0.2, 0.3, 0.4, 0.5, 0.938], "5 times from 20 % to 94 %"),
+    ],
+)
+def test_places_on_a_way_are_named_or_counted(shares: list[float], words: str) -> None:
+    assert places_text(shares) == words

@@ -4,7 +4,7 @@ Only input and messages use this: inside, everything is in SI units.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
@@ -268,6 +268,17 @@ def percent_text(share: float) -> str:
     if abs(share) < 1e-9:
         return "0 %"
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+
+
+FEW = 4  # places that are named one by one
+
+
+def places_text(shares: Sequence[float]) -> str:
+    """Where something happens on a way, by its shares: "at 20 % and 34 %", or "7 times from 20 % to 94 %"."""
+    words = [f"{min(100 * share, 99):.0f} %" for share in shares]  # at 100 % it would be behind
+    if len(words) > FEW:
+        return f"{len(words)} times from {words[0]} to {words[-1]}"
+    return f"at {' and '.join(filter(None, [', '.join(words[:-1]), words[-1]]))}"
 
 
 def as_float(value: float | Real) -> float:

@@ -28,7 +28,7 @@ from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.path import EASY, SAME, Snap, Trace, follow, relax, trace, unaccounted
 from rodshell.solve.problem import Problem, Supports, half_width
-from rodshell.units import length_text, percent_text
+from rodshell.units import FEW, length_text, percent_text, places_text
 
 Progress = Callable[[float], None]
 Stage = tuple[float, Equilibrium]  # share of the deployment, and the shell there
@@ -37,7 +37,6 @@ DEGREE = 3  # at most, of the polynomials by which the next shape is guessed
 LOWEST = 1 / 64  # share of the deployment at which the grid has left its plane: by about an eighth of its final height
 SHORTEST = 0.001  # share of the deployment: a snap is located to this
 MOST = 8000  # factorisations of a path forwards; those that arrive take 30 to 4000, of which one snap may take 900
-FEW = 4  # snaps that are named one by one
 SHORTEST_TURN = 0.02  # share of the clamps' angles: a snap is located to this
 MOST_TURNING = 400  # factorisations of turning the clamps; the paths that arrive take 3 to 33
 AT_ONCE = 40  # iterations from the lifted grid to an equilibrium, before the energy is followed down
@@ -121,11 +120,10 @@ class Deployment:
         """Sentences that a user should read."""
         words = list[str]()
         if self.snaps:
-            shares, many = [percent_text(snap.start) for snap in self.snaps], len(self.snaps) > FEW
-            where = f"{len(shares)} times from {shares[0]} to {shares[-1]}" if many else f"at {', '.join(shares)}"
+            where = places_text([snap.start for snap in self.snaps])
             by = length_text(max(snap.moved for snap in self.snaps))
-            ways = "; its way is one of several, which smallest differences decide" if many else ""
             continues = ", and continues to its final shape" if self.reached_from_flat else ""
+            ways = "; its way is one of several, which smallest differences decide" if len(self.snaps) > FEW else ""
             words.append(
                 f"{where} of the deployment from flat the shell snaps forward by itself, by up to {by}{continues}{ways}"
             )

@@ -27,6 +27,7 @@ from rodshell.results.results import Clearance, Reactions, Stock
 from rodshell.results.strength_used import ENDS, by_design_strength
 from rodshell.results.verdict import facts, unknown_below
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
+from rodshell.units import places_text
 
 IN_PAGE = ("supports", "elevations", "erection")
 FOLLOWED = "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends{gaps}."
@@ -34,7 +35,7 @@ PARTLY = (
     "Below {share} of the deployment no stage could be found, and the shape is not known. Above it, every stage is an "
     "equilibrium of the elastic grid with pinned ends{gaps}."
 )
-SNAPS = "; at {shares} of the deployment the shell snaps forward"
+SNAPS = "; {places} of the deployment the shell snaps forward"
 GUIDED = "; between {start} and {stop} of the deployment it has to be guided, and its shape is not known"
 NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between are not known."
 
@@ -120,7 +121,7 @@ def _note(archive: Archive) -> str:
         return NOT_FOLLOWED
     gaps = ""
     if deployment.snaps:
-        gaps += SNAPS.format(shares=", ".join(whole_percent(start) for start, _ in deployment.snaps))
+        gaps += SNAPS.format(places=places_text([start for start, _ in deployment.snaps]))
     if deployment.guided:
         start, stop = deployment.guided
         gaps += GUIDED.format(start=whole_percent(start), stop=whole_percent(stop))

@@ -20,6 +20,7 @@ from rodshell.results.wording import (
     stress,
     whole_percent,
 )
+from rodshell.units import places_text
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
 
@@ -235,9 +236,9 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
 def _deployment(results: Results) -> Iterator[str]:
     """Whether the shell is reached from flat, and what other shapes it has."""
     if deployment := results.deployment:
-        snaps = ", ".join(whole_percent(start) for start, _ in deployment.snaps)
+        snaps = places_text([start for start, _ in deployment.snaps]) if deployment.snaps else ""
         words = {
-            True: f"reached, snapping at {snaps}" if snaps else "reached",
+            True: f"reached, snapping {snaps}" if snaps else "reached",
             False: "ends in another shape",
             None: "not known whether it is reached",
         }
