@@ -260,7 +260,7 @@ def test_no_more_is_said_of_the_deployment_than_was_followed(
     ("lost", "snaps", "guided", "note"),
     [(None, [], None, "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends."),
      (None, [[0.14, 0.15], [0.33, 0.34]], None,
-      "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends; at 14 %, 33 % of the "
+      "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends; at 14 % and 33 % of the "
       "deployment the shell "
       "snaps forward."),
      (None, [], [0.25, 0.5625],

@@ -35,7 +35,7 @@ PARTLY = (
     "Below {share} of the deployment no stage could be found, and the shape is not known. Above it, every stage is an "
     "equilibrium of the elastic grid with pinned ends{gaps}."
 )
-SNAPS = "; {places} of the deployment the shell snaps forward"
+SNAPS = "; {where} of the deployment the shell snaps forward"
 GUIDED = "; between {start} and {stop} of the deployment it has to be guided, and its shape is not known"
 NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between are not known."
 
@@ -121,7 +121,7 @@ def _note(archive: Archive) -> str:
         return NOT_FOLLOWED
     gaps = ""
     if deployment.snaps:
-        gaps += SNAPS.format(places=places_text([start for start, _ in deployment.snaps]))
+        gaps += SNAPS.format(where=places_text([start for start, _ in deployment.snaps]))
     if deployment.guided:
         start, stop = deployment.guided
         gaps += GUIDED.format(start=whole_percent(start), stop=whole_percent(stop))
