@@ -123,9 +123,10 @@ class Deployment:
             where = places_text([snap.start for snap in self.snaps])
             by = length_text(max(snap.moved for snap in self.snaps))
             continues = ", and continues to its final shape" if self.reached_from_flat else ""
-            elsewhere = "; a small difference can make it snap elsewhere" if len(self.snaps) > FEW else ""
+            other = "; a small difference can make it snap elsewhere" if len(self.snaps) > FEW else ""
             words.append(
-                f"{where} of the deployment from flat the shell snaps forward by itself, by up to {by}{continues}{elsewhere}"
+                f"{where} of the deployment from flat the shell snaps forward by itself, by up to {by}"
+                f"{continues}{other}"
             )
         if self.reached_from_flat is False:
             where = "" if self.elsewhere is None else f", {self.elsewhere.words}"
