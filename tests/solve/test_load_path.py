@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.elements import Stretch
 from rodshell.rods.isotropic import IsotropicBend
+from rodshell.solve.arc_length import ArcLength
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import CLOSE, load_path
@@ -139,6 +141,33 @@ def test_thin_rods_hide_no_loss_of_stability(thinner: float) -> None:
     assert path.limit == "limit point"
     assert path.factor == pytest.approx(frame.exact["upper"], rel=5e-3)  # 40 edges a rod: 1e-3; and CLOSE
     assert path.factorizations <= 40  # 25 to 34; 120 where the path is lost
+
+
+@pytest.mark.parametrize("thinner", [3e7, 1e8, 1e9])
+@pytest.mark.parametrize("edge", [3.0, 12.0])
+def test_nothing_is_said_where_round_off_hides_the_stiffness(thinner: float, edge: float) -> None:
+    """The signs of modes are those of round-off there: the path would end at 0.001 to 0.05 times the load."""
+    frame = known.lees_frame(edge, stretch=thinner * 6 * 720.0)
+    path = load_path(frame.unloaded, frame.load, most=3.0)
+    assert path.limit == "lost"
+    assert path.factor == 0.0
+    assert path.mode is None
+
+
+def test_what_round_off_hides_does_not_depend_on_the_scale() -> None:
+    """Twist angles are among the lowest mode's unknowns: what counts is their motion of an edge, not radians."""
+    hidden = []
+    for size in (1.0, 1e-4):
+        rod = rs.Rod(
+            rs.RectangularSection(width=2e-3 * size, height=1e-3 * size), rs.Material(youngs_modulus=1e6, density=1e3)
+        )
+        layout = rs.GridLayout.orthogonal(spacing=0.06 * size, edge=0.03 * size)
+        form = rs.find_form(rs.Hemisphere(radius=0.2 * size), layout, rod, joint=rs.Pin())
+        path = ArcLength(form.popped["pinned"].equilibrium, Load(forces=np.ones_like(form.popped["pinned"].state)))
+        path.begin()
+        hidden.append(path.round_off)
+    assert hidden[0] < 1e-6
+    assert hidden[1] == pytest.approx(hidden[0], rel=0.05)
 
 
 def test_a_ring_leaves_its_circle_under_pressure() -> None:

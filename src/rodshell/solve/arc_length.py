@@ -86,6 +86,7 @@ class ArcLength:
         self._unit = np.where(self.is_node, 1.0, edge)[:, None]  # other blocks are angles: they count as small lengths
         self._per_factor = PER_FACTOR * self.length
         self._scale = np.empty(0)
+        self.round_off = 0.0  # relative error of the lowest stiffness at t = 0, since the stiffest is rounded
         self._least_force = 1e-6 * float(problem.stretch.stiffness.max(initial=0.0))
         self._unstable: tuple[Floats, Tangent]  # the last one that was found, with its tangent
         self.factorizations = 0
@@ -107,7 +108,17 @@ class ArcLength:
             raise InputError("the load moves nothing: give one that acts in free directions")
         # modes are measured by the first stiffness's diagonal: metres and radians alike
         self._scale = 1.0 / np.sqrt(np.abs(tangent.values[tangent.pattern.assembly.diagonal]))
-        return self._on_path(0.0, start.state, start.forces, elements, tangent, rate)
+        here = self._on_path(0.0, start.state, start.forces, elements, tangent, rate)
+        if here.modes is not None:
+            self.round_off = self._round_off(tangent, here.modes[0])
+        return here
+
+    def _round_off(self, tangent: Tangent, lowest: Floats) -> float:
+        """See `round_off`, of the lowest mode (dofs,)."""
+        stretch, moved = self._loaded.problem.stretch, tangent.freedom.expand(lowest)
+        softest = lowest @ tangent.pattern.product(tangent.values, lowest) / np.square(self._unit * moved).sum()
+        stiffest = 2 * (stretch.stiffness / stretch.rest_lengths).max(initial=0.0)  # a node between two edges
+        return float(np.finfo(float).eps * stiffest / softest)
 
     def point(self, here: Point, other: Point | None, step: float, *, near: float = NEGLIGIBLE) -> Point | None:
         """The point a step further; None where Newton's method does not find it, or strays from the prediction.

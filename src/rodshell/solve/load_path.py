@@ -25,6 +25,7 @@ from rodshell.solve.load import Load
 Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "lost"]
 
 CLOSE = 2e-3  # of the factor: the last stable point is as near as this to the first unstable one
+ROUNDED = 0.2  # of `close`: where round-off in EA hides more of the lowest stiffness, signs of modes mean nothing
 MOST = 100.0  # times the load: a path is not followed further
 MOST_FACTORIZATIONS = 120
 FARTHEST = 0.1  # of the length that a node moves from point to point
@@ -80,7 +81,8 @@ class LoadPath:
         is not stable.
     limit : what ends the stable path: "limit point", the load cannot grow; "bifurcation", the structure leaves the path
         sideways (one that is not quite symmetric has a limit point nearby instead); "none", nothing up to the largest
-        factor asked for; "lost", the path could not be followed further, and nothing is known above `factor`;
+        factor asked for; "lost", the path could not be followed further, and nothing is known above `factor`: from the
+        start where EA is so large (over EI/L^2 some 1e11) that round-off in it hides how stiff the structure is;
         "unstable unloaded".
     points : in the order of the path; the stable ones come first.
     mode : (n, 3) how it gives way, the largest component of a node's displacement being 1; None unless the limit is a
@@ -168,7 +170,8 @@ class _Search:
         if here is None or here.negative_modes:
             return LoadPath(0.0, "unstable unloaded", (), None, None, (), self.path.factorizations)
         self.stable.append(here)
-        limit, beyond = self._to_the_loss(here)
+        known = self.path.round_off <= ROUNDED * self.close
+        limit, beyond = self._to_the_loss(here) if known else ("lost", None)
         mode, place, last = None, None, self.stable[-1]
         if beyond is not None:
             mode = self.path.losing_mode(beyond)  # round-off alone may turn the rate of the factor next to it
