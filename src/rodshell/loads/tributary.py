@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.geometry.frames import dot
+from rodshell.geometry.frames import cross, dot
 from rodshell.targets import Target
 from rodshell.validation import brief
 
@@ -71,9 +71,9 @@ def tributary_areas(
         corners, faces = mesh_triangles(target, step=step)
     else:
         corners, faces = surface_triangles(target, anchor=anchor, rotate=rotate, step=step)
-    a, b, c = (corners[faces[:, k]] for k in range(3))
-    vector = 0.5 * np.cross(b - a, c - a)
-    shares = np.column_stack([np.linalg.norm(vector, axis=1), vector]) / 3.0
+    a, b, c = (corners.take(faces[:, k], axis=0) for k in range(3))
+    vector = 0.5 * cross(b - a, c - a)
+    shares = np.column_stack([np.sqrt(dot(vector, vector)), vector]) / 3.0
     at_corners = _sums(faces.T, [shares] * 3, len(corners))
     wanted = range(1, 1 + min(NEIGHBOURS, len(positions)))
     distance, nearest = map(np.asarray, cKDTree(positions).query(corners, k=list(wanted)))
@@ -109,8 +109,9 @@ def surface_triangles(
     reach = 2.5 * target.size + float(np.hypot(*(np.array(anchor) - target.summit)))
     count = int(np.ceil(reach / step))
     ticks = step * np.arange(-count, count + 1)
-    turn = np.array([[np.cos(rotate), np.sin(rotate)], [-np.sin(rotate), np.cos(rotate)]])
-    plan = np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 2) @ turn + anchor
+    along, across = (side.ravel() for side in np.meshgrid(ticks, ticks, indexing="ij"))
+    cos, sin = np.cos(rotate), np.sin(rotate)
+    plan = np.column_stack([cos * along - sin * across, sin * along + cos * across]) + anchor
     z, inside = _lifted(target, plan)
     index = np.arange(len(plan)).reshape(len(ticks), len(ticks))
     sw, se, nw, ne = index[:-1, :-1], index[1:, :-1], index[:-1, 1:], index[1:, 1:]
@@ -258,8 +259,8 @@ def _halved(target: Target, points: Floats, faces: Ints, *, longest: float) -> t
     """The triangles, their sides halved until these are at most `longest` [m]: lifted onto a surface that ends steeply,
     as a hemisphere does, long triangles lie across it."""
     for _ in range(MOST_HALVINGS):
-        sides = np.linalg.norm(points[np.roll(faces, -1, axis=1)] - points[faces], axis=2)
-        long = sides.max(axis=1) > longest
+        p, q, r = (points.take(faces[:, k], axis=0) for k in range(3))
+        long = np.max([dot(side, side) for side in (q - p, r - q, p - r)], axis=0) > longest**2
         if not long.any():
             break
         a, b, c = faces[long].T
