@@ -1,12 +1,18 @@
 """Work that threads share: all of it is done, what fails is raised, and the bits do not depend on the threads."""
 
+from threading import Event, Thread
+
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import rodshell as rs
 from rodshell import threads
 from rodshell.model import Assembly, Freedom, Shell, assembly
 from rodshell.rods import elements
+from rodshell.solve import modes
+from rodshell.solve.modes import linear_buckling
+from tests.solve import stability_problems as known
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 RANDOM = np.random.default_rng(3)
@@ -35,6 +41,53 @@ def test_the_number_of_threads_can_be_set(monkeypatch):
     assert threads.threads() == 1
     monkeypatch.setenv("NUMBA_NUM_THREADS", "0")
     assert threads.threads() == 1
+
+
+def blas_threads():
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_while_modes_are_looked_for_the_blas_has_one_thread(monkeypatch):
+    """It would keep ours from the processors: on two, a load check took five times as long."""
+    column, asked = known.eulers_column(), list[set[int]]()
+    lanczos = modes.eigsh
+
+    def listen(*given, **options):
+        asked.append(blas_threads())
+        return lanczos(*given, **options)
+
+    monkeypatch.setattr(modes, "eigsh", listen)
+    with threadpool_limits(2, user_api="blas"):
+        before = blas_threads()
+        linear_buckling(column.unloaded, column.load)
+        assert blas_threads() == before
+    assert asked == [{1}]
+
+
+def test_the_threads_of_the_blas_are_given_back():
+    """Of two that overlap, the first to leave would restore what it found, and the second then the one thread that it
+    found itself."""
+    inside, also_inside, out = Event(), Event(), Event()
+
+    def first():
+        with threads.one_blas_thread():
+            inside.set()
+            also_inside.wait(0.3)
+        out.set()
+
+    def second():
+        inside.wait(5.0)
+        with threads.one_blas_thread():
+            also_inside.set()
+            out.wait(5.0)
+
+    with threadpool_limits(2, user_api="blas"):
+        before, both = blas_threads(), [Thread(target=work) for work in (first, second)]
+        for thread in both:
+            thread.start()
+        for thread in both:
+            thread.join()
+        assert blas_threads() == before
 
 
 def bent_shell():

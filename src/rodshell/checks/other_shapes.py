@@ -251,5 +251,5 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
 def _plane(points: Floats) -> tuple[Floats, Floats, float]:
     """Normal and middle of the plane nearest to points (m, 3), and how far the farthest lies off it."""
     middle = points.mean(axis=0)
-    normal = np.linalg.svd(points - middle)[2][2]
+    normal = np.linalg.svd(points - middle, full_matrices=False)[2][2]
     return normal, middle, float(np.abs((points - middle) @ normal).max())

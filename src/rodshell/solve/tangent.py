@@ -17,6 +17,7 @@ from rodshell.model import Freedom
 from rodshell.rods.elements import Elements, Stressed, Stretch
 from rodshell.solve.problem import Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
+from rodshell.threads import one_blas_thread
 
 GUARDS = 4  # vectors of the subspace iteration beyond the modes that are asked for
 MOST_SWEEPS, FEW_SWEEPS = 200, 12
@@ -341,7 +342,8 @@ def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, toleran
 
     size = start.shape[1]
     operator = LinearOperator((size, size), matvec=inverse, dtype=float)
-    return np.asarray(eigsh(operator, k=1, which="SA", v0=start[0], tol=tolerance)[1][:, 0])
+    with one_blas_thread():
+        return np.asarray(eigsh(operator, k=1, which="SA", v0=start[0], tol=tolerance)[1][:, 0])
 
 
 def orthonormal(rows: Floats) -> Floats:
