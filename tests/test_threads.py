@@ -1,7 +1,5 @@
 """Work that threads share: all of it is done, what fails is raised, and the bits do not depend on the threads."""
 
-from threading import Event, Thread
-
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -62,32 +60,6 @@ def test_while_modes_are_looked_for_the_blas_has_one_thread(monkeypatch):
         linear_buckling(column.unloaded, column.load)
         assert blas_threads() == before
     assert asked == [{1}]
-
-
-def test_the_threads_of_the_blas_are_given_back():
-    """Of two that overlap, the first to leave would restore what it found, and the second then the one thread that it
-    found itself."""
-    inside, also_inside, out = Event(), Event(), Event()
-
-    def first():
-        with threads.one_blas_thread():
-            inside.set()
-            also_inside.wait(0.3)
-        out.set()
-
-    def second():
-        inside.wait(5.0)
-        with threads.one_blas_thread():
-            also_inside.set()
-            out.wait(5.0)
-
-    with threadpool_limits(2, user_api="blas"):
-        before, both = blas_threads(), [Thread(target=work) for work in (first, second)]
-        for thread in both:
-            thread.start()
-        for thread in both:
-            thread.join()
-        assert blas_threads() == before
 
 
 def bent_shell():

@@ -1,13 +1,11 @@
 """Work that threads share. Kernels declared with `nogil` run at the same time; results never depend on the threads."""
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from threading import RLock, Thread
+from collections.abc import Callable
+from threading import Thread
 
 PROCESSORS = os.cpu_count() or 1  # asked once: the answer takes as long as a small front
 MOST_THREADS = 4  # parts of a factorisation stay one thread's work, and memory is as fast as it is
-_BLAS = RLock()
 
 
 def threads() -> int:
@@ -51,15 +49,3 @@ def in_threads(work: Callable[[int, int], object], count: int, *, most: int | No
         other.join()
     if failures:
         raise failures[0]
-
-
-@contextmanager
-def one_blas_thread() -> Iterator[None]:
-    """While this lasts, the BLAS has one thread, as on the command line: after each small product its others would keep
-    waiting for more, on the processors on which our own are to run. It is one setting for the whole process, so that
-    other threads that ask for it wait.
-    """
-    from threadpoolctl import threadpool_limits  # here, as few jobs need it
-
-    with _BLAS, threadpool_limits(limits=1, user_api="blas"):
-        yield

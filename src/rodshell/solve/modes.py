@@ -20,6 +20,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+from threadpoolctl import threadpool_limits
 
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError, StabilityError
@@ -28,7 +29,6 @@ from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.problem import Pattern
 from rodshell.solve.sparse_ldl import SingularError
 from rodshell.solve.tangent import Tangent, TangentAssembly, orthonormal, subspace_iteration
-from rodshell.threads import one_blas_thread
 
 DENSE = 24  # unknowns up to which LAPACK solves the whole problem
 SPARE = 2  # modes that are computed beyond those asked for, so that the count has a gap to stand in
@@ -211,8 +211,7 @@ def _largest(tangent: Tangent, upper: csc_matrix, count: int, least: float) -> t
     for _ in range(TRIES):
         wanted = min(wanted, available)
         if size <= DENSE or wanted >= size - 1:
-            with one_blas_thread():
-                values, vectors = eigh(matrix.toarray(), stiffness.toarray())
+            values, vectors = eigh(matrix.toarray(), stiffness.toarray())
             order = np.argsort(values)[::-1]
         else:
             values, vectors = _lanczos(tangent, matrix, stiffness, wanted)
@@ -255,7 +254,7 @@ def _lanczos(tangent: Tangent, matrix: csc_matrix, stiffness: csc_matrix, count:
     inverse = LinearOperator((size, size), matvec=tangent.factors.solve, dtype=float)
     start = np.sin(1.0 + np.arange(size) ** 2)  # the same at every run, and no symmetry of the structure is one of it
     try:
-        with one_blas_thread():
+        with threadpool_limits(limits=1, user_api="blas"):  # others would keep ours from the processors
             values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=start, tol=ACCURACY)
     except ArpackError as error:
         raise ConvergenceError(f"the modes were not found: {error}; ask for fewer") from None

@@ -17,7 +17,6 @@ from rodshell.model import Freedom
 from rodshell.rods.elements import Elements, Stressed, Stretch
 from rodshell.solve.problem import Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
-from rodshell.threads import one_blas_thread
 
 GUARDS = 4  # vectors of the subspace iteration beyond the modes that are asked for
 MOST_SWEEPS, FEW_SWEEPS = 200, 12
@@ -339,10 +338,11 @@ def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, toleran
     if settled and values[0] > 0:
         return np.asarray(row)
     from scipy.sparse.linalg import LinearOperator, eigsh  # here, as it is rare: a stiffness that has jumped
+    from threadpoolctl import threadpool_limits
 
     size = start.shape[1]
     operator = LinearOperator((size, size), matvec=inverse, dtype=float)
-    with one_blas_thread():
+    with threadpool_limits(limits=1, user_api="blas"):
         return np.asarray(eigsh(operator, k=1, which="SA", v0=start[0], tol=tolerance)[1][:, 0])
 
 
