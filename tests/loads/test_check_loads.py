@@ -1,6 +1,7 @@
 """Balance, symmetry, superposition and rigid motions of shells under loads; what is refused."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import pi
 from pathlib import Path
 
@@ -14,8 +15,12 @@ from rodshell.formfinding.popup import Ends
 from rodshell.layout.cells import diagonals
 from rodshell.loads.check import _load, mechanism, tributary_of
 from rodshell.loads.kinds import LoadedNodes
+from rodshell.loads.strength import area_of, preset_limits
 from rodshell.loads.structure import Structure
+from rodshell.loads.tributary import Tributary
+from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load_path import load_path
+from rodshell.solve.modes import linear_buckling
 from tests.loads.shells import LARCH, ROPE, TUBE, grid, one, shell
 
 
@@ -69,6 +74,72 @@ def test_snow_and_wind_have_the_sums_of_their_surface() -> None:
     assert drift[:, 2].sum() == pytest.approx(-24.0 * 3 / 8, rel=0.02)
     right = flat.popped["pinned"].positions[:, 0] > 0
     assert drift[right, 2].sum() / drift[~right, 2].sum() == pytest.approx(2.0, rel=0.1)
+
+
+def test_half_of_a_plan_is_what_lies_beyond_the_middle_of_its_extent() -> None:
+    """Of a right triangle three quarters towards its right angle's far side or a quarter, and of a drift both halves:
+    a triangle's load on each side of the middle."""
+    ticks = (np.arange(400) + 0.5) / 400
+    x, y = (side.ravel() for side in np.meshgrid(ticks, ticks))
+    inside = x + y < 1.0
+    plan = np.column_stack([x, y])[inside]
+    area = np.full(len(plan), 0.5 / len(plan))
+    positions = np.column_stack([plan, np.zeros(len(plan))])
+    areas = Tributary(area, area, area[:, None] * [0.0, 0.0, 1.0], plan)
+    nodes = LoadedNodes(positions, area, areas, 0.01)
+    for direction, share in ((pi / 4, 0.75), (5 * pi / 4, 0.25), (0.0, 0.25), (pi, 0.75)):
+        half = rs.Snow(1.0, "half", direction).forces(nodes).sum(axis=0)[2]
+        assert half == pytest.approx(-0.5 * share, rel=0.01)
+    drift = rs.Snow(1.0, "drifted", pi / 4).forces(nodes)[:, 2]
+    beyond = plan.sum(axis=1) > 0.5
+    assert drift[beyond].sum() < 0 > drift[~beyond].sum()
+    assert drift.min() == pytest.approx(-1.0 * area[0], rel=0.01)
+    assert drift[~beyond].min() == pytest.approx(-0.5 * area[0], rel=0.01)
+
+
+def test_a_combination_that_moves_nothing_is_named() -> None:
+    loads = rs.Loads(
+        loads={"own": rs.SelfWeight(), "none": rs.Snow(0.0)}, combinations={"all": {"own": 1.0}, "bare": {"none": 1.0}}
+    )
+    with pytest.raises(InputError, match='combination "bare": the load moves nothing'):
+        rs.check_loads(shell("tubes"), loads)
+
+
+def test_bracing_whose_strength_is_not_known_is_named_as_not_judged() -> None:
+    bare = rs.Cables(rod=rs.Rod(ROPE.section, rs.Material(160e9, 7850, 0.3)), prestrain=5e-4)
+    gfrp = rs.Cables(rod=rs.Rod(ROPE.section, rs.Material.preset("gfrp")), prestrain=5e-4)
+    for bracing, said in ((bare, True), (gfrp, False)):
+        found = rs.check_loads(shell("tubes"), one(rs.Snow(10.0), bracing=bracing))
+        assert any("strength of the bracing is not known" in word for word in found.warnings) == said
+
+
+def test_prestressed_cables_are_judged_by_the_permanent_strength() -> None:
+    """Nearly all of their force is prestress, which stays."""
+    rod = rs.Rod(ROPE.section, rs.Material.preset("gfrp"))
+    bracing = rs.Cables(rod=rod, prestrain=1e-3)
+    found = rs.check_loads(shell("tubes"), one(rs.Snow(1.0), bracing=bracing)).shells["all"]["pinned"]
+    known, area = preset_limits(rod, None).bending, area_of(rod)
+    short = found.bracing_forces.max() / (known["short"] * area)
+    assert found.bracing_utilisation is not None
+    assert found.bracing_utilisation > 1.3 * short
+    assert found.bracing_utilisation == pytest.approx(short * known["short"] / known["permanent"], rel=0.05)
+
+
+def test_each_mode_is_an_imperfection_of_its_own() -> None:
+    """The smallest factor of all; of their sum each has a part of the amplitude, and its sign is arbitrary."""
+    form, bracing = shell("tubes"), rs.Cables(rod=ROPE, prestrain=1e-3)
+    asked = one(rs.Snow(300.0), bracing=bracing, stability=rs.Stability(imperfection=0.1, modes=2))
+    found = rs.check_loads(form, asked).shells["all"]["pinned"]
+    structure = bracing.brace(Structure.erected(form.popped["pinned"], form.rod), form.target)
+    load = _load(structure, nodes_of(form), asked, asked.combinations["all"])
+    modes = linear_buckling(structure.equilibrium, load, 2).shapes
+    each = [
+        load_path(imperfect(structure.equilibrium, shape, amplitude), load).factor
+        for shape in modes
+        for amplitude in (0.1, -0.1)
+    ]
+    assert found.imperfect_factor == pytest.approx(min(each), rel=5e-3)
+    assert max(each) > 1.02 * min(each)
 
 
 def test_point_and_line_loads_have_their_forces() -> None:

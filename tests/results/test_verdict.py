@@ -115,6 +115,9 @@ def test_different_faults_of_all_end_conditions_leave_none_to_build() -> None:
      ([("bending.deployment.max_bending_strain", 0.08)], "too thick for this curvature"),
      ([("contact.deployment", TOUCHING)], "5 pairs of rods touch or cross, worst: U03 and U04 overlap by 3.00 mm"),
      ([("target.flat", True)], "the target is flat, nothing pops up"),
+     ([("self_weight.pinned.load_factor", 0.024), ("self_weight.clamped.load_factor", 0.051)],
+      "it carries only 2.4 % of it with pinned ends and 5.1 % of it with clamped ends"),
+     ([("self_weight.pinned.load_factor", 0.5), ("pop_up.clamped.stable", False)], "it carries only 50 % of it"),
      ([("agreement.pinned.max_relative", 0.2), ("agreement.clamped.max_relative", 0.051)], "deviates from the target"),
      ([("pop_up", {}), ("status", "drape stalled")], "did not converge: drape stalled")],
 )  # fmt: skip
@@ -142,8 +145,6 @@ def test_a_shell_that_cannot_be_built_says_too_that_it_does_not_carry_its_own_we
 @pytest.mark.parametrize(
     ("changes", "words"),
     [([("agreement.pinned.max_relative", 0.2), ("agreement.clamped.max_relative", 0.021)], "deviates from the target"),
-     ([("self_weight.pinned.load_factor", 0.024), ("self_weight.clamped.load_factor", 0.051)],
-      "it carries only 2.4 % of it with pinned ends and 5.1 % of it with clamped ends"),
      ([("self_weight", MISSING)], "own weight was not checked"),
      ([("deployment", MISSING)], "reached from flat was not checked: "),
      ([("other_shapes.clamped.found", [{"distance": 0.49, "energy": 1.16, "mirror": False}])],
@@ -247,6 +248,30 @@ def test_no_more_than_a_lower_bound_is_made_of_a_path_that_was_lost() -> None:
         "with pinned ends it is not known whether the shell stands under its own weight: it could be followed only up "
         "to 12 % of it",
     )
+
+
+def test_a_shell_that_sinks_far_under_its_own_weight_does_not_have_the_shape_that_is_told() -> None:
+    """Its gap to the target is that without weight; one end condition that keeps the shape is enough."""
+    size = 0.2
+    gaps = [(f"agreement.{ends}", {"max": 1e-4, "max_relative": 1e-4 / size}) for ends in ("pinned", "clamped")]
+    sunk = [(f"self_weight.{ends}.deflection", depth) for ends, depth in (("pinned", 0.03), ("clamped", 0.005))]
+    found = verdict(changed(*gaps, *sunk))
+    assert found.level == "check"
+    assert "with clamped ends the shell moves by 5.00 mm (2.5 % of its size) under its own weight" in found.headline
+    assert verdict(changed(*gaps, sunk[0], ("self_weight.clamped.deflection", 0.003))).level == "good"
+
+
+def test_a_shell_that_buckles_in_the_linear_sense_before_its_loads_is_to_be_checked() -> None:
+    loads = {"winter": {"pinned": {"limit_factor": 1.43, "linear_factor": 0.177, "max_deflection": 0.198}}}
+    found = verdict(changed(("loads", loads)))
+    assert found.level == "check"
+    assert any(
+        "under winter with pinned ends linear buckling is at 0.177 times these loads: the shell carries them only in "
+        "another shape, its nodes having moved by 198 mm" in reason
+        for reason in found.reasons
+    )
+    loads["winter"]["pinned"]["linear_factor"] = 1.2
+    assert not any("linear" in reason for reason in verdict(changed(("loads", loads))).reasons)
 
 
 LIGHT = [(f"self_weight.{ends}.load_factor", 0.1) for ends in ("pinned", "clamped")]

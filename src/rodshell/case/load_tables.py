@@ -338,7 +338,9 @@ class StabilityTable(Table):
     imperfection: Annotated[str | float, BeforeValidator(_imperfection)] | None = Field(
         default=None, description='largest imperfection: a length, or "span/500"; default: none'
     )
-    modes: Whole = Field(default=3, description="number of buckling modes that imperfections have")
+    modes: Whole = Field(
+        default=3, description="number of buckling modes, each of which is tried as the shape of the imperfection"
+    )
 
     def build(self) -> "Stability":
         """What it says."""

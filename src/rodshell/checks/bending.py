@@ -6,6 +6,9 @@ normal curvature, out of the shell, and the geodesic curvature, within it. Of ro
 are taken by the section's own axes m1 and m2, which are the shell's normal and a line within it where joints hold the
 rods upright; of others by the shell's normal, that of the rods that cross there.
 
+A joint that resists shear passes a moment M about its normal from one rod to the other, so that a rod's own jumps there
+by M. The node has the mean of both sides; the sharper one bends by M/(2 EI2) more within the shell, and is what counts.
+
 The stress over a section is that of bending, stretch and torsion together, at the points where it can be largest:
 
     sigma = E (eps + kappa1 x + kappa2 y),   tau = G theta' l(x, y),   s = sqrt(sigma^2 + (w tau)^2)
@@ -28,9 +31,11 @@ from math import sqrt
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
+from rodshell.checks.reactions import joint_loads
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
@@ -280,7 +285,7 @@ def bending_of(
     if shell.node_count != mesh.node_count:  # rods a distance apart at their joints: each has its own line
         mesh, positions = mesh.apart, state[: shell.node_count]
     clamps = unit(state[shell.ghosts] - state[shell.ends]) if len(shell.ghosts) else None
-    components, twist = None, None
+    components, twist, by_joints = None, None, _bent_by_joints(shell, state, rod)
     if frames := rod_frames(shell):
         strains = _on_entries(shell, frames.strains(state))
         twist = strains[:, 2]
@@ -292,14 +297,30 @@ def bending_of(
     return bending(
         mesh, positions, rod,
         clamps=clamps, components=components, twist_rate=twist, normals=normals, shear_weight=shear_weight,
-        edge_strains=edge_strains,
+        edge_strains=edge_strains, by_joints=by_joints,
     )  # fmt: skip
+
+
+def _bent_by_joints(shell: Shell, state: Floats, rod: Rod) -> Floats | None:
+    """(k, 3) by how much more each rod bends on the sharper side of its joints than at their nodes, along the joints'
+    normals [1/m]; None where no joint resists shear."""
+    joints = (element for element in shell.between if isinstance(element, RelativeRotation))
+    if not any(element.stiffness[:, 0, 0].any() for element in joints):
+        return None
+    mesh, loads = shell.mesh, joint_loads(shell, state)
+    moments = np.zeros((len(mesh.rod_nodes), 3))
+    np.add.at(moments, mesh.at_crossings, (np.abs(loads.shear_moments)[:, None] * loads.normals)[:, None])
+    stiffness = np.full(len(moments), rod.bend_stiffnesses[1])
+    if (local := varied_at_nodes(mesh, rod)) is not None:
+        stiffness = stiffness * local.bend2
+    share = np.where(_inner(mesh), 0.5, 1.0)  # a rod that ends at a joint has all of its moment on one side
+    return np.asarray(moments * (share / stiffness)[:, None])
 
 
 def bending(
     mesh: GridMesh, positions: Floats, rod: Rod, *, clamps: Floats | None = None, components: Floats | None = None,
     twist_rate: Floats | None = None, normals: Floats | None = None, shear_weight: float = VON_MISES,
-    edge_strains: Floats | None = None,
+    edge_strains: Floats | None = None, by_joints: Floats | None = None,
 ) -> Bending:  # fmt: skip
     """Bending of the rods of `mesh` with nodes at `positions` (n, 3) [m].
 
@@ -312,8 +333,15 @@ def bending(
     normals : (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without `components`.
     shear_weight : of the shear stress against the normal stress, see `checks.bending`.
     edge_strains : (e,) as of `bending_of`.
+    by_joints : (k, 3) along the normals of joints, how much sharper than their nodes bend the sides of them that bend
+        most [1/m]; None: joints pass no moments about their normals.
     """
     turns, tangents = _turns(mesh, positions, clamps)
+    if by_joints is not None:
+        turns = turns + np.copysign(1.0, dot(turns, by_joints))[:, None] * by_joints
+        if components is not None:
+            within = np.copysign(np.sqrt(dot(by_joints, by_joints)), components[:, 1])
+            components = np.column_stack([components[:, 0], components[:, 1] + within])
     curvature = np.linalg.norm(turns, axis=1)
     axial = axial_strains(mesh, positions) if edge_strains is None else _mean_of_edges(mesh, edge_strains)
     twist = np.zeros(len(curvature)) if twist_rate is None else twist_rate

@@ -3,13 +3,14 @@
 For each combination and end condition the path of equilibria under t times the combination is followed from the
 unloaded shell. What is read off at t = 1 is what the combination does; where the shell falls before, at the last factor
 at which it is stable. Three factors stand side by side: the linear buckling factor about the unloaded shell, the factor
-at which the path loses its stability, and the same of a shell with imperfections in its lowest modes. All multiply the
-whole combination, with the shell's weight if that is in it.
+at which the path loses its stability, and the smallest of the same of shells with an imperfection in one of the lowest
+modes. All multiply the whole combination, with the shell's weight if that is in it.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -55,9 +56,9 @@ class LoadedShell:
         `MOST`.
     limit_kind : what ends the path, see `LoadPath.limit`; "lost": nothing is known above the factor.
     linear_factor : lowest linear buckling factor about the unloaded shell; None: none up to `MOST`.
-    imperfect_factor : as `limit_factor`, of the shell with imperfections; None: above `MOST`, not asked for, or not
-        found.
-    imperfect_kind : what ends the path of the shell with imperfections; "lost": nothing is known above its factor;
+    imperfect_factor : as `limit_factor`, the smallest of the shells with an imperfection in one mode; None: above
+        `MOST`, not asked for, or not found.
+    imperfect_kind : what ends the path of that shell; "lost": nothing is known above its factor;
         None: not asked for.
     load_sum : (3,) sum of the loads, those on supports included [N].
     reactions : of the supports, without those of the unloaded shell.
@@ -156,7 +157,7 @@ class LoadChecks:
         if self.refused:
             return (f"the loads were not checked: {self.refused}",)
         late = (f"{self.stopped}; not checked: {', '.join(self.missing)}",) if self.stopped else ()
-        return (*late, *self._unjudged)
+        return (*late, *self._unjudged, *self._unjudged_bracing)
 
     @property
     def _unjudged(self) -> tuple[str, ...]:
@@ -171,6 +172,16 @@ class LoadChecks:
         if missing:
             return (f"the design strength for {' and '.join(missing)} loads is not known and was not judged",)
         return ()
+
+    @property
+    def _unjudged_bracing(self) -> tuple[str, ...]:
+        every = [shell for by_ends in self.shells.values() for shell in by_ends.values()]
+        if all(shell.bracing_utilisation is not None or not len(shell.bracing_forces) for shell in every):
+            return ()
+        return (
+            "the design strength of the bracing is not known, so that whether it breaks under the loads was not "
+            "judged: compare its largest forces, which stand with the loads, with what it can carry",
+        )
 
 
 def check_shells(
@@ -211,9 +222,12 @@ def check_shells(
             acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
             for name, load in acting.items():
                 said = partial(_said, progress, f"{name}, {ends} ends")
-                found[name][ends] = loaded_shell(
-                    structure, load, loads, limits=limits, duration=loads.duration(name), progress=said
-                )
+                try:
+                    found[name][ends] = loaded_shell(
+                        structure, load, loads, limits=limits, duration=loads.duration(name), progress=said
+                    )
+                except InputError as reason:
+                    raise InputError(f"combination {shown(name)}: {reason}") from None
                 missing.pop(0)
     except OutOfTimeError as late:
         stopped = str(late)
@@ -429,9 +443,14 @@ def _of_bracing(
     """Largest utilisation of the bracing; None: there is none, or its strength is not known."""
     bracing = loads.bracing
     if structure.cables is not None and isinstance(bracing, Cables):
-        known = preset_limits(bracing.rod, loads.strength.service_class).bending.get(duration)
-        force = float(structure.bracing_forces(found).max(initial=0.0))
-        return None if known is None else force / (known * area_of(bracing.rod))
+        known, area = preset_limits(bracing.rod, loads.strength.service_class).bending, area_of(bracing.rod)
+        pulls = ((found, duration), (structure.equilibrium, PERMANENT))  # prestress stays
+        shares = [
+            float(structure.bracing_forces(state).max(initial=0.0)) / (known[lasting] * area)
+            for state, lasting in pulls
+            if lasting in known
+        ]
+        return max(shares, default=None)
     if structure.laths is None:
         return None
     rod, edges, asked = structure.laths.rod, len(structure.mesh.edges), replace(loads.strength, slip=None)
@@ -449,19 +468,23 @@ def _with_imperfections(
     structure: Structure, load: Load, loads: Loads, buckling: LinearBuckling | None,
     progress: Callable[[int, float], None],
 ) -> tuple[float | None, Limit | None, int]:  # fmt: skip
-    """The smaller limit factor of the shells with imperfections of either sign, what ends its path, and the
-    factorisations that both took."""
+    """The smallest limit factor of the shells with an imperfection in one mode, of either sign, what ends its path, and
+    the factorisations that all took.
+
+    Modes are not added: how their signs go together is arbitrary, and each would have a part of the amplitude only.
+    """
     points = structure.shell.positions(structure.equilibrium.state)
     amplitude = loads.stability.amplitude(float(np.ptp(points[:, :2], axis=0).min()))
     if amplitude is None or buckling is None or not len(buckling.shapes):
         return None, None, 0
-    try:
-        starts = [imperfect(structure.equilibrium, buckling.shapes, sign * amplitude) for sign in (1.0, -1.0)]
-    except ConvergenceError:
-        return None, "lost", 0
     kind: Limit = "none"
     least, work = np.inf, 0
-    for start in starts:  # the second only as far as it could be the smaller
+    for shape, sign in product(buckling.shapes, (1.0, -1.0)):
+        try:
+            start = imperfect(structure.equilibrium, shape, sign * amplitude)
+        except ConvergenceError:
+            return None, "lost", work
+        # as far as it could be the smallest
         path = load_path(start, load, most=min(MOST, least), stations=(), progress=progress)
         work += path.factorizations
         if path.limit != "none" and path.factor < least:

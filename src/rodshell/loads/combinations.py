@@ -29,7 +29,7 @@ class Stability:
     ----------
     imperfection : largest displacement of the geometry with imperfections [m], or a part of the span such as
         "span/500"; None: the perfect geometry alone.
-    modes : lowest buckling modes that are looked for, in which imperfections are.
+    modes : lowest buckling modes that are looked for; an imperfection in each of them is tried, with either sign.
     """
 
     imperfection: float | str | None = None

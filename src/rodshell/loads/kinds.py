@@ -47,11 +47,10 @@ class LoadedNodes:
 
     def along(self, direction: float) -> Floats:
         """(n, 2) middles of the nodes' plan areas in axes along a `direction` [rad] and across it, from the middle of
-        the plan [m]."""
-        xy = self.tributary.plan_positions
-        middle = 0.5 * (xy.min(axis=0) + xy.max(axis=0))
-        axis = np.array([cos(direction), sin(direction)])
-        return np.column_stack([(xy - middle) @ axis, (xy - middle) @ np.array([-axis[1], axis[0]])])
+        the plan's extent in each of them [m]."""
+        x, y = self.tributary.plan_positions.T
+        axes = np.array([cos(direction) * x + sin(direction) * y, cos(direction) * y - sin(direction) * x])
+        return np.asarray((axes - 0.5 * (axes.min(axis=1) + axes.max(axis=1))[:, None]).T)
 
     def nearest(self, at: Sequence[float], what: str) -> int:
         """The node that is nearest to a point of the plan [m].
@@ -140,7 +139,7 @@ class Wind:
     ----------
     value : velocity pressure [N/m2].
     coefficient : pressure coefficient, positive towards the surface from above: a number, or a formula in x along the
-        wind and y across it, from the middle of the plan [m], such as "-1.2 + 0.1*x".
+        wind and y across it, from the middle of the plan's extent in both [m], such as "-1.2 + 0.1*x".
     direction : in which it blows, in plan from the x axis [rad].
     """
 

@@ -9,10 +9,11 @@ sigma is the normal stress of both bending moments and the axial force together,
 whose strength f_a is below that of bending in timber [EN 1995-1-1, 6.2.3; with k_m = 1]. tau_T is the stress of
 torsion, tau_V of the shear force: 3/2 of its mean in a rectangle, 4/3 in a circle or an ellipse, 2 in a tube. At a
 joint with a hole, stresses are those of the net section. A joint slips where the axial forces of a rod on both of its
-sides differ by more than it can transfer. A locked joint also transfers a moment M about its normal, half of it to
-either side of a rod, where the node at the joint has the mean of both sides: bending has the stress of M/2 more there;
-and slip is the root of the sum of the squares of force and moment over what alone makes it slip [the limit surface of
-sliding friction as an ellipse: Howe and Cutkosky 1996].
+sides differ by more than it can transfer. A locked joint also transfers a moment about its normal (which bends rods
+more sharply on one side of it, see `checks.bending`), and slip is the root of the sum of the squares of force and
+moment over what alone makes it slip [the limit surface of sliding friction as an ellipse: Howe and Cutkosky 1996].
+
+tau_V is the largest of a span, continued in a straight line to its joints from the edges that are not next to them.
 
 Compression is also shown over the Euler load of each span between joints. It does not count as a utilisation: the path
 of the loaded shell has the buckling of spans in it.
@@ -26,7 +27,7 @@ from typing import Literal
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.checks.bending import VON_MISES, Bending, bending_of, fibre_modulus, fibre_strain
+from rodshell.checks.bending import VON_MISES, Bending, bending_of
 from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
@@ -254,7 +255,7 @@ def utilisation(
     if asked.hole and local is not None:
         raise InputError("strength.hole: the net section of rods that vary along their length is not known: leave out")
     spans = Spans.of(mesh)
-    axial, across = forces[spans.middle], _shear_forces(shell, state)[spans.middle]
+    axial, across = forces[spans.middle], spans.towards_joints(_shear_forces(shell, state))
     bends = np.full(len(mesh.rod_nodes), min(rod.bend_stiffnesses))
     areas = np.ones(len(mesh.rod_nodes))
     if local is not None:
@@ -273,11 +274,6 @@ def utilisation(
             net[_at_joints(mesh)] = net_section(section, asked.hole)
         drawn = np.abs(bent.axial_strain) * rod.stretch_stiffness / area_of(rod)
         stress = bent.stress + drawn * (1.0 / limits.axial - 1.0)
-        if turned.any():
-            within = 0.5 * turned / rod.bend_stiffnesses[1]
-            if local is not None:
-                within = within * local.fibre2 / local.bend2
-            stress = stress + fibre_modulus(rod) * fibre_strain(rod, np.zeros_like(within), within)
         uses["bending"] = net * stress / strength
         if bent.torsion_stress is not None and (peak := _shear_peak(section)) is not None:
             sheared = spans.on_entries(across) * peak / (limits.cracked * area_of(rod) * areas)
@@ -389,6 +385,17 @@ class Spans:
         first, last = entries[:-1][same], entries[1:][same]
         middle = (first + last - 1) // 2 - rods[:-1][same]  # edges are counted rod by rod
         return Spans(first, last, middle, mesh.stations[last] - mesh.stations[first])
+
+    def towards_joints(self, values: Floats) -> Floats:
+        """(s,) largest of the `values` (e,) of each span, continued in a straight line from its inner edges to those
+        next to joints, whose own shear forces contain moments of the joints."""
+        result = values[self.middle].copy()
+        edges = self.last - self.first
+        begins = self.middle - (edges - 1) // 2
+        for s in np.flatnonzero(edges >= 4).tolist():
+            inner = values[begins[s] + 1 : begins[s] + edges[s] - 1]
+            result[s] = max(inner.max(), 2 * inner[0] - inner[1], 2 * inner[-1] - inner[-2])
+        return result
 
     def least(self, values: Floats) -> Floats:
         """(s,) smallest of `values` (k,) of the entries of each span."""

@@ -85,7 +85,8 @@ class OutputOptions:
     strength : of the rods' material [Pa], by which utilisation is counted; None: it is not counted.
     stages : equilibria of the deployment from flat; 0: it is not followed.
     rod_chosen : which of the rod's "material" and "section" the program chose to fit the target.
-    shear_strength : of the rods' material [Pa], in addition to `strength`; None: stress is counted by von Mises.
+    shear_strength : of the rods' material [Pa], in addition to `strength`; None: in the proportion of a preset, or
+        stress is counted by von Mises.
     strength_of : the preset material that the strengths are of, where they were not given.
     """
 
@@ -123,13 +124,19 @@ class OutputOptions:
     def judged_by(self, rod: Rod) -> "OutputOptions":
         """The same with the strengths of the rod's preset material, where none was given.
 
+        A strength that is given alone, such as a reduced one, has a shear strength in the preset's proportion.
+
         Parameters
         ----------
         rod : section and material of every rod.
         """
         material = rod.material
-        if self.strength is not None or material is None or material.bending_strength is None:
+        if material is None or material.bending_strength is None:
             return self
+        if self.strength is not None:
+            if self.shear_strength is not None or material.shear_strength is None:
+                return self
+            return replace(self, shear_strength=self.strength * material.shear_strength / material.bending_strength)
         return replace(
             self,
             strength=material.bending_strength,

@@ -6,7 +6,7 @@ not checked, and then the result is not good.
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rodshell.results.own_weight import light, weight_findings
+from rodshell.results.own_weight import falls, light, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
 from rodshell.results.strength_used import (
@@ -48,7 +48,8 @@ def verdict(results: Results) -> Verdict:
     """The verdict on the figures of a result.
 
     An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
-    enough for their bends. Without one that can be used, or far off the target, the result is unbuildable.
+    enough for their bends. Without one that can be used, far off the target, or where none stands under its own weight,
+    the result is unbuildable.
 
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
@@ -81,8 +82,11 @@ def verdict(results: Results) -> Verdict:
     weight, stands = weight_findings(results, usable or there)
     lead = weight if there and not stands else []
     gravest = [*lead, *far, *grave] if off > FAR_OFF else [*lead, *grave, *far]
-    to_check = [*gravest, *weight, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings]
-    if not usable or deployment or off > FAR_OFF:
+    sinks = _sinks(results, usable)
+    to_check = [
+        *gravest, *weight, *sinks, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings
+    ]  # fmt: skip
+    if not usable or deployment or off > FAR_OFF or falls(results, usable):
         return _verdict("unbuildable", to_check)
     if to_check:
         return _verdict("check", to_check)
@@ -244,6 +248,21 @@ def _off_words(results: Results, ends: Ends, gap: Agreement) -> str:
     )
 
 
+def _sinks(results: Results, usable: list[Ends]) -> list[str]:
+    """That every shell that can be used takes another shape under its own weight: gaps are those without weight."""
+    sizes = [gap.max / gap.max_relative for gap in results.agreement.values() if gap.max and gap.max_relative]
+    sunk = {ends: results.self_weight[ends].deflection for ends in usable if ends in results.self_weight}
+    known = {ends: depth for ends, depth in sunk.items() if depth is not None}
+    if not sizes or not known or min(known.values()) <= OFF * sizes[0]:
+        return []
+    ends, depth = min(known.items(), key=lambda pair: pair[1])
+    return [
+        f"with {ends} ends the shell moves by {_mm(results, depth)} ({percent(depth / sizes[0])} of its size) under "
+        "its own weight, so that it does not keep the shape whose gap to the target is given: use stiffer rods, or "
+        "brace it"
+    ]
+
+
 def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
     """What has to be looked at although the shell can be built, and what is not known; more is among the warnings."""
     shells, status = results.pop_up, results.status
@@ -274,6 +293,13 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[str]:
                 continue
             found = by_ends[end]
             limit, imperfect = found.limit_factor or 0.0, found.imperfect_factor
+            linear, stands = found.linear_factor, found.limit_factor is None or limit >= 1
+            if linear is not None and linear < 1 and stands:
+                yield (
+                    f"under {name} with {end} ends linear buckling is at {rounded_down(linear)} times these loads: "
+                    "the shell carries them only in another shape, its nodes having moved by "
+                    f"{_mm(results, found.max_deflection)}"
+                )
             if found.limit_kind == "not followed" and limit < 1:
                 yield (
                     f"whether the shell stands under {name} with {end} ends is not known: it could be followed only up "
