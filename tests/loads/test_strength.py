@@ -103,6 +103,26 @@ def test_spans_run_from_joint_to_joint() -> None:
     )
 
 
+def test_shear_forces_are_those_towards_joints_without_the_edges_next_to_them() -> None:
+    """Under loads between joints they grow towards these in a straight line; the edges next to them hold moments of
+    joints, as pairs of forces."""
+    layout = rs.GridLayout.orthogonal(rods=(3, 3), spacing=0.6, edge=0.1, length=1.8)
+    mesh = rs.mesh_grid(layout.flat_grid((3, 3), 1.8), 0.1)
+    spans = Spans.of(mesh)
+    values, expected = np.full(len(mesh.edges), np.nan), np.zeros(len(spans.lengths))
+    edge = 0
+    for s, count in enumerate((spans.last - spans.first).tolist()):
+        forces = np.abs(np.arange(count) - 0.5 * (count - 1) + 0.2 * s)
+        values[edge : edge + count] = forces
+        expected[s] = forces.max() if count > 3 else values[spans.middle[s]]
+        if count > 3:
+            values[[edge, edge + count - 1]] = 1e6
+        edge += count
+    assert edge == len(values)
+    assert (spans.last - spans.first).max() > 5
+    np.testing.assert_allclose(spans.towards_joints(values), expected, atol=1e-12)
+
+
 def test_stress_over_strength_is_what_is_used_and_the_erected_shell_counts_with_the_permanent_one() -> None:
     form = shell("tubes")
     bracing = rs.Cables(rod=ROPE, prestrain=1e-3)
