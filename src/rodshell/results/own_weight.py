@@ -85,20 +85,6 @@ def _times(weighed: SelfWeight) -> str:
     return f"{least}{shown_factor(weighed.load_factor)} times"
 
 
-def falls(results: Results, ends: list[Ends]) -> bool:
-    """Whether none of the shells stands under its own weight, as far as is known, and no bracing is to hold them.
-
-    Parameters
-    ----------
-    results : with the checks of the self-weight.
-    ends : whose shells are meant.
-    """
-    found = [results.self_weight.get(end) for end in ends]
-    braced = any(shell.bracing for supported in results.loads.values() for shell in supported.values())
-    known = [weighed for weighed in found if weighed is not None and weighed.limit not in ("not followed", "no mass")]
-    return bool(ends) and len(known) == len(ends) == len(light(results, ends)) and not braced
-
-
 def light(results: Results, ends: list[Ends]) -> dict[Ends, float]:
     """By end condition, the factors on its own weight that a shell carries, or is known to, where they are below 1.
 

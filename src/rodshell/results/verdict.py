@@ -6,7 +6,7 @@ not checked, and then the result is not good.
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rodshell.results.own_weight import falls, light, weight_findings
+from rodshell.results.own_weight import light, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
 from rodshell.results.strength_used import (
@@ -48,8 +48,7 @@ def verdict(results: Results) -> Verdict:
     """The verdict on the figures of a result.
 
     An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
-    enough for their bends. Without one that can be used, far off the target, or where none stands under its own weight,
-    the result is unbuildable.
+    enough for their bends. Without one that can be used, or far off the target, the result is unbuildable.
 
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
@@ -86,7 +85,7 @@ def verdict(results: Results) -> Verdict:
     to_check = [
         *gravest, *weight, *sinks, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings
     ]  # fmt: skip
-    if not usable or deployment or off > FAR_OFF or falls(results, usable):
+    if not usable or deployment or off > FAR_OFF:
         return _verdict("unbuildable", to_check)
     if to_check:
         return _verdict("check", to_check)
