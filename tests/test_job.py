@@ -188,6 +188,27 @@ def test_a_job_of_python_objects_runs_with_them(tmp_path: Path) -> None:
     assert job.case.build().method == frames
 
 
+def test_the_case_kept_with_the_form_of_a_python_function_is_not_run_with_another_target(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    form = rs.Job(FUNCTION, LAYOUT, ROD, ends="clamped", options=rs.OutputOptions(stages=0)).run(until="pop-up")
+    saved = str(form.save(tmp_path / "bowl"))
+    assert rs.read(saved).case_toml == form.archive().case_toml
+    for case in (f"{saved}/case.toml", form.archive().case_toml):
+        with pytest.raises(InputError, match=r"be run again: no case file can describe the Python function .*bowl"):
+            rs.Job.load(case)
+    (tmp_path / "loads.toml").write_text('[[loads]]\nname = "own"\nkind = "self_weight"\n')
+    loads, case = ("--loads", str(tmp_path / "loads.toml")), f"{saved}/case.toml"
+    for arguments in (["check", saved, *loads], ["check", case, *loads], ["refine", saved], ["refine", case],
+                      ["form", case]):  # fmt: skip
+        assert main([*arguments, "--out", str(tmp_path / "again")]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith("rodshell: error: this case cannot be run again: no case file can describe the Python")
+        assert said.count("\n") == 1
+    assert main(["export", saved, "--only", "csv"]) == 0
+    assert main(["popup", saved, "--out", str(tmp_path / "popped"), "--only", "csv"]) in (0, 1)
+
+
 def test_a_job_is_read_only_and_says_what_it_is_in_one_line() -> None:
     job = dome(seams__lines="-1,0; 1,0")
     with pytest.raises(AttributeError, match=r"use job.changed\(...\)"):

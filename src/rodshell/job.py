@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rodshell.case import Case, load_case
 from rodshell.case.case import built
 from rodshell.case.from_objects import case_of, case_of_rod_ends
-from rodshell.case.load import changed_case, flattened, require_keys_of_rods
+from rodshell.case.load import changed_case, flattened, is_described, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
 from rodshell.errors import InputError
 from rodshell.form import Form
@@ -322,7 +322,8 @@ def _ends_and_case(
             raise InputError(f"unit = {shown(unit)}: {path} is a result, which is in SI: leave it out")
         earlier = read_result(path)
         with reading(path) as file:
-            case = file("case.toml") if file("case.toml").is_file() else None
+            kept = file("case.toml")
+            case = kept if kept.is_file() and is_described(kept) else None
             joint = {f"joint.{key}": value for key, value in earlier.joint.items()}
             return earlier.ends, load_case(case, joint | overrides, otherwise={"rod": earlier.rod})
     if not path.exists():

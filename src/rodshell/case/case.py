@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from rodshell.targets import Target
 
 HEADER = "# The full input of a rodshell job, in SI units. To run it again: rodshell form case.toml\n"
+UNDESCRIBED = "not_described"
+"""Key of the case kept with the form of an object that no case file can describe: what that is; no such case is run."""
 
 
 class Built(NamedTuple):
@@ -118,12 +120,12 @@ class Case(Table):
         return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True, exclude=idle))
 
     def text(self) -> str:
-        """As `to_toml`, or a comment on why no case file can give the same again."""
+        """As `to_toml`, or a text that is refused as a case and says why no case file can give the same again."""
         if self.of_table:
             return ""
         for held in self.held_objects.values():
             if not held.writable:
-                return f"# no case file can give {held.what} again\n"
+                return f"# no case file can give {held.what} again\n{UNDESCRIBED} = {_value(held.what)}\n"
         return self.to_toml()
 
     def absolute(self) -> Self:

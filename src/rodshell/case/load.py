@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from rodshell.case.case import Case
+from rodshell.case.case import UNDESCRIBED, Case
 from rodshell.case.keys import BY_KIND, case_keys, case_tables, not_a_table, sentence, unknown_key
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
@@ -86,15 +86,26 @@ def load_case(
 
     Raises
     ------
-    InputError : no such case or file, not TOML, an unknown key, a value that cannot be used; in one sentence.
+    InputError : no such case or file, not TOML, an unknown key, a value that cannot be used, the case of an object that
+        no case file can describe; in one sentence.
     """
     overrides = dict(overrides or {})
     raw = _raw_of(source)
+    if UNDESCRIBED in raw:
+        what = raw[UNDESCRIBED]
+        raise InputError(
+            f"this case cannot be run again: no case file can describe {what}: keep the Python that makes it"
+        )
     raw = {**deepcopy(dict(otherwise or {})), **raw}
     if str(source) in BUILT_IN and {"seams.lines", "seams.file"} & overrides.keys():
         for key in ("rods", "length"):  # of the whole; what seams cut has them from its patches
             raw.get("layout", {}).pop(key, None)
     return _validated(raw, overrides)
+
+
+def is_described(path: Path) -> bool:
+    """Whether the case file kept with a result describes all that the result was made of."""
+    return UNDESCRIBED not in _raw_of(path)
 
 
 def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
