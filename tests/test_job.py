@@ -31,6 +31,15 @@ def earlier() -> rs.Form:
     return dome().run()
 
 
+def test_a_form_that_was_saved_and_shown_is_pickled(earlier: rs.Form, tmp_path: Path) -> None:
+    earlier.save(tmp_path / "dome")
+    page = earlier._repr_html_()
+    same = pickle.loads(pickle.dumps(earlier))
+    assert same.archive() == earlier.archive()
+    assert same._repr_html_() == page
+    assert pickle.loads(pickle.dumps(earlier.archive())) == earlier.archive()
+
+
 # A value
 
 

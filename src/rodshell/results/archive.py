@@ -176,6 +176,11 @@ class Archive:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {
+            "_made": {}
+        }  # which is made again, and whose keys are functions that pickle does not find
+
     def __repr__(self) -> str:
         shells = [name for name in SHELLS if name in self.states]
         return (
