@@ -322,6 +322,13 @@ def test_a_sound_mesh_is_returned_facing_up_and_whole():
     assert len(mesh.loops[0]) == 4 * 39
 
 
+def test_a_single_triangle_is_a_sound_mesh():
+    """That most single triangles have nothing inside their edge is said later, by `Freeform`."""
+    mesh, repairs = sound_mesh(np.eye(3), np.array([[0, 2, 1]]), "the mesh")
+    assert repairs == []
+    assert (mesh.doubled[:, 2] > 0).all()
+
+
 def test_normals_at_the_vertices_of_a_sphere_are_exact():
     x, faces = closed_ball(20)
     mesh, _ = sound_mesh(x, faces, "the ball")

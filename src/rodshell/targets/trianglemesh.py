@@ -260,6 +260,8 @@ class _Neighbours:
         from scipy.sparse.csgraph import breadth_first_order
 
         i, j = self.faces.T
+        if not len(i):  # a single face, and SciPy cannot look up no entries
+            return np.zeros(faces, dtype=bool)
         graph = coo_matrix((np.where(self.against, 2.0, 1.0), (i, j)), (faces, faces)).tocsr()
         graph = graph + graph.T
         order, before = breadth_first_order(graph, 0, directed=False)
