@@ -582,6 +582,20 @@ def test_a_table_needs_rods_and_a_known_unit(finder: FakeFinder, capsys: pytest.
     assert "column flat_x0 is missing" in refused(capsys, "popup", "empty.csv", "--unit", "m")
 
 
+def test_a_table_in_another_unit_than_its_own_is_refused(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    in_mm = [[3e4 * x for x in row] for row in CROSS]  # of 6 m
+    table = write_table(Path("rods.csv"), in_mm)
+    said = refused(capsys, "popup", table, "--unit", "m")
+    assert "rods.csv is 6e+03 m wide in this unit (6000 x 6000 units): give another unit, for 0.001 to 1000 m" in said
+    in_m = write_table(Path("small.csv"), [[1e-4 * x for x in row] for row in CROSS])
+    assert "small.csv is 2e-08 m wide" in refused(capsys, "popup", in_m, "--unit", "mm")
+    named = write_table(Path("named.csv"), [[1e7 * x for x in row] for row in CROSS], tuple(f"{c}_mm" for c in COLUMNS))
+    assert "check its columns, which are in mm, for 0.001 to 1000 m" in refused(capsys, "popup", named)
+    assert finder.calls == []
+
+
 @pytest.fixture
 def dome() -> Path:
     """A result of two rods of three nodes that share the middle one."""
@@ -605,7 +619,7 @@ def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinde
     from rodshell.results.from_form import rod_type
 
     result = json.loads((dome / "result.json").read_text())
-    (dome / "case.toml").write_text("# the target was a Python function\n")
+    (dome / "case.toml").write_text('not_described = "the Python function bowl as a target"\n')
     for rod in (
         rs.Rod(rs.Tube(radius=0.02, thickness=0.003), rs.Material.preset("gfrp")),
         rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=2.0, GJ=0.5, mass=0.3)),

@@ -13,6 +13,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, Profile, straight_rods
 from rodshell.results.records import Stiffness
+from rodshell.targets.mesh_files import require_size
 from rodshell.units import length_text, parse_quantity, read_unit, shown
 from rodshell.validation import instance
 
@@ -97,7 +98,7 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     Raises
     ------
     InputError : no such file, no rods, a missing column, a cell without a finite number, an id used twice;
-        no unit, or another than the columns'.
+        no unit, or another than the columns'; rods that span less than 1 mm or more than 1 km.
     """
     try:
         scale = None if unit is None else float(read_unit(unit, "length"))
@@ -125,7 +126,11 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
         names.append(row.get("id", "").strip())
     if not numbers:
         raise InputError(f"{path} has no rods: give one row for each rod under the header")
-    values = np.array(numbers) * scale
+    values = np.array(numbers)
+    instead = "give another unit" if columns == COLUMNS else "check its columns, which are in mm"
+    for ends in (values[:, :4].reshape(-1, 2), values[:, 4:].reshape(-1, 3)):
+        require_size(path, np.ptp(ends, axis=0), scale, instead=instead)
+    values *= scale
     grid = straight_rods(values[:, :4].reshape(-1, 2, 2), names=_labels(path, names))
     return RodEnds(grid, values[:, 4:].reshape(-1, 2, 3))
 

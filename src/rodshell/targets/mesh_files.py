@@ -104,21 +104,42 @@ def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> 
     """
     used = vertices[np.unique(faces)] if len(faces) else vertices
     extent = np.ptp(used, axis=0) if len(used) and np.isfinite(used).all() else np.full(3, np.nan)
-    size = " x ".join(f"{float(f'{side:.4g}'):.10g}" for side in extent)
     if unit is None:
         if path.suffix.lower() not in IN_METRES and np.isfinite(extent).all():  # else it is refused for that
             raise InputError(
-                f"{path} does not state its unit (it is {size} units wide): give it, such as --unit mm (in Python "
+                f"{path} does not state its unit (it is {_units(extent)} wide): give it, such as --unit mm (in Python "
                 "unit=0.001)"
             )
         unit = 1.0
+    require_size(path, extent, unit)
+    return vertices * unit
+
+
+def require_size(path: Path, extent: Floats, unit: float, *, instead: str = "give another unit") -> None:
+    """Refuse a size that no gridshell has; one that is not finite is left to other checks.
+
+    Parameters
+    ----------
+    path : of the file, for the message.
+    extent : (k,) widths along x, y and perhaps z in the file's unit.
+    unit : length of the file's unit [m].
+    instead : what can be done.
+
+    Raises
+    ------
+    InputError : smaller than 1 mm or larger than 1 km.
+    """
     largest = float(extent.max()) * unit
     if np.isfinite(largest) and largest > 0 and not SMALLEST <= largest <= LARGEST:
         raise InputError(
-            f"{path} is {largest:.3g} m wide in this unit ({size} units): give another unit, for {SMALLEST:g} to "
+            f"{path} is {largest:.3g} m wide in this unit ({_units(extent)}): {instead}, for {SMALLEST:g} to "
             f"{LARGEST:g} m"
         )
-    return vertices * unit
+
+
+def _units(extent: Floats) -> str:
+    """Widths in the file's unit."""
+    return " x ".join(f"{float(f'{side:.4g}'):.10g}" for side in extent) + " units"
 
 
 def _in_utf8(path: Path, data: bytes) -> bytes:
