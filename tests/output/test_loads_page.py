@@ -1,5 +1,6 @@
 """The report's part on loads says what the result has."""
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -8,6 +9,7 @@ import rodshell as rs
 from rodshell.output.loads_page import _stability, loads_page
 from rodshell.results import Archive
 from rodshell.results.loaded import LoadedShell
+from rodshell.results.summary import summary_text
 
 CASE = {
     "target": {"kind": "cap", "radius": "10 m", "base": "7 m"},
@@ -83,3 +85,15 @@ def test_a_factor_that_imperfections_raise_is_explained(
 ) -> None:
     shell = LoadedShell(limit_factor=limit, limit_kind=kind, imperfect_factor=imperfect, imperfect_kind=imperfect_kind)  # type: ignore[call-arg]
     assert _stability("winter", "pinned", shell)[-1] == said
+
+
+def test_deflections_do_not_stand_above_the_limit_at_which_they_are_known() -> None:
+    factor = 0.512747
+    loaded = archive().results.loads["winter"]["pinned"]
+    shell = loaded.model_copy(update={"limit_factor": factor, "at_factor": factor})
+    results = archive().results.model_copy(update={"loads": {"winter": {"pinned": shell}}})
+    assert "stable up to 0.512 times the loads" in summary_text(results)
+    assert "; deflection at 0.512 times " in summary_text(results)
+    page = loads_page(replace(archive(), results=results))
+    assert page is not None
+    assert page["deflection"][0][2] == "0.512"

@@ -12,7 +12,7 @@ from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
 from rodshell.results.loaded import LoadedShell
 from rodshell.results.records import Ends
-from rodshell.results.wording import millimetres, percent, rounded, rounding_of, shown_factor, stress
+from rodshell.results.wording import millimetres, percent, rounded, rounded_down, rounding_of, shown_factor, stress
 from rodshell.units import percent_text
 
 CLOSE = 1.005  # both factors are found within 0.2 %: a larger ratio of theirs says something
@@ -115,7 +115,7 @@ def _deflection(results: Results, name: str, ends: Ends, shell: LoadedShell) -> 
     return [
         name,
         ends,
-        rounded(shell.at_factor or 0.0),
+        rounded_down(shell.at_factor or 0.0),
         millimetres(deflection, rounding=rounding_of(results)),
         "" if not deflection or span is None else f"span/{span / deflection:.0f}",
         "not known" if shell.max_stress is None else stress(shell.max_stress),

@@ -13,6 +13,7 @@ from rodshell.results.wording import (
     case_rows,
     percent,
     rounded,
+    rounded_down,
     share_of_weight,
     shown_factor,
     shown_length,
@@ -225,7 +226,7 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
                 line += f", linear {shown_factor(found.linear_factor)}"
             if found.imperfect_factor is not None:
                 line += f", with imperfections {shown_factor(found.imperfect_factor)}"
-            at = "" if found.at_factor == 1 else f" at {rounded(found.at_factor or 0.0)} times"
+            at = "" if found.at_factor == 1 else f" at {rounded_down(found.at_factor or 0.0)} times"
             line += f"; deflection{at} {length(found.max_deflection)}"
             if found.utilisation is not None:
                 by = f" ({found.governs.by}, {found.governs.rod})" if found.governs and found.governs.by else ""
