@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.case.link import studio_link
 from rodshell.cli import main
 
 TARGET = rs.Hemisphere(radius=0.2)
@@ -13,6 +14,10 @@ CROSS = rs.straight_rods([[(-1.0, 0.0), (1.0, 0.0)], [(0.0, -1.0), (0.0, 1.0)]])
 FOOTPRINT = rs.Footprint(rs.mesh_grid(CROSS, 0.5))
 BOUNDARY = rs.Boundary(np.zeros((4, 3)), np.zeros((4, 3)))
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+
+
+def form():
+    return rs.find_form(TARGET, LAYOUT, ROD, ends="pinned")
 
 
 @pytest.mark.parametrize(
@@ -85,6 +90,31 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
         (lambda: rs.OutputOptions(stages="3"), 'stages must be a whole number, 0 to 1000, not "3"'),
         (lambda: rs.OutputOptions(stages=True), "stages must be a whole number, 0 to 1000, not true"),
         (lambda: rs.OutputOptions(strength="3"), 'the strength must be a number in Pa, not "3"'),
+        (lambda: rs.DrawingStyle(project=3), "the project of drawings must be text, not 3"),
+        (lambda: rs.DrawingStyle(date=None), "the date of drawings must be text, not None"),
+        (lambda: rs.DrawingStyle(paper=["A3"]), "the paper of drawings must be text, not a list"),
+        (lambda: rs.DrawingStyle(tolerance="1"), 'the tolerance of drawings must be a number in m, not "1"'),
+        (lambda: rs.DrawingStyle(layers=["CUT"]), "the layers of drawings must be a mapping .*, not a list"),
+        (lambda: rs.DrawingStyle(layers={"CUT": 3}), "the name of layer CUT must be text, not 3"),
+        (
+            lambda: rs.GridLayout.orthogonal(spacing=np.array([0.03, 0.04, 0.05])),
+            "layout spacing must be two lengths in m, not array",
+        ),
+        (
+            lambda: rs.GridLayout.orthogonal(spacing=np.array(0.03)),
+            "layout spacing must be two lengths in m, not array",
+        ),
+        (lambda: rs.GridLayout.orthogonal(spacing="3"), 'layout spacing must be one or two lengths in m, not "3"'),
+        (lambda: studio_link(rs.Job(TARGET, LAYOUT, ROD)), "case must be the case of a job: job.case, not a Job"),
+        (lambda: rs.agreement(None, TARGET), "popped must be what rodshell.pop_up returned, not None"),
+        (lambda: rs.agreement(form().popped["pinned"], None), "target must be a rodshell Target, not None"),
+        (lambda: rs.trim(LAYOUT), "draped must be what rodshell.drape returned, not a GridLayout"),
+        (
+            lambda: rs.map_back(rs.drape(LAYOUT, ROD, TARGET)),
+            "trimmed must be what rodshell.trim returned, not a Draped",
+        ),
+        (lambda: rs.read(None), "folder must be the path of a folder, not None"),
+        (lambda: rs.Results.of(None), "content must be a mapping, as result.json holds one, not None"),
         (lambda: rs.Rod(ROD.material, ROD.section), "section must be a circle, .* section, not a Material"),
         (lambda: rs.Rod(ROD.section, 1e9), "material must be a rodshell Material, not 1000000000.0"),
         (lambda: rs.Hemisphere(radius="20"), 'target radius must be a number in m, not "20"'),
@@ -98,6 +128,18 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
 def test_a_wrong_argument_is_refused_in_one_sentence(call, sentence):
     with pytest.raises(rs.InputError, match=sentence):
         call()
+
+
+def test_numpy_s_numbers_are_numbers():
+    options = rs.OutputOptions(
+        strength=np.float32(1e6), stages=np.int64(4), drawings=rs.DrawingStyle(tolerance=np.float32(1))
+    )
+    assert options == rs.OutputOptions(strength=1e6, stages=4, drawings=rs.DrawingStyle(tolerance=1.0))
+    assert rs.Job(TARGET, LAYOUT, ROD, options=options).case.checks.stages == 4
+    given = {"spacing": np.array([0.03, 0.04]), "rods": np.array([5, 7]), "offset": np.array([0.0, 0.01])}
+    same = rs.GridLayout.orthogonal(spacing=(0.03, 0.04), rods=(5, 7), offset=(0.0, 0.01))
+    assert rs.GridLayout.orthogonal(**given) == same
+    assert hash(rs.GridLayout.orthogonal(**given)) == hash(same)
 
 
 def test_one_end_condition_needs_no_tuple():

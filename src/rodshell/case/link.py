@@ -11,6 +11,7 @@ from rodshell.case.case import Case
 from rodshell.case.load import BY_SUFFIX, FILE_KEYS
 from rodshell.errors import InputError
 from rodshell.units import shown
+from rodshell.validation import instance
 
 ADDRESS = "http://127.0.0.1:8731/"  # of `rodshell studio` without options
 UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
@@ -30,8 +31,10 @@ def studio_link(case: Case, *, address: str = ADDRESS) -> str:
 
     Raises
     ------
-    InputError : the case holds an object that no case file can describe, or is about a table of rods.
+    InputError : not a case; or one that holds an object that no case file can describe, or that is about a
+        table of rods.
     """
+    instance("case", case, Case, "the case of a job: job.case")
     text = json.dumps(page_case(case)[0], separators=(",", ":"))
     packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     packed = packer.compress(text.encode()) + packer.flush()

@@ -34,7 +34,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.units import length_text
-from rodshell.validation import choices_of
+from rodshell.validation import choices_of, instance
 
 STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
 ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other axis
@@ -80,6 +80,8 @@ class Agreement:
 
 def agreement(popped: PopUp, target: Target) -> Agreement:
     """Distance of the popped-up rods to the target, continued smoothly past its end."""
+    instance("popped", popped, PopUp, "what rodshell.pop_up returned")
+    instance("target", target, Target)
     nodes, mesh = popped.positions, popped.footprint.mesh
     points = np.concatenate([nodes, edge_middles(mesh, nodes)])
     gaps = target.distance(points) - np.concatenate([mesh.heights, mesh.heights[mesh.edges[:, 0]]])

@@ -11,6 +11,7 @@ from rodshell.formfinding.methods import Bound, Draped
 from rodshell.geometry.frames import unit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
+from rodshell.validation import instance
 
 NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
 FEWEST_JOINTS = 3  # a rod with fewer swings about the line through its joints
@@ -95,8 +96,9 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
 
     Raises
     ------
-    InputError : no rod is left, or a hanging rod is too short to reach the target's end.
+    InputError : `draped` is of another kind; no rod is left, or a hanging rod is too short to reach the target's end.
     """
+    instance("draped", draped, Draped, "what rodshell.drape returned")
     margin = NEAREST_JOINT * min(draped.layout.spacing)
     rods, positions, dropped = draped.rods, draped.positions, list(draped.dropped)
     if isinstance(draped.method, Bound):
@@ -147,6 +149,7 @@ def untrimmed(draped: Draped) -> Trimmed:
 
 def map_back(trimmed: Trimmed) -> Footprint:
     """The same cuts on the flat grid: the footprint G0 [HQK 3.2]."""
+    instance("trimmed", trimmed, Trimmed, "what rodshell.trim returned")
     return Footprint(trimmed.mesh)
 
 

@@ -101,7 +101,7 @@ class GridLayout:
     def orthogonal(
         *,
         rods: tuple[int, int] | Auto = "auto",
-        spacing: float | tuple[float, float],
+        spacing: float | tuple[float, float] | Floats,
         length: float | Auto = "auto",
         edge: float | Auto = "auto",
         rotate: float = 0.0,
@@ -126,8 +126,8 @@ class GridLayout:
         ------
         InputError : as `GridLayout` does.
         """
-        instance("layout spacing", spacing, tuple | list | Real, "one or two lengths in m")
-        pair = spacing if isinstance(spacing, tuple | list) else (spacing, spacing)
+        instance("layout spacing", spacing, tuple | list | Real | np.ndarray, "one or two lengths in m")
+        pair = spacing if isinstance(spacing, tuple | list | np.ndarray) else (spacing, spacing)
         _require_two("spacing", pair)
         pair = (positive("layout spacing", pair[0], "m"), positive("layout spacing", pair[1], "m"))
         longest = auto_edge(pair) if isinstance(edge, str) and edge == "auto" else edge
@@ -211,7 +211,8 @@ def _is_auto(value: object) -> bool:
 
 def _require_two(name: str, pair: object) -> None:
     """Refuse what is not a pair of numbers [m]."""
-    if not isinstance(pair, tuple | list) or len(pair) != 2 or not all(isinstance(value, NUMBER) for value in pair):
+    given = pair.tolist() if isinstance(pair, np.ndarray) else pair
+    if not isinstance(given, tuple | list) or len(given) != 2 or not all(isinstance(value, NUMBER) for value in given):
         raise InputError(f"layout {name} must be two lengths in m, not {short(pair)}")
 
 

@@ -45,14 +45,17 @@ class DrawingStyle:
     date: str = ""
 
     def __post_init__(self) -> None:
+        for key in ("paper", "project", "revision", "name", "author", "date"):
+            instance(f"the {key} of drawings", getattr(self, key), str, "text")
         if self.paper not in PAPERS:
             raise InputError(f'unknown paper size "{self.paper}": use {", ".join(PAPERS)}')
-        if self.tolerance is not None and not self.tolerance > 0:
-            raise InputError(f"the tolerance of drawings must be positive, not {self.tolerance} m")
+        if self.tolerance is not None:
+            object.__setattr__(self, "tolerance", positive("the tolerance of drawings", self.tolerance, "m"))
         try:
             datetime.date.fromisoformat(self.date or "2000-01-01")
         except ValueError:
             raise InputError(f'the date of drawings cannot be "{self.date}": write a day as "2026-11-22"') from None
+        instance("the layers of drawings", self.layers, Mapping, "a mapping from layers to their new names")
         if self.layers:
             _require_names(self.layers)
 
@@ -68,6 +71,7 @@ def _require_names(layers: Mapping[str, str]) -> None:
     for layer, name in layers.items():
         if layer not in LAYERS:
             raise InputError(f'there is no layer "{layer}" to rename: there are {", ".join(LAYERS)}')
+        instance(f"the name of layer {layer}", name, str, "text")
         if not name.strip() or any(letter in FORBIDDEN or not letter.isprintable() for letter in name):
             raise InputError(f'a layer cannot be called "{name}": a name has none of {FORBIDDEN}')
     shown = [layers.get(layer, layer).upper() for layer in LAYERS]
@@ -99,9 +103,9 @@ class OutputOptions:
     strength_of: str | None = None
 
     def __post_init__(self) -> None:
-        for name, value in (("strength", self.strength), ("shear strength", self.shear_strength)):
-            if value is not None:
-                positive(f"the {name}", value, "Pa")
+        for name in ("strength", "shear_strength"):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, positive(f"the {name.replace('_', ' ')}", value, "Pa"))
         if self.shear_strength is not None and self.strength is None:
             raise InputError(
                 f"a shear strength of {self.shear_strength:g} Pa does not say what bending may be: "
@@ -109,6 +113,7 @@ class OutputOptions:
             )
         if isinstance(self.stages, bool) or not isinstance(self.stages, Integral):
             raise InputError(f"stages must be a whole number, 0 to {MOST_STAGES}, not {described(self.stages)}")
+        object.__setattr__(self, "stages", int(self.stages))
         instance("fabrication", self.fabrication, Fabrication)
         instance("drawings", self.drawings, DrawingStyle)
         if not 0 <= self.stages <= MOST_STAGES:

@@ -25,6 +25,7 @@ from rodshell.results.folder import ResultFolder, reading
 from rodshell.results.results import Results, Verdict, read_results
 from rodshell.results.summary import summary_text
 from rodshell.results.verdict import verdict_of
+from rodshell.validation import instance
 
 LARGEST = 20_000_000  # bytes of a file that is copied
 FOLDER = "inputs"
@@ -268,8 +269,10 @@ def read(folder: str | os.PathLike[str]) -> Archive:
 
     Raises
     ------
-    OutputError : there is no result, or it cannot be read; the sentence names the file and the key.
+    InputError : `folder` is not a path. OutputError : there is no result, or it cannot be read; the sentence names the
+        file and the key.
     """
+    instance("folder", folder, str | os.PathLike, "the path of a folder")
     where = Path(folder).expanduser()
     if where.is_file():
         raise OutputError(f"{where} is a file: give the folder of a rodshell result")

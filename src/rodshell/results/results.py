@@ -45,6 +45,7 @@ from rodshell.results.records import (
     required,
     rows,
 )
+from rodshell.validation import instance
 
 FORMAT = "rodshell-result"
 VERSION = 2
@@ -311,8 +312,9 @@ class Results(Record):
 
         Raises
         ------
-        OutputError : the content is not valid; the sentence names the key.
+        InputError : not a mapping. OutputError : the content is not valid; the sentence names the key.
         """
+        instance("content", content, Mapping, "a mapping, as result.json holds one")
         return cls.from_text(json.dumps(plain(upgraded(content, source=source))), source=source)
 
     @classmethod
