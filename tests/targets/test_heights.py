@@ -14,6 +14,7 @@ from rodshell.targets.from_file import read_heights, read_image, read_table, smo
 SIZE = (12.0, 8.0)
 X, Y = np.meshgrid(np.linspace(-6, 6, 13), np.linspace(4, -4, 9))
 Z = np.round(3 - 0.05 * X**2 - 0.04 * Y**2 + 0.02 * X * Y + 0.1 * Y, 4)
+HOLED = np.where(Y * X < -20, np.nan, Z)
 
 
 def rows(table, separator=",", point=".", number="{:.4f}"):
@@ -62,7 +63,9 @@ def test_points_lie_where_they_say_in_unequal_steps_scaled_and_centred(tmp_path)
     [
         (points(np.arange(X.size - 1)), "seems to have points x, y, z: 116 with 13 different x and 9 different y"),
         (points([*range(X.size - 1), 0]), "not a complete lattice: sample one height"),
-        (rows([(0, 0, 1), (1, 0, 1), (np.nan, 1, 1), (1, 1, 1)]), "some lack x or y"),
+        ("0,0,1\n1,0,1\n,1,1\n1,1,1\n", "some lack x or y"),
+        (rows([(0, 0, 1), (1, 0, 1), (0, 1, np.nan), (1, 1, 1)]), 'row 3, column 3 is "nan", not a number'),
+        (rows(HOLED, ";"), r'row \d+, column \d+ is "nan", not a number'),
         (rows(np.vstack([X[0], Z])), r"its first row seems to hold coordinates \(-5 to 6 in equal steps\) and not"),
         (rows(np.column_stack([Y[:, 0], Z])), r"its first column seems to hold coordinates \(3 to -4 in"),
         ("\n".join([rows([np.r_[-6.0, X[0]]]).replace("-6.0000", "", 1), rows(np.column_stack([Y[:, 0], Z]))]),
@@ -84,6 +87,12 @@ def test_points_in_another_proportion_than_the_size_are_refused(tmp_path):
     (tmp_path / "roof.csv").write_text(WRITTEN["points"])
     with pytest.raises(rs.InputError, match=r"its points span 12 x 8, which is not in the proportion of .* 8 x 12 m"):
         read_table(tmp_path / "roof.csv", SIZE[::-1])
+
+
+def test_an_empty_cell_and_between_blanks_nan_is_a_hole(tmp_path):
+    for text in (rows(HOLED).replace("nan", ""), rows(HOLED, ";", ",").replace("nan", ""), rows(HOLED, "  ")):
+        (tmp_path / "roof.csv").write_text(text)
+        np.testing.assert_array_equal(read_table(tmp_path / "roof.csv", SIZE)[0], HOLED)
 
 
 EVEN = {

@@ -83,7 +83,7 @@ def read_table(path: Path, size: tuple[float, float]) -> tuple[Floats, Floats, F
     """Read a table of heights, or of points x, y, z that are a complete lattice.
 
     Cells are separated by semicolons, tabs, commas or blanks; unless by commas, a comma is a decimal point. Empty cells
-    and "nan" are holes.
+    are holes; between blanks, which leave no cell empty, "nan" is one.
 
     Parameters
     ----------
@@ -124,6 +124,8 @@ def _cells(path: Path) -> list[list[str]]:
     columns = len(lines[0].split(separator)) if lines else 0
     require_few_heights(path, len(lines), 1 if columns == POINT else columns)
     rows = [[cell.strip() for cell in line.split(separator)] for line in lines]
+    if separator is None:  # blanks leave no cell empty
+        return [["" if cell.lower() == "nan" else cell.replace(",", ".") for cell in row] for row in rows]
     return rows if separator == "," else [[cell.replace(",", ".") for cell in row] for row in rows]
 
 
@@ -138,9 +140,16 @@ def _numbers(path: Path, rows: list[list[str]]) -> Floats:
             raise InputError(f"{path}: its first row is a header ({', '.join(rows[0])[:40]}): delete it")
         rows = rows[1:]
     try:
-        return np.array([[float(cell) if cell else np.nan for cell in row] for row in rows]).reshape(-1, widths.pop())
+        table = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows]).reshape(-1, widths.pop())
     except ValueError as reason:
         raise InputError(f"{path} is not a table of numbers ({str(reason)[:60]}): give rows of heights") from None
+    for row, column in np.argwhere(np.isnan(table)).tolist():
+        if cell := rows[row][column]:
+            raise InputError(
+                f"{path}: row {row + 1}, column {column + 1} is {shown(cell)}, not a number: leave the cell empty "
+                "where there is no surface"
+            )
+    return table
 
 
 def _is_number(cell: str) -> bool:
