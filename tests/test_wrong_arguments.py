@@ -136,6 +136,8 @@ def test_numpy_s_numbers_are_numbers():
     )
     assert options == rs.OutputOptions(strength=1e6, stages=4, drawings=rs.DrawingStyle(tolerance=1.0))
     assert rs.Job(TARGET, LAYOUT, ROD, options=options).case.checks.stages == 4
+    changes = {"layout.rods": tuple(np.array([5, 7])), "checks.stages": np.int64(4)}
+    assert rs.Job.load("hemisphere", changes) == rs.Job.load("hemisphere", {"layout.rods": (5, 7), "checks.stages": 4})
     given = {"spacing": np.array([0.03, 0.04]), "rods": np.array([5, 7]), "offset": np.array([0.0, 0.01])}
     same = rs.GridLayout.orthogonal(spacing=(0.03, 0.04), rods=(5, 7), offset=(0.0, 0.01))
     assert rs.GridLayout.orthogonal(**given) == same

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import date
 from difflib import get_close_matches
+from numbers import Integral
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr
@@ -154,8 +155,12 @@ def counts(value: object) -> tuple[int, int] | str:
     items = value
     if isinstance(value, str):
         items = [int(n) if n.strip().isdecimal() else n for n in re.split("[x×,]", value)]
-    if isinstance(items, list | tuple) and len(items) == 2 and all(type(n) is int and n >= 2 for n in items):
-        return items[0], items[1]
+    if (
+        isinstance(items, list | tuple)
+        and len(items) == 2
+        and all(isinstance(n, Integral) and int(n) >= 2 for n in items)
+    ):
+        return int(items[0]), int(items[1])
     raise ValueError('give two counts of at least 2, such as [17, 17] or "17x17", or "auto"')
 
 
@@ -192,9 +197,9 @@ def not_negative(kind: Kind) -> Reader:
 def whole(value: object) -> int:
     """A whole number, not negative."""
     number = int(value) if isinstance(value, str) and value.strip().isdecimal() else value
-    if type(number) is not int or number < 0:
+    if isinstance(number, bool) or not isinstance(number, Integral) or number < 0:
         raise ValueError("give a whole number of at least 0, such as 8")
-    return number
+    return int(number)
 
 
 def is_auto(value: object) -> bool:
