@@ -44,7 +44,7 @@ LENGTHS = {
     "height": lambda x: rs.heights_from("dome.csv", size=(1.0, 1.0), height=0.0 if x is None else x),
     "radius": lambda x: sphere_net_end(x, 0.1),
 }
-NO_LENGTH = ["20", None, True, float("nan"), float("inf"), -1.0, 0, [1.0], np.ones(2), 10**400]
+NO_LENGTH = ["20", None, True, float("nan"), float("inf"), -1.0, 0, [1.0], np.ones(3), 10**400]
 
 
 def refusal(call) -> str:
