@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import rodshell as rs
 from rodshell.fabrication import Fabrication, fabricate, nest, splices
-from rodshell.layout import FlatGrid, mesh_grid, straight_rods
+from rodshell.layout import FlatGrid, Profile, mesh_grid, straight_rods
 from rodshell.layout.flatgrid import layers
 from rodshell.layout.gridlayout import GridLayout
 
@@ -141,7 +141,7 @@ def test_short_pieces_are_avoided_where_that_takes_no_more_bars(rods: int, piece
         ]
     made = fabricate(mesh, ROD, Fabrication(stock_length=5.0), curvature=bend)
     for k in range(rods):
-        assert sorted(length for rod, _, length in made.pieces if rod == k) == pytest.approx(pieces)
+        assert sorted(length for rod, _, _, length in made.pieces if rod == k) == pytest.approx(pieces)
     assert made.nesting is not None
     assert len(made.nesting.bars) == (3 if rods == 1 else 7)
 
@@ -160,7 +160,7 @@ def test_lengths_of_the_workshop_add_up() -> None:
     np.testing.assert_allclose(made.cut_length, 0.64)
     np.testing.assert_allclose(made.mass, 0.64 * ROD.mass_per_length)
     for k, at in enumerate(made.splices):
-        pieces = [length for rod, _, length in made.pieces if rod == k]
+        pieces = [length for rod, _, _, length in made.pieces if rod == k]
         assert len(pieces) == len(at) + 1 == 2
         assert sum(pieces) == pytest.approx(0.64)
         assert pieces[0] == pytest.approx(0.02 + at[0])  # splices are measured from the rod's start, not its cut end
@@ -168,6 +168,37 @@ def test_lengths_of_the_workshop_add_up() -> None:
         assert np.abs(mine - at[0]).min() == pytest.approx(0.05)
     assert made.nesting is not None
     assert made.warnings == ()
+
+
+def test_second_laths_are_cut_from_stock_too_and_spliced_elsewhere_than_the_first() -> None:
+    mesh = mesh_grid(lattice(), 0.05).with_profiles(Profile.double(0.75))
+    made = fabricate(mesh, ROD, Fabrication(end_allowance=0.02, stock_length=0.4, kerf=0.003))
+    assert made.warnings == ()
+    assert made.mass.sum() == pytest.approx(ROD.mass_per_length * sum(length for *_, length in made.pieces))
+    for k, rod in enumerate(mesh.grid.rods):
+        first, second = (lath for lath in made.laths if lath.rod == k)
+        assert (second.start, second.stop) == pytest.approx((0.075, 0.525))
+        assert sum(length for r, lath, _, length in made.pieces if (r, lath) == (k, 2)) == pytest.approx(0.45)
+        joints = mesh.grid.crossings.at[mesh.grid.crossings.rods == k] - rod.start
+        (place,) = second.splices
+        assert np.abs(joints - place).min() == pytest.approx(0.05)  # halfway between two joints
+        assert abs(place - first.splices[0]) > 0.09
+    assert made.nesting is not None
+    assert sorted(k for bar in made.nesting.bars for k in bar.pieces) == list(range(len(made.pieces)))
+
+
+def test_laths_that_reach_the_rods_ends_have_their_allowances() -> None:
+    profile = Profile((0.0, 0.25, 0.25, 0.5, 0.5, 1.0), (2, 2, 1, 1, 3, 3), "laths")
+    assert profile.laths(8.0, 0.1) == ((-0.1, 2.0), (4.0, 8.1), (4.0, 8.1))
+
+
+def test_a_second_lath_that_cannot_be_spliced_is_named() -> None:
+    mesh = mesh_grid(
+        straight_rods([[[0.0, 0.0], [1.0, 0.0]], [[0.4, -0.1], [0.4, 0.1]], [[0.6, -0.1], [0.6, 0.1]]]), 0.05
+    )
+    made = fabricate(mesh.with_profiles((Profile.double(0.7), None, None)), ROD, Fabrication(stock_length=0.55))
+    assert made.nesting is None
+    assert "(lath 2) cannot be spliced between joints from stock of 550 mm" in made.warnings[0]
 
 
 def test_stock_that_is_too_short_is_said() -> None:

@@ -18,8 +18,8 @@ TAPER = rs.Profile.symmetric((0.15, 0.7, 1.0))
 DOUBLE = rs.Profile.double(0.65)
 
 
-def varied_form(profile):
-    form = rs.Job.load("hemisphere", layout__spacing="60 mm", checks__stages=0).run(until="pop-up")
+def varied_form(profile, **keys):
+    form = rs.Job.load("hemisphere", layout__spacing="60 mm", checks__stages=0, **keys).run(until="pop-up")
     stages = form.patches[0]
     footprint = Footprint(stages.footprint.mesh.with_profiles(profile))
     return replace(form, stages=popped_again(stages, footprint, stages.boundary, "pinned"))
@@ -72,6 +72,34 @@ def test_drawings_and_models_of_rods_that_vary_can_be_made(form, tmp_path):
     folder = form.save(tmp_path, kinds="svg, gltf, report, pdf")
     strips = (folder / "drawings" / "strips.svg").read_text()
     assert ("2 L" if form.footprint.rods[0].profile is DOUBLE else "1.24") in strips  # 2 mm times 0.15^(1/4)
+
+
+def test_second_laths_are_in_the_stock_plan_and_in_every_total(tmp_path):
+    form = varied_form(DOUBLE, fabrication__stock_length="300 mm", fabrication__end_allowance="10 mm")
+    folder = form.save(tmp_path, kinds="csv, report, svg")
+    rods, sections, bars = (
+        list(csv.DictReader((folder / "schedule" / f"{name}.csv").open())) for name in ("rods", "sections", "stock")
+    )
+    pieces = [piece.split() for bar in bars for piece in bar["pieces_mm"].split("; ")]
+    first, second = (
+        {rod["id"]: sum(float(cut) for name, cut in pieces if name.split(".")[0] == rod["id"] + lath) for rod in rods}
+        for lath in ("", "-2")
+    )
+    doubled = {row["rod"]: float(row["to_mm"]) - float(row["from_mm"]) for row in sections if row["laths"] == "2"}
+    assert second == pytest.approx(doubled, abs=0.05)
+    assert second == pytest.approx({rod["id"]: float(rod["second_laths_mm"]) for rod in rods}, abs=0.05)
+    assert first == pytest.approx({rod["id"]: float(rod["cut_length_mm"]) for rod in rods}, abs=0.05)
+    for rod in rods:
+        cut = 1e-3 * (first[rod["id"]] + second[rod["id"]])
+        assert float(rod["mass_kg"]) == pytest.approx(form.rod.mass_per_length * cut, rel=1e-3)
+        splices = [set(rod[f"{of}splices_from_cut_end_mm"].split("; ")) for of in ("", "second_laths_")]
+        assert not set.intersection(*splices) - {""}
+    said = f"{1e-3 * sum(second.values()):.1f} m of second laths"
+    assert f"{1e-3 * sum(first.values()):.1f} m, and {said}" in form.summary()
+    for name in ("report.html", "drawings/plan.svg"):
+        assert said in (folder / name).read_text()
+    assert "  S2<" in (folder / "drawings/strips.svg").read_text()
+    assert rs.read(folder).results.rods[0].stiffness.splices == form.results().rods[0].stiffness.splices
 
 
 def test_uniform_rods_have_no_stiffness_in_the_result(tmp_path):

@@ -14,8 +14,9 @@ Route = tuple[int, int, float, int]  # to a stop: pieces so far, short ones of t
 
 
 def splices(
-    length: float, joints: ArrayLike, stock: float, *, stations: ArrayLike, curvature: ArrayLike, short: float = 0.0
-) -> list[float] | None:
+    length: float, joints: ArrayLike, stock: float, *, stations: ArrayLike, curvature: ArrayLike, short: float = 0.0,
+    taken: ArrayLike = (),
+) -> list[float] | None:  # fmt: skip
     """Distances of the splices from the rod's start [m]; None where stock of this length cannot do.
 
     A splice lies halfway between two neighbouring joints. The choice has the fewest pieces; among such choices the
@@ -28,11 +29,14 @@ def splices(
     stock : longest piece [m].
     short : pieces under this length are avoided [m].
     stations, curvature : the rod's bend [1/m] at some ascending distances from the start [m].
+    taken : splices of other laths of the rod; none is made between the same joints [m from the start].
     """
     if length <= stock:
         return []
     at = np.unique(np.asarray(joints, dtype=float))
     middles = 0.5 * (at[:-1] + at[1:])
+    apart = np.abs(middles[:, None] - np.asarray(taken, dtype=float))
+    middles = middles[(apart > TINY * stock).all(axis=1)]
     bend = np.interp(middles, np.asarray(stations, dtype=float), np.asarray(curvature, dtype=float))
     stops = np.concatenate([[0.0], middles, [length]])
     return _fewest(stops, np.concatenate([[0.0], bend, [0.0]]), stock, short)

@@ -60,14 +60,39 @@ class Fabrication:
 
 
 @dataclass(frozen=True)
+class Lath:
+    """A lath as it is cut: a rod, or what lies on it over a part of its length.
+
+    Parameters
+    ----------
+    rod : index of the rod.
+    number : 1 is the rod itself, whole.
+    start, stop : its cut ends, allowances included, from the rod's start [m].
+    splices : distances from the rod's start [m].
+    """
+
+    rod: int
+    number: int
+    start: float
+    stop: float
+    splices: tuple[float, ...] = ()
+
+    @property
+    def pieces(self) -> list[float]:
+        """Lengths of its pieces [m]."""
+        lengths: list[float] = np.diff([self.start, *self.splices, self.stop]).tolist()
+        return lengths
+
+
+@dataclass(frozen=True)
 class Fabricated:
     """Cut list and more, rod by rod in the order of the grid.
 
     Parameters
     ----------
     cut_length : (m,) with both end allowances [m]; mass : (m,) of it [kg]; layer : (m,) 1 the lowest.
-    splices : distances from each rod's start, its allowance not counted [m].
-    pieces : (rod, number along the rod, length [m]) of all that is cut from stock, rods one after the other.
+    laths : of every rod, one rod after the other; more than one of a rod over part of which laths lie on each other.
+    pieces : (rod, lath, number along the lath, length [m]) of all that is cut from stock, in the order of the laths.
     nesting : of the pieces; None where there is no stock length, or a piece does not fit.
     bracing : diagonals between joints, by their index among the grid's crossings, and to rod ends.
     """
@@ -76,11 +101,16 @@ class Fabricated:
     cut_length: Floats
     mass: Floats
     layer: Ints
-    splices: tuple[tuple[float, ...], ...]
-    pieces: tuple[tuple[int, int, float], ...]
+    laths: tuple[Lath, ...]
+    pieces: tuple[tuple[int, int, int, float], ...]
     nesting: Nesting | None
     bracing: tuple[Diagonal, ...]
     warnings: tuple[str, ...]
+
+    @property
+    def splices(self) -> tuple[tuple[float, ...], ...]:
+        """Of each rod itself, distances from its start, its allowance not counted [m]."""
+        return tuple(lath.splices for lath in self.laths if lath.number == 1)
 
 
 def fabricate(
@@ -100,15 +130,15 @@ def fabricate(
     rods, crossings = mesh.grid.rods, mesh.grid.crossings
     lengths = np.array([rod_line.length for rod_line in rods])
     cut = lengths + 2 * options.end_allowance
-    made, warnings = _splices(mesh, options, curvature)
-    pieces = _pieces_of(lengths, made, options)
+    made, warnings = _laths(mesh, options, curvature)
+    pieces = _pieces_of(made)
     nesting = None
     if options.stock_length is not None and not warnings:
         bars = partial(nest, stock=options.stock_length, kerf=options.kerf)
-        nesting = bars([piece for _, _, piece in pieces])
-        longer, _ = _splices(mesh, options, curvature, short=SHORT)
-        others = _pieces_of(lengths, longer, options)
-        tried = bars([piece for _, _, piece in others])
+        nesting = bars([length for *_, length in pieces])
+        longer, _ = _laths(mesh, options, curvature, short=SHORT)
+        others = _pieces_of(longer)
+        tried = bars([length for *_, length in others])
         if len(tried.bars) <= len(nesting.bars):
             made, pieces, nesting = longer, others, tried
     bracing: tuple[Diagonal, ...] = ()
@@ -150,49 +180,47 @@ def _stretch(rod: Rod, profile: Profile, factors: Floats) -> Floats:
     return varied(rod, profile.varies, factors).stretch
 
 
-def _splices(
+def _laths(
     mesh: GridMesh, options: Fabrication, curvature: Floats | None, *, short: float = 0.0
-) -> tuple[tuple[tuple[float, ...], ...], tuple[str, ...]]:
-    """Splices of each rod [m from its start], and a sentence about rods that cannot be spliced.
+) -> tuple[tuple[Lath, ...], tuple[str, ...]]:
+    """All laths with their splices, and a sentence about those that cannot be spliced.
 
     short : pieces of so many joint distances are avoided.
     """
-    rods, stock = mesh.grid.rods, options.stock_length
-    if stock is None:
-        return ((),) * len(rods), ()
+    stock, crossings = options.stock_length, mesh.grid.crossings
     bend = np.zeros(len(mesh.rod_nodes)) if curvature is None else curvature
-    made, hopeless = list[tuple[float, ...]](), list[str]()
-    for k, rod in enumerate(rods):
-        here, crossings = mesh.rod_slice(k), mesh.grid.crossings
-        shift = options.end_allowance - rod.start  # from material coordinates to the cut rod
-        joints = crossings.at[crossings.rods == k] + shift
-        cut = rod.length + 2 * options.end_allowance
+    made, hopeless = list[Lath](), dict[int, str]()
+    for k, rod in enumerate(mesh.grid.rods):
+        here, more = mesh.rod_slice(k), options.end_allowance
+        joints, stations = crossings.at[crossings.rods == k] - rod.start, mesh.stations[here] - rod.start
         apart = median(np.diff(np.sort(joints))) if len(joints) > 1 else 0.0
-        found = splices(
-            cut, joints, stock, stations=mesh.stations[here] + shift, curvature=bend[here], short=short * apart
-        )
-        if found is None:
-            hopeless.append(rod.name)
-        made.append(tuple(at - options.end_allowance for at in found or ()))
+        beyond = () if rod.profile is None else rod.profile.laths(rod.length, more)
+        spliced = list[float]()
+        for number, (start, stop) in enumerate([(-more, rod.length + more), *beyond], start=1):
+            found: list[float] | None = []
+            if stock is not None:
+                inside = joints[(joints > start) & (joints < stop)]
+                found = splices(
+                    stop - start, inside - start, stock, stations=stations - start, curvature=bend[here],
+                    short=short * apart, taken=np.array(spliced) - start,
+                )  # fmt: skip
+            if found is None:
+                hopeless.setdefault(k, rod.name if number == 1 else f"{rod.name} (lath {number})")
+            mine = tuple(at + start for at in found or ())
+            spliced += mine
+            made.append(Lath(k, number, start, stop, mine))
     if not hopeless:
         return tuple(made), ()
-    named = f"rod {hopeless[0]}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {hopeless[0]})"
+    first = next(iter(hopeless.values()))
+    named = f"rod {first}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {first})"
+    assert stock is not None
     return tuple(made), (
         f"{named} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock",
     )
 
 
-def _pieces_of(
-    lengths: Floats, made: tuple[tuple[float, ...], ...], options: Fabrication
-) -> tuple[tuple[int, int, float], ...]:
-    """(rod, number along the rod, length [m]) of every piece."""
+def _pieces_of(laths: tuple[Lath, ...]) -> tuple[tuple[int, int, int, float], ...]:
+    """(rod, lath, number along the lath, length [m]) of every piece."""
     return tuple(
-        (k, number, piece)
-        for k, at in enumerate(made)
-        for number, piece in enumerate(_pieces(float(lengths[k]), at, options), start=1)
+        (lath.rod, lath.number, number, length) for lath in laths for number, length in enumerate(lath.pieces, start=1)
     )
-
-
-def _pieces(length: float, at: tuple[float, ...], options: Fabrication) -> list[float]:
-    stops = [-options.end_allowance, *at, length + options.end_allowance]
-    return np.diff(stops).tolist()

@@ -103,6 +103,32 @@ class Profile:
         pairs = zip(self.stations, self.stations[1:], strict=False)
         return tuple(first for first, second in pairs if first == second)
 
+    def laths(self, length: float, allowance: float = 0.0) -> tuple[tuple[float, float], ...]:
+        """Where each lath beyond the first begins and ends, from the rod's start [m]; none where no laths vary.
+
+        Parameters
+        ----------
+        length : of the rod [m].
+        allowance : by which every lath that reaches an end of the rod is cut longer there [m].
+        """
+        found = list[tuple[float, float]]()
+        parts = list(zip(self.stations, self.stations[1:], self.factors, self.factors[1:], strict=False))
+        parts = [part for part in parts if part[0] < part[1]]
+        for number in range(2, int(max(self.factors)) + 1 if self.varies == "laths" else 0):
+            runs = list[list[float]]()
+            for low, high, *factors in parts:
+                if min(factors) < number:
+                    continue
+                if runs and runs[-1][1] == low:
+                    runs[-1][1] = high
+                else:
+                    runs.append([low, high])
+            found += [
+                (low * length - (allowance if low == 0.0 else 0.0), high * length + (allowance if high == 1.0 else 0.0))
+                for low, high in runs
+            ]
+        return tuple(found)
+
     def at(self, shares: Floats) -> Floats:
         """Factors (n,) at `shares` (n,) of the length; at a step the mean of both sides."""
         return np.asarray(0.5 * (self._beside(shares, "left") + self._beside(shares, "right")))

@@ -22,6 +22,7 @@ from rodshell.output.svg import SCALE, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import SHELLS, shown_case
+from rodshell.results.laths import laths_text
 from rodshell.results.records import Agreement, Drape, Ends, Gate, PopUp, Record
 from rodshell.results.results import Clearance, Reactions, Stock
 from rodshell.results.strength_used import ENDS, by_design_strength
@@ -319,7 +320,7 @@ def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]
     groups = [
         ("Target", wording.case_rows(results.target, plan.rounding)),
         ("Layout", wording.case_rows(results.layout, plan.rounding)),
-        ("Cut list", _cut_list(plan)),
+        ("Cut list", _cut_list(plan, results)),
         ("Rod", [row for part in parts for row in wording.case_rows(part)] + preset),
         ("Net", _listed(results.net, _NET, plan.rounding)),
         ("Drape", _drape_rows(drape, plan.rounding) + deviation),
@@ -383,13 +384,14 @@ def _drape_rows(drape: Drape | None, rounding: Rounding) -> list[Row]:
     return [(words.get(title, title), value) for title, value in _listed(drape, _DRAPE, rounding)]
 
 
-def _cut_list(plan: FlatPlan) -> list[Row]:
+def _cut_list(plan: FlatPlan, results: Results) -> list[Row]:
     lengths = [rod.length for rod in plan.rods]
     bare = ", without allowances" if plan.allowances else ""
     return [
         ("rods", str(len(plan.rods))),
         ("joints", str(len(plan.joints))),
         (f"all rods together{bare}", f"{sum(lengths):.1f} m"),
+        *((("all laths on them together", laths),) if (laths := laths_text(results)) else ()),
         (f"longest rod{bare}", f"{plan.rounding.mm(max(lengths, default=None)) or wording.UNKNOWN} mm"),
         (f"shortest rod{bare}", f"{plan.rounding.mm(min(lengths, default=None)) or wording.UNKNOWN} mm"),
     ]

@@ -95,6 +95,12 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
         ("max_stress_pop_up_MPa", True, lambda rod: _mpa(rod.record.pop_up.max_stress if rod.record.pop_up else None)),
         ("utilisation_pop_up", True, lambda rod: _number(_utilisation(rod), 3)),
         ("splices_from_cut_end_mm", True, lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.record.splices)),
+        ("second_laths_mm", True, lambda rod: "; ".join(mm(stop - start) for start, stop in rod.laths)),
+        (
+            "second_laths_splices_from_cut_end_mm",
+            True,
+            lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
+        ),
         *_ends(mm, "flat", 2, lambda rod: rod.flat),
         ("final_state", False, lambda rod: final or "" if len(rod.nodes) else ""),
         *_ends(
@@ -311,7 +317,8 @@ def loaded_shells(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
 
 
 def stock_table(archive: Archive) -> Table:
-    """One row a bar of stock: its pieces, named rod.number from the datum end, and what is left of it."""
+    """One row a bar of stock: its pieces, named rod.number from the datum end, those of a lath on it
+    rod-2.number, and what is left of it."""
     stock = archive.results.fabrication.stock if archive.results.fabrication else None
     mm = rounding_of(archive.results).mm
     rows = [
@@ -338,6 +345,12 @@ def end_paths_table(archive: Archive) -> Table:
         for end, point, way in zip(ends, here, moved, strict=True)
     ]
     return columns, rows
+
+
+def _on(rod: GridRod) -> list[float]:
+    """Splices of the laths that lie on a rod, from its start [m]."""
+    along = rod.record.stiffness
+    return [at for lath in along.splices for at in lath] if along is not None else []
 
 
 def _joints_at(rod: GridRod, mm: Show) -> str:

@@ -16,6 +16,7 @@ from rodshell.checks import Reactions as SupportReactions
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
 from rodshell.loads.strength import Limits
+from rodshell.results.laths import lath_name
 from rodshell.results.loaded import DesignStrength
 from rodshell.results.records import Bent, Ends, Rod
 from rodshell.results.results import (
@@ -238,6 +239,9 @@ def _rods(
             "layer": int(fabricated.layer[k]),
             "splices": tuple(fabricated.splices[k]),
         }
+        beyond = tuple(lath.splices for lath in fabricated.laths if lath.rod == k and lath.number > 1)
+        if rod.stiffness is not None and any(beyond):
+            made["stiffness"] = rod.stiffness.changed(splices=beyond)
         found.append(rod.changed(**made, **bent))
     return tuple(found)
 
@@ -387,7 +391,10 @@ def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fa
     joint_mass = (results.joint.mass if results.joint else None) or 0.0
     stock = dict[str, Any]()
     if fabricated.nesting is not None:
-        pieces = [Piece(piece=f"{names[rod]}.{number}", length=length) for rod, number, length in fabricated.pieces]
+        pieces = [
+            Piece(piece=f"{lath_name(names[rod], lath)}.{number}", length=length)
+            for rod, lath, number, length in fabricated.pieces
+        ]
         bars = tuple(Bar(pieces=tuple(pieces[k] for k in bar.pieces), left=bar.left) for bar in fabricated.nesting.bars)
         stock["stock"] = Stock(waste=fabricated.nesting.waste, fewest=fabricated.nesting.fewest, bars=bars)
     return Fabrication(

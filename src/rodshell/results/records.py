@@ -385,6 +385,7 @@ class Stiffness(Record):
         "what changes: all lengths of the section (size), one of them by its name, or the number of laths on each other"
     )
     sizes: Rows[Real] = rows("that length at each station; of a round rod its diameter; none of laths", "m")
+    splices: Rows[Rows[Real]] = rows("of laths: splices of each lath beyond the first, from the rod's start", "m")
 
     @model_validator(mode="after")
     def _as_many(self) -> Self:

@@ -196,7 +196,9 @@ class Brace(Record):
 class Piece(Record):
     """A piece that is cut from stock."""
 
-    piece: Text = Field(description="the rod's id, a dot and its number along the rod")
+    piece: Text = Field(
+        description="the rod's id, a dot and its number along the rod; of the second lath on a rod with -2 after the id"
+    )
     length: Number = key("length", "m")
 
 

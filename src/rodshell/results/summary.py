@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees
 
+from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.loaded import DesignStrength
 from rodshell.results.records import Bent, RodType
 from rodshell.results.results import Bending, Results
@@ -38,7 +39,8 @@ def summary_text(results: Results) -> str:
     joints = sum(len(rod.joints) for rod in results.rods) // 2
     lines = [f"{results.name or 'rodshell'}: {verdict.headline}"]
     lines += [f"            {reason}" for reason in verdict.reasons[1:]]
-    lines.append(f"  grid      {len(results.rods)} rods, {joints} joints")
+    laths = f"; {lengths_text(results)}" if laths_text(results) else ""
+    lines.append(f"  grid      {len(results.rods)} rods, {joints} joints{laths}")
     if results.rod:
         lines += _rod(results.rod, results.bending, results.strength)
     lines += _patches(results, length)

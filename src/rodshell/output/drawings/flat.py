@@ -18,6 +18,7 @@ from rodshell.output.labels import Label, Room, callouts, closed_segments, lines
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
 from rodshell.results.archive import made_once
+from rodshell.results.laths import laths_text
 from rodshell.results.records import Stiffness
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
@@ -29,7 +30,8 @@ GAP = 0.06  # from an id to a rod, in text sizes
 CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
 STRIPS_LEGEND = (
-    "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice.",
+    "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice; "
+    "S2: of the second lath.",
     "Open triangle: support. Arrow: the section's size there [mm], or from there on the number of laths (L).",
 )
 TALL = 15.0  # text sizes from strip to strip
@@ -49,6 +51,7 @@ class FlatPlan:
     boundary : closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if they
         are not known.
     rounding : how finely lengths are shown.
+    laths : how much lies on the rods, in words; "" where nothing does.
     """
 
     name: str
@@ -60,6 +63,7 @@ class FlatPlan:
     footprint: list[Floats]
     boundary: list[Floats]
     rounding: Rounding
+    laths: str
 
     @cached_property
     def extent(self) -> float:
@@ -100,8 +104,9 @@ class FlatPlan:
     def summary(self) -> str:
         """The cut list in one line; lengths as cut."""
         lengths = [rod.cut_length for rod in self.rods]
+        laths = f" and {self.laths}" if self.laths else ""
         return (
-            f"{len(self.rods)} rods, {len(self.joints)} joints, {sum(lengths):.1f} m in total, "
+            f"{len(self.rods)} rods, {len(self.joints)} joints, {sum(lengths):.1f} m in total{laths}, "
             f"longest {self.rounding.mm(max(lengths, default=0.0))} mm"
             + (", with allowances" if self.allowances else "")
         )
@@ -127,7 +132,7 @@ def flat_plan(archive: Archive) -> FlatPlan:
         archive.name, rods, joints, 1e3 * lines, 1e3 * cuts.reshape(-1, 2, 2), 1e3 * marks,
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
-        rounding_of(archive.results),
+        rounding_of(archive.results), laths_text(archive.results),
     )  # fmt: skip
 
 
@@ -349,6 +354,8 @@ def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str,
     stops = [(0.0, first, ""), *joints, (cut, last, "")]
     stops += [(1e3 * rod.from_cut_end(at), "S", "splice") for at in rod.record.splices]
     if along is not None:
+        beyond = enumerate(along.splices, start=2)
+        stops += [(1e3 * rod.from_cut_end(at), f"S{lath}", "splice") for lath, spliced in beyond for at in spliced]
         stops += [(1e3 * rod.from_cut_end(at), size, "section") for at, size in _section_marks(along)]
     if start > 0:
         stops += [(start, "", "support"), (cut - start, "", "support")]
