@@ -27,7 +27,7 @@ def browser_page(said: list[str]) -> Iterator[Page]:
     assert CHROMIUM, "no browser, and RODSHELL_BROWSER=required: install Chromium (Debian: apt-get install chromium)"
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        page = browser.new_context(viewport={"width": 1440, "height": 900}).new_page()
         page.set_default_timeout(PATIENCE)
         page.on("console", lambda message: said.append(message.text) if message.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: said.append(str(error)))

@@ -4,11 +4,14 @@ import json
 import zlib
 from base64 import urlsafe_b64decode
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from tests.output.browser import needs_browser
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 CASE = """
 target = { kind = "hemisphere" }
@@ -23,6 +26,51 @@ loads = [{ name = "gale", kind = "wind", value = "0.4 kN/m2", coefficient = -0.5
 combinations = [{ name = "storm", factors = { gale = 1.5, weight = 1.0 } }]
 """
 SPACING = "input[data-path='layout.spacing']"
+
+
+def put(page: "Page", selector: str, text: str) -> None:
+    """Write into a field, and leave it with Enter."""
+    field = page.locator(selector).first
+    field.fill(text)
+    field.press("Enter")
+
+
+def linked(page: "Page") -> Any:
+    """The case in the page's address."""
+    code = page.url.partition("#case=")[2]
+    return json.loads(zlib.decompress(urlsafe_b64decode(code + "=" * (-len(code) % 4)), -15))
+
+
+@pytest.mark.slow
+@needs_browser
+def test_two_tabs_of_one_session_show_the_same_case_with_its_figures(tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page, errors
+
+    (tmp_path / "case.toml").write_text(CASE)
+    said: list[str] = []
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as first:
+        second = first.context.new_page()
+        tabs = [Robot(page, tmp_path, "studio") for page in (first, second)]
+        for tab in tabs:
+            tab.page.set_default_timeout(20_000)
+            tab.page.goto(address)
+            tab.checked()
+        for tab, width in zip(tabs, ("70", "90"), strict=True):
+            put(tab.page, SPACING, width)
+            for page in (first, second):
+                expect(page.locator(SPACING).first).to_have_value(width)
+            tab.checked()
+            for other in tabs:
+                other.checked()
+                assert linked(other.page)["layout"]["spacing"] == float(width) / 1000
+            assert first.inner_text("#figures") == second.inner_text("#figures")
+        first.click("#undo")
+        expect(second.locator(SPACING).first).to_have_value("70")
+        second.wait_for_selector("#redo:not(:disabled)")
+    assert errors(said) == []
 
 
 @pytest.mark.slow
@@ -94,11 +142,6 @@ def test_the_dialog_of_loads_keeps_those_that_the_case_has(tmp_path: Path) -> No
     with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
         page.set_default_timeout(20_000)
 
-        def tables() -> dict[str, Any]:
-            code = page.url.partition("#case=")[2]
-            found: dict[str, Any] = json.loads(zlib.decompress(urlsafe_b64decode(code + "=" * (-len(code) % 4)), -15))
-            return found
-
         page.goto(address)
         page.wait_for_selector("#loads[aria-pressed=true]")
         page.click("#loads")
@@ -109,7 +152,7 @@ def test_the_dialog_of_loads_keeps_those_that_the_case_has(tmp_path: Path) -> No
         page.fill("input[name=self_weight]", "2 kg/m2")
         page.click("#load-values button[value=check]")
         page.click("#loads")
-        case = tables()
+        case = linked(page)
         assert [load["name"] for load in case["loads"]] == ["gale", "weight", "snow"]
         assert case["loads"][0]["kind"] == "wind"
         assert case["loads"][1]["cladding"] == "2 kg/m2"
@@ -118,5 +161,5 @@ def test_the_dialog_of_loads_keeps_those_that_the_case_has(tmp_path: Path) -> No
         page.fill("input[name=snow]", "")
         page.click("#load-values button[value=check]")
         page.click("#loads")
-        assert tables()["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0}}]
+        assert linked(page)["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0}}]
     assert errors(said) == []

@@ -220,9 +220,10 @@ async def _live(socket: WebSocket) -> None:
     await socket.accept()
     news: asyncio.Queue[News] = asyncio.Queue()
     session.listeners.add(news.put_nowait)
-    sender = asyncio.create_task(_send_news(socket, news))
+    sender = None
     try:
         await socket.send_json({"kind": "session", **vars(session.state)})
+        sender = asyncio.create_task(_send_news(socket, news))
         while True:
             message = json.loads(await socket.receive_text())
             if error := _obey(session, message):
@@ -235,7 +236,8 @@ async def _live(socket: WebSocket) -> None:
         pass
     finally:
         session.listeners.discard(news.put_nowait)
-        sender.cancel()
+        if sender:
+            sender.cancel()
 
 
 async def _send_news(socket: WebSocket, news: asyncio.Queue[News]) -> None:

@@ -186,7 +186,7 @@ class Session:
             self.state = State(**json.loads((folder / "session.json").read_text(encoding="utf-8")))
         self.listeners: set[Heard] = set()
         self.worker = WorkerProcess(self._hear)
-        self._newest = 0
+        self._newest: tuple[int, dict[str, Any]] = (0, {})  # serial of the newest order, and its case for the pages
         self._scene = b""  # of the present case, checked
         self._facts: Mapping[str, Any] = {}
 
@@ -209,7 +209,7 @@ class Session:
         resolved = with_uploads(case, {path.name: path for path in self.uploads.iterdir()})
         if not live and case != self.state.case:
             self._record(case)
-        self._newest = serial
+        self._newest = (serial, {"case": case, "live": live})
         self.worker.order(Order(serial, "form", resolved, live, self.time_limit))
 
     def step(self, by: int) -> bool:
@@ -272,6 +272,9 @@ class Session:
             self._facts, self._scene = news.facts, news.content
         elif news.kind == "taken":
             self._facts = {}
+            serial, shown_case = self._newest
+            if news.serial == serial:  # every page of the session follows
+                news = replace(news, facts={**shown_case, "at": self.state.at, "count": len(self.state.cases)})
         for listener in list(self.listeners):
             listener(news)
 

@@ -28,9 +28,12 @@ const SLIDERS = [  // key, name, and how its range follows from its value
 const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["rod.material.preset", "Material"], ["drape.method", "Drape"]];
 const IDLE = ["drape.frames", "target.file", "target.boundary", "seams.file"];  // not from a page
 const TIMEOUT = 1500;  // ms after which a lost connection is tried again
+const TABS = 1000, tab = Math.floor(TABS * Math.random());  // serials modulo TABS tell which tab sent a case
+const mine = number => number % TABS === tab;
+const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 let start, session, socket, viewer, gui, drawn;
-let base = {}, resolved = null, serial = Date.now(), waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
+let base = {}, resolved = null, serial = TABS * Date.now(), waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
 
 // The case, and what is sent
 
@@ -44,7 +47,7 @@ function submit(next, live) {
   base = next;
   byId("verdict").classList.add("old");
   const soon = waiting;
-  serial = Math.max(serial, shown) + 1;
+  serial = TABS * (Math.floor(serial / TABS) + 1) + tab;
   waiting = { kind: "case", serial, case: base, live };  // at most one waits: the newest
   if (!live) post();
   else if (!soon) requestAnimationFrame(post);  // at most one a frame
@@ -156,18 +159,36 @@ function hear(news) {
   if (news.kind === "session") return restore(news);
   if (news.kind === "history") return showHistory(news);
   if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
-  if (news.kind === "stage" && news.serial >= shown) {
-    shown = news.serial;
-    drawn = news.serial;
-    facts = news;
-    showFacts();
+  if (news.kind === "taken" && news.case && news.serial !== serial && !(mine(news.serial) && mine(serial))) follow(news);
+  if (news.kind === "stage") {  // of this case, or of one before it of the same drag
+    drawn = news.serial === serial || (mine(news.serial) && mine(serial) && news.serial >= shown);
+    if (drawn) {
+      shown = news.serial;
+      facts = news;
+      showFacts();
+      if (shown !== serial) byId("verdict").classList.add("old");
+    }
   }
   if (news.kind === "done" && news.serial === serial) say("");
   if (news.kind === "failed" && (news.serial === serial || news.serial < 0 || !news.serial)) failed(news.sentence);
 }
 
+// Another tab of this session has changed the case.
+function follow(news) {
+  const changed = !same(news.case, base);
+  pending = pending || !same(news.case.target, base.target);
+  base = news.case;
+  serial = news.serial;
+  byId("verdict").classList.add("old");
+  if (changed) document.body.classList.add("old");
+  showHistory(news);
+  if (!news.live) remember();
+  showTools();
+  if (changed) refreshControls();
+}
+
 function see(bytes) {
-  if (drawn !== shown) return;
+  if (!drawn) return;
   const first = !viewer.scene;
   viewer.show(bytes, { keepView: !first });
   if (pending) { viewer.home(); pending = false; }
@@ -180,11 +201,11 @@ function restore(state) {
   const from = state.cases[state.at];
   showHistory({ at: state.at, count: state.cases.length });
   showVariants();
-  if (restore.known && JSON.stringify(from) === JSON.stringify(base)) return;
+  if (restore.known && same(from, base)) return;
   const linked = restore.known ? null : restore.linked;
   restore.known = true;
   const next = linked || from || start.first;
-  pending = pending || JSON.stringify(next.target) !== JSON.stringify(base.target);
+  pending = pending || !same(next.target, base.target);
   submit(clone(next), false);
   buildControls();
 }
