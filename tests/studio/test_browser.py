@@ -133,6 +133,31 @@ def test_a_case_is_changed_undone_kept_refined_and_found_again_after_a_reload(tm
 
 @pytest.mark.slow
 @needs_browser
+def test_a_change_made_while_the_server_is_away_is_kept(tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page
+
+    (tmp_path / "case.toml").write_text(CASE)
+    options = (tmp_path / "sessions", str(tmp_path / "case.toml"))
+    with browser_page([]) as page:
+        page.set_default_timeout(20_000)
+        robot = Robot(page, tmp_path, "studio")
+        with server(*options) as (address, _):
+            page.goto(address)
+            robot.checked()
+        page.wait_for_selector("#state.wrong")
+        put(page, SPACING, "80")
+        with server(*options, "--port", address.rstrip("/").rpartition(":")[2]):
+            robot.checked()
+            expect(page.locator(SPACING).first).to_have_value("80")
+            assert linked(page)["layout"]["spacing"] == 0.08
+            assert not page.is_disabled("#undo")
+
+
+@pytest.mark.slow
+@needs_browser
 def test_the_dialog_of_loads_keeps_those_that_the_case_has(tmp_path: Path) -> None:
     from tests.acceptance.studio import server
     from tests.acceptance.studio_browser import browser_page, errors

@@ -222,14 +222,14 @@ async def _live(socket: WebSocket) -> None:
     session.listeners.add(news.put_nowait)
     sender = None
     try:
-        await socket.send_json({"kind": "session", **vars(session.state)})
+        await socket.send_json({"kind": "session", "after": "connect", **vars(session.state)})
         sender = asyncio.create_task(_send_news(socket, news))
         while True:
             message = json.loads(await socket.receive_text())
             if error := _obey(session, message):
                 await socket.send_json({"kind": "failed", "serial": message.get("serial", 0), "sentence": error})
             if message.get("kind") in ("step", "keep", "drop"):
-                await socket.send_json({"kind": "session", **vars(session.state)})
+                await socket.send_json({"kind": "session", "after": message["kind"], **vars(session.state)})
             elif not message.get("live"):
                 await socket.send_json({"kind": "history", "at": session.state.at, "count": len(session.state.cases)})
     except (WebSocketDisconnect, json.JSONDecodeError):

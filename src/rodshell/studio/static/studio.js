@@ -32,8 +32,8 @@ const TABS = 1000, tab = Math.floor(TABS * Math.random());  // serials modulo TA
 const mine = number => number % TABS === tab;
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-let start, session, socket, viewer, gui, drawn;
-let base = {}, resolved = null, serial = TABS * Date.now(), waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
+let start, session, socket, viewer, gui, drawn, ready = false;  // ready: the server has said what it holds
+let base = {}, resolved = null, serial = TABS * Date.now(), taken = 0, waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
 
 // The case, and what is sent
 
@@ -120,7 +120,7 @@ function wireTools() {
 }
 
 function post() {
-  if (!waiting || socket?.readyState !== WebSocket.OPEN) return;
+  if (!waiting || !ready || socket.readyState !== WebSocket.OPEN) return;
   socket.send(JSON.stringify(waiting));
   waiting = null;
 }
@@ -134,8 +134,8 @@ function connect() {
   socket = new WebSocket(`${scheme}://${location.host}/api/sessions/${session}/live`);
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : see(data));
-  socket.onopen = post;
   socket.onclose = ({ code }) => {
+    ready = false;
     if (code === 4404) { localStorage.removeItem("rodshell-session"); return open(); }
     say("The server does not answer; trying again", true);
     setTimeout(connect, TIMEOUT);
@@ -160,6 +160,7 @@ function hear(news) {
   if (news.kind === "history") return showHistory(news);
   if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
   if (news.kind === "taken" && news.case && news.serial !== serial && !(mine(news.serial) && mine(serial))) follow(news);
+  if (news.kind === "taken" && news.serial === serial) taken = serial;
   if (news.kind === "stage") {  // of this case, or of one before it of the same drag
     drawn = news.serial === serial || (mine(news.serial) && mine(serial) && news.serial >= shown);
     if (drawn) {
@@ -198,16 +199,16 @@ let pending = true;  // a new target: the view begins anew
 
 function restore(state) {
   history = state;
-  const from = state.cases[state.at];
+  const from = state.cases[state.at], { known } = restore, edited = known && taken !== serial;  // while the server was away
   showHistory({ at: state.at, count: state.cases.length });
   showVariants();
-  if (restore.known && same(from, base)) return;
-  const linked = restore.known ? null : restore.linked;
-  restore.known = true;
-  const next = linked || from || start.first;
+  ready = restore.known = true;
+  if (state.after === "step" ? same(from, base) : state.after !== "connect") return;
+  const next = state.after === "connect" && edited ? base : (!known && restore.linked) || from || (known ? base : start.first);
   pending = pending || !same(next.target, base.target);
-  submit(clone(next), false);
-  buildControls();
+  const changed = !known || !same(next, base);
+  submit(clone(next), false);  // also an unchanged case: a server that was started again has not found its form yet
+  if (changed) refreshControls();
 }
 
 function showHistory({ at, count }) {
