@@ -158,6 +158,34 @@ def test_a_change_made_while_the_server_is_away_is_kept(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @needs_browser
+def test_a_case_that_failed_offers_no_files_and_no_script_of_the_case_before(tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page
+
+    (tmp_path / "case.toml").write_text(CASE)
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page([]) as page:
+        page.set_default_timeout(20_000)
+        robot = Robot(page, tmp_path, "studio")
+        page.goto(address)
+        robot.checked()
+        offered = [page.locator(part) for part in ("#download[href]", "#python:enabled", "#keep button:enabled")]
+        for part in offered:
+            expect(part).to_have_count(1)
+        page.locator(".lil-title", has_text="[layout]").click()
+        put(page, "[data-path='layout.spacing'] >> nth=-1", "banana")
+        page.wait_for_selector("#verdict.failed")
+        for part in offered:
+            expect(part).to_have_count(0)
+        page.click("#undo")
+        robot.checked()
+        for part in offered:
+            expect(part).to_have_count(1)
+
+
+@pytest.mark.slow
+@needs_browser
 def test_the_dialog_of_loads_keeps_those_that_the_case_has(tmp_path: Path) -> None:
     from tests.acceptance.studio import server
     from tests.acceptance.studio_browser import browser_page, errors

@@ -46,6 +46,7 @@ function change(edit, live = false) {
 function submit(next, live) {
   base = next;
   byId("verdict").classList.add("old");
+  offer(false);
   const soon = waiting;
   serial = TABS * (Math.floor(serial / TABS) + 1) + tab;
   waiting = { kind: "case", serial, case: base, live };  // at most one waits: the newest
@@ -53,6 +54,14 @@ function submit(next, live) {
   else if (!soon) requestAnimationFrame(post);  // at most one a frame
   if (!live) remember();
   showTools();
+}
+
+// What can be done with a form once it has its verdict.
+function offer(ready) {
+  byId("python").disabled = byId("keep").querySelector("button").disabled = !ready;
+  byId("download").setAttribute("aria-disabled", String(!ready));
+  if (ready) byId("download").href = `/api/sessions/${session}/files.zip`;
+  else byId("download").removeAttribute("href");
 }
 
 // Buttons for what takes longer; each is a part of the case
@@ -181,6 +190,7 @@ function follow(news) {
   base = news.case;
   serial = news.serial;
   byId("verdict").classList.add("old");
+  offer(false);
   if (changed) document.body.classList.add("old");
   showHistory(news);
   if (!news.live) remember();
@@ -255,12 +265,8 @@ function showFacts() {
     const before = JSON.stringify(resolved);
     resolved = facts.resolved;
     if (before !== JSON.stringify(resolved)) refreshControls();
-    byId("download").removeAttribute("aria-disabled");
-    byId("download").href = `/api/sessions/${session}/files.zip`;
-  } else {
-    byId("download").setAttribute("aria-disabled", "true");
-    if (facts.status !== "converged") box.replaceChildren(make("strong", { textContent: facts.status }));
-  }
+    offer(shown === serial);
+  } else if (facts.status !== "converged") box.replaceChildren(make("strong", { textContent: facts.status }));
   document.title = `${facts.name} · rodshell studio`;
   showPlan();
 }
