@@ -182,6 +182,10 @@ def test_a_case_that_failed_offers_no_files_and_no_script_of_the_case_before(tmp
         robot.checked()
         for part in offered:
             expect(part).to_have_count(1)
+        page.fill("#name", "   ")
+        page.click("#keep button")
+        expect(page.locator("#state.wrong")).to_have_text("a variant needs a name")
+        assert page.locator("#verdict.failed, #verdict.old, body.old").count() == 0
 
 
 @pytest.mark.slow

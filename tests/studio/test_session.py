@@ -2,9 +2,13 @@
 
 import asyncio
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from rodshell.studio.session import WorkerProcess
+import pytest
+
+from rodshell.errors import InputError
+from rodshell.studio.session import Session, WorkerProcess
 from rodshell.studio.worker import News, Order
 
 
@@ -102,3 +106,28 @@ def test_when_the_process_dies_the_order_has_failed_and_what_waits_is_sent_to_an
         worker.says("done", 2)
 
     assert scripted(play) == [(1, "failed"), (2, "done")]
+
+
+def test_a_variant_is_kept_after_a_download_but_not_of_a_case_without_its_verdict(tmp_path: Path) -> None:
+    checks = {"stage": "checks", "figures": [], "verdict": {"level": "good", "headline": "it stands", "reasons": []}}
+
+    async def run() -> None:
+        session = Session(tmp_path)
+        session.worker = worker = Scripted(session._hear)
+        session.show(1, {"layout": {"spacing": 1.0}}, live=False)
+        worker._hear(worker._process, News(1, "stage", checks))
+        worker.says("done", 1)
+        session.files(-1)
+        for kind in ("taken", "files", "done"):
+            worker.says(kind, -1)
+        session.keep_variant("first")
+        session.show(2, {"layout": {"spacing": 2.0}}, live=False)
+        worker._hear(worker._process, News(1, "stage", checks))  # late
+        with pytest.raises(InputError, match="no verdict yet"):
+            session.keep_variant("second")
+        assert [(kept["name"], kept["case"]) for kept in session.state.variants] == [
+            ("first", {"layout": {"spacing": 1.0}})
+        ]
+        worker.end()
+
+    asyncio.run(run())

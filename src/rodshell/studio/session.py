@@ -209,7 +209,7 @@ class Session:
         resolved = with_uploads(case, {path.name: path for path in self.uploads.iterdir()})
         if not live and case != self.state.case:
             self._record(case)
-        self._newest = (serial, {"case": case, "live": live})
+        self._newest, self._facts = (serial, {"case": case, "live": live}), {}
         self.worker.order(Order(serial, "form", resolved, live, self.time_limit))
 
     def step(self, by: int) -> bool:
@@ -217,6 +217,7 @@ class Session:
         if not 0 <= self.state.at + by < len(self.state.cases):
             return False
         self.state.at += by
+        self._facts = {}
         self._keep()
         return True
 
@@ -268,13 +269,11 @@ class Session:
 
     def _hear(self, news: News) -> None:
         news = replace(news, facts=_with_names(news.facts, f"{self.uploads}{os.sep}"))
-        if news.kind == "stage" and news.facts.get("stage") == "checks":
+        serial, case = self._newest
+        if news.serial == serial and news.kind == "stage" and news.facts.get("stage") == "checks":
             self._facts, self._scene = news.facts, news.content
-        elif news.kind == "taken":
-            self._facts = {}
-            serial, shown_case = self._newest
-            if news.serial == serial:  # every page of the session follows
-                news = replace(news, facts={**shown_case, "at": self.state.at, "count": len(self.state.cases)})
+        elif news.serial == serial and news.kind == "taken":  # every page of the session follows
+            news = replace(news, facts={**case, "at": self.state.at, "count": len(self.state.cases)})
         for listener in list(self.listeners):
             listener(news)
 

@@ -180,7 +180,8 @@ function hear(news) {
     }
   }
   if (news.kind === "done" && news.serial === serial) say("");
-  if (news.kind === "failed" && (news.serial === serial || news.serial < 0 || !news.serial)) failed(news.sentence);
+  if (news.kind === "failed" && news.serial === serial) failed(news.sentence);
+  else if (news.kind === "failed" && news.serial <= 0) say(news.sentence, true);  // of files or a variant: the form stands
 }
 
 // Another tab of this session has changed the case.
