@@ -2,7 +2,7 @@
 
 import json
 import zlib
-from base64 import urlsafe_b64decode
+from base64 import urlsafe_b64decode, urlsafe_b64encode
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,10 +35,16 @@ def put(page: "Page", selector: str, text: str) -> None:
     field.press("Enter")
 
 
+def code(text: str) -> str:
+    """What a link holds after "#case="."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    return urlsafe_b64encode(packer.compress(text.encode()) + packer.flush()).decode().rstrip("=")
+
+
 def linked(page: "Page") -> Any:
     """The case in the page's address."""
-    code = page.url.partition("#case=")[2]
-    return json.loads(zlib.decompress(urlsafe_b64decode(code + "=" * (-len(code) % 4)), -15))
+    packed = page.url.partition("#case=")[2]
+    return json.loads(zlib.decompress(urlsafe_b64decode(packed + "=" * (-len(packed) % 4)), -15))
 
 
 @pytest.mark.slow
@@ -186,6 +192,40 @@ def test_a_case_that_failed_offers_no_files_and_no_script_of_the_case_before(tmp
         page.click("#keep button")
         expect(page.locator("#state.wrong")).to_have_text("a variant needs a name")
         assert page.locator("#verdict.failed, #verdict.old, body.old").count() == 0
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_link_opens_its_case_in_an_open_tab_and_one_without_a_case_says_so(tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page, errors
+
+    (tmp_path / "case.toml").write_text(CASE)
+    said: list[str] = []
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
+        page.set_default_timeout(20_000)
+        robot = Robot(page, tmp_path, "studio")
+        page.goto(address)
+        robot.checked()
+        case = linked(page)
+        case["layout"]["spacing"] = 0.08
+        whole = code(json.dumps(case))
+        page.goto(f"{address}#case={whole}")  # the page stays: only what follows the # differs
+        expect(page.locator(SPACING).first).to_have_value("80")
+        robot.checked()
+        for wrong in (whole[:-9], whole[:20] + "!" + whole[21:], "", *map(code, ("5", '"x"', "null", "[]", "{"))):
+            for open_tab in (True, False):
+                if not open_tab:
+                    page.goto("about:blank")
+                page.goto(f"{address}#case={wrong}")
+                expect(page.locator("#notice")).to_contain_text("holds no case, or is damaged or cut off")
+                expect(page.locator(SPACING).first).to_have_value("80")
+                robot.checked()
+        put(page, SPACING, "90")
+        expect(page.locator("#notice")).to_be_hidden()
+    assert errors(said) == []
 
 
 @pytest.mark.slow

@@ -31,6 +31,8 @@ const TIMEOUT = 1500;  // ms after which a lost connection is tried again
 const TABS = 1000, tab = Math.floor(TABS * Math.random());  // serials modulo TABS tell which tab sent a case
 const mine = number => number % TABS === tab;
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+const isTable = value => typeof value === "object" && value !== null && !Array.isArray(value);
+const NO_CASE = "The link in the address holds no case, or is damaged or cut off: copy it again. What is shown is another case.";
 
 let start, session, socket, viewer, gui, drawn, ready = false;  // ready: the server has said what it holds
 let base = {}, resolved = null, serial = TABS * Date.now(), taken = 0, waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
@@ -46,6 +48,7 @@ function change(edit, live = false) {
 function submit(next, live) {
   base = next;
   byId("verdict").classList.add("old");
+  notice("");
   offer(false);
   const soon = waiting;
   serial = TABS * (Math.floor(serial / TABS) + 1) + tab;
@@ -190,6 +193,7 @@ function follow(news) {
   pending = pending || !same(news.case.target, base.target);
   base = news.case;
   serial = news.serial;
+  notice("");
   byId("verdict").classList.add("old");
   offer(false);
   if (changed) document.body.classList.add("old");
@@ -219,6 +223,7 @@ function restore(state) {
   pending = pending || !same(next.target, base.target);
   const changed = !known || !same(next, base);
   submit(clone(next), false);  // also an unchanged case: a server that was started again has not found its form yet
+  if (!known && restore.linked === undefined) notice(NO_CASE);
   if (changed) refreshControls();
 }
 
@@ -231,6 +236,11 @@ function showHistory({ at, count }) {
 function say(text, wrong = false) {
   byId("state").textContent = text;
   byId("state").classList.toggle("wrong", wrong);
+}
+
+function notice(text) {
+  byId("notice").textContent = text;
+  byId("notice").hidden = !text;
 }
 
 function failed(sentence) {
@@ -633,6 +643,24 @@ async function unpacked(code) {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"))).text();
 }
 
+// The case in the address; null: there is none; undefined: it cannot be read.
+async function fromAddress() {
+  const code = new URLSearchParams(location.hash.slice(1)).get("case");
+  const found = code === null ? null : await unpacked(code).then(JSON.parse).catch(() => undefined);
+  return code === null || isTable(found) ? found : undefined;
+}
+
+async function openLink() {
+  const found = await fromAddress();
+  if (!restore.known) restore.linked = found;
+  else if (found === undefined) notice(NO_CASE);
+  else if (found) {
+    pending = true;
+    submit(found, false);
+    buildControls();
+  }
+}
+
 async function remember() {
   const code = await packed(JSON.stringify(base));
   window.history.replaceState(null, "", `${location.pathname}#case=${code}`);
@@ -714,8 +742,8 @@ function wire() {
 
 viewer = createViewer(byId("view"));
 start = await (await fetch("/api/start")).json();
-const code = new URLSearchParams(location.hash.slice(1)).get("case");
-if (code) restore.linked = await unpacked(code).then(JSON.parse).catch(() => null);
+await openLink();
+addEventListener("hashchange", openLink);
 wire();
 wireHandles();
 await open();
