@@ -211,6 +211,33 @@ def test_a_job_of_a_program_gives_its_result_and_files(client: TestClient) -> No
     assert client.get("/api/jobs/nothing").status_code == 404
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        '{"layout": {"spacing": NaN}}',
+        '{"layout": {"spacing": 1e999}}',
+        '{"target": {"kind": "\\ud800"}}',
+        "[" * 100_000,
+        '{"seams": {"lines": ' + "[" * 500 + "]" * 500 + "}}",
+    ],
+    ids=["nan", "infinite", "half of a character", "without an end", "deep"],
+)
+def test_a_case_that_is_no_plain_json_is_refused_in_a_sentence(client: TestClient, tmp_path: Path, body: str) -> None:
+    answer = client.post("/api/jobs", content=body)
+    assert answer.status_code == 400
+    assert "case" in answer.json()["sentence"]
+    assert not list(tmp_path.glob("jobs/*"))
+
+
+def test_a_session_keeps_no_case_that_cannot_be_sent_back(client: TestClient) -> None:
+    session = new_session(client)
+    with client.websocket_connect(f"/api/sessions/{session}/live") as socket:
+        socket.receive_json()
+        socket.send_text('{"kind": "case", "serial": 1, "case": {"layout": {"spacing": NaN}}}')
+        assert "finite numbers" in socket.receive_json()["sentence"]
+        assert socket.receive_json()["count"] == 0
+
+
 def wait(client: TestClient, job: str) -> dict[str, Any]:
     for _ in range(1200):
         status: dict[str, Any] = client.get(f"/api/jobs/{job}").json()

@@ -37,6 +37,8 @@ STATIC = files("rodshell.studio").joinpath("static")
 TYPES = {".js": "text/javascript", ".css": "text/css"}
 PAGES = ("studio.js", "studio.css", "lil-gui.js", "lil-gui.css")
 LARGEST_CASE = 1_000_000  # bytes of a case as JSON
+DEEPEST = 20  # tables and lists of a case within one another
+NO_CASE = "the body must be a case as JSON, with the tables of a case file"
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "font-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -232,7 +234,7 @@ async def _live(socket: WebSocket) -> None:
                 await socket.send_json({"kind": "session", "after": message["kind"], **vars(session.state)})
             elif not message.get("live"):
                 await socket.send_json({"kind": "history", "at": session.state.at, "count": len(session.state.cases)})
-    except (WebSocketDisconnect, json.JSONDecodeError):
+    except (WebSocketDisconnect, json.JSONDecodeError, RecursionError):
         pass
     finally:
         session.listeners.discard(news.put_nowait)
@@ -255,6 +257,7 @@ async def _send_news(socket: WebSocket, news: asyncio.Queue[News]) -> None:
 def _obey(session: Session, message: dict[str, Any]) -> str:
     """What a page asks for; why not, in a sentence."""
     try:
+        _refuse_unwritable(message)
         match message.get("kind"):
             case "case":
                 session.show(int(message["serial"]), dict(message["case"]), live=bool(message.get("live")))
@@ -326,12 +329,33 @@ async def _new_job(request: Request) -> Response:
             raise InputError(f"a case may have {LARGEST_CASE / 1e6:g} MB at most")
     try:
         case = json.loads(body)
-    except ValueError:
-        raise InputError("the body must be a case as JSON, with the tables of a case file") from None
+    except (ValueError, RecursionError):
+        raise InputError(NO_CASE) from None
     if not isinstance(case, dict):
-        raise InputError("the body must be a case as JSON, with the tables of a case file")
+        raise InputError(NO_CASE)
+    _refuse_unwritable(case)
     jobs: Jobs = request.app.state.jobs
     return JSONResponse({"id": jobs.add(_without_files(case))}, 202)
+
+
+def _refuse_unwritable(case: dict[str, Any]) -> None:
+    """What Python reads as JSON but cannot be sent back as JSON, or nests too deep for that."""
+    level: list[Any] = [case]
+    for _ in range(DEEPEST):
+        level = [part for whole in level for part in _parts(whole)]
+    if level:
+        raise InputError(f"a case has at most {DEEPEST} tables and lists within one another")
+    try:
+        json.dumps(case, allow_nan=False, ensure_ascii=False).encode()
+    except ValueError:
+        raise InputError("a case must hold finite numbers and valid Unicode text") from None
+
+
+def _parts(value: Any) -> list[Any]:
+    """What a table or a list holds."""
+    if isinstance(value, dict):
+        return list(value.values())
+    return value if isinstance(value, list) else []
 
 
 def _without_files(case: dict[str, Any]) -> dict[str, Any]:
