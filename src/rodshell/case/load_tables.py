@@ -338,9 +338,7 @@ class StabilityTable(Table):
     imperfection: Annotated[str | float, BeforeValidator(_imperfection)] | None = Field(
         default=None, description='largest imperfection: a length, or "span/500"; default: none'
     )
-    modes: Whole = Field(
-        default=3, description="number of buckling modes, each of which is tried as the shape of the imperfection"
-    )
+    modes: Whole = Field(default=3, description="number of buckling modes, each of which is tried as imperfection")
 
     def build(self) -> "Stability":
         """What it says."""

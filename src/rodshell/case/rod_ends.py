@@ -13,7 +13,6 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, Profile, straight_rods
 from rodshell.results.records import Stiffness
-from rodshell.targets.mesh_files import require_size
 from rodshell.units import length_text, parse_quantity, read_unit, shown
 from rodshell.validation import instance
 
@@ -129,6 +128,8 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     values = np.array(numbers)
     instead = "give another unit" if columns == COLUMNS else "check its columns, which are in mm"
     for ends in (values[:, :4].reshape(-1, 2), values[:, 4:].reshape(-1, 3)):
+        from rodshell.targets.mesh_files import require_size  # here, as most cases are no tables
+
         require_size(path, np.ptp(ends, axis=0), scale, instead=instead)
     values *= scale
     grid = straight_rods(values[:, :4].reshape(-1, 2, 2), names=_labels(path, names))

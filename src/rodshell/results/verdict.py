@@ -160,7 +160,7 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
         said = place is not None and place.by == "permanent" and (bent_of(results, ends).utilisation or 0.0) > 1
         if used is not None and used > 1 and not said:
             where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
-            at = "" if found.at_factor == 1 else f" already at {rounded(found.at_factor or 0.0)} times these loads"
+            at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
             share = f"{max(101, round(100 * used))} %"
             by = BY_WORDS.get((place.by if place else None) or "", "the rods use {} of their design strength")
             under = "" if place is not None and place.by == "permanent" else f" under {name}{at}"

@@ -75,7 +75,7 @@ def _loads(archive: "Archive") -> Figures:
         for ends, found in by_ends.items():
             limit = wording.shown_factor(found.limit_factor)
             rows.append((f"{name}, {ends}: stable up to", f"{limit} times the loads ({found.limit_kind})"))
-            at = "" if found.at_factor == 1 else f" at {wording.rounded(found.at_factor or 0.0)} times"
+            at = "" if found.at_factor == 1 else f" at {wording.rounded_down(found.at_factor or 0.0)} times"
             rows.append(
                 (f"{name}, {ends}: deflection{at}", wording.millimetres(found.max_deflection, rounding=rounding))
             )
