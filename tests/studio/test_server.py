@@ -11,6 +11,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.case.link import upload_name
+from rodshell.cli import main
 from rodshell.errors import InputError
 from rodshell.studio.session import with_uploads
 
@@ -236,6 +237,25 @@ def test_a_session_keeps_no_case_that_cannot_be_sent_back(client: TestClient) ->
         socket.send_text('{"kind": "case", "serial": 1, "case": {"layout": {"spacing": NaN}}}')
         assert "finite numbers" in socket.receive_json()["sentence"]
         assert socket.receive_json()["count"] == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--folder", "plain"), "cannot keep sessions in plain (Not a directory)"),
+        (("--port", "99999"), "'--port': 99999"),
+    ],
+)
+def test_a_folder_or_port_that_cannot_be_used_is_refused_at_the_start(
+    options: tuple[str, str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: pytest.fail("it was served"))
+    Path("plain").write_text("")
+    assert main(["studio", "--no-browser", "--port", "0", *options]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
 
 
 def wait(client: TestClient, job: str) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from rodshell.errors import InputError
+from rodshell.errors import InputError, OutputError
 
 HOST = "Address to listen on; at any but this machine's own, a page needs the printed token."
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
@@ -13,7 +13,9 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 @click.command()
 @click.argument("name", metavar="[CASE|SURFACE]", default="pavilion")
 @click.option("--host", default="127.0.0.1", show_default=True, help=HOST)
-@click.option("--port", default=8731, show_default=True, help="Port to listen on; 0: any free one.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=8731, show_default=True, help="Port to listen on; 0: any free one."
+)
 @click.option("--folder", help="Folder in which sessions are kept; default: the user's cache.")
 @click.option("--time-limit", default="120 s", show_default=True, help="Of one job.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
@@ -38,6 +40,11 @@ def command(name: str, host: str, port: int, folder: str | None, time_limit: str
     from rodshell.studio.start import first_case, sessions_folder
 
     case, contents = first_case(name)
+    kept = Path(folder) if folder else sessions_folder()
+    try:
+        (kept / "sessions").mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise OutputError(f"cannot keep sessions in {kept} ({reason.strerror}): give another --folder") from None
     listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -50,9 +57,7 @@ def command(name: str, host: str, port: int, folder: str | None, time_limit: str
     loopback = host in LOOPBACK
     token = "" if loopback else secrets.token_urlsafe(18)
     hosts = tuple(f"{known}:{port}" for known in ("127.0.0.1", "localhost", "[::1]")) if loopback else ()
-    settings = Settings(
-        Path(folder) if folder else sessions_folder(), hosts, token, case, contents, seconds_of(time_limit) or 120.0
-    )
+    settings = Settings(kept, hosts, token, case, contents, seconds_of(time_limit) or 120.0)
     address = f"http://{f'[{host}]' if ':' in host else host}:{port}/{f'?token={token}' if token else ''}"
     click.echo(f"rodshell studio: {address} (Ctrl-C ends it)", err=True)
     if not no_browser:
