@@ -11,9 +11,9 @@ import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.joints import Joint, joint_parameters
 from rodshell.output.drawing import CAPITAL, LETTER, TEXT, Drawing
-from rodshell.output.drawings import sheet_set
+from rodshell.output.drawings import drawing_set, sheet_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
-from rodshell.output.drawings.sheets import MARGIN, laid_out, room, title_block
+from rodshell.output.drawings.sheets import BLOCK, MARGIN, MORE, ROW, laid_out, room, title_block
 from rodshell.output.options import PAPERS, DrawingStyle
 from rodshell.results import Archive, Results
 from tests.output.forms import archive, wished
@@ -90,6 +90,30 @@ def test_a_drawing_whose_sheet_shows_all_is_laid_out_once_for_files_and_paper() 
     low, high = room(paper)
     assert len(tried) <= 3
     assert np.all(extent / (min(tried) / TEXT) <= high - low)
+
+
+def judged(made: Archive, level: str, *reasons: str) -> Archive:
+    return replace(made, results=Results.of({**made.results.plain(), "verdict": {"level": level, "reasons": reasons}}))
+
+
+@pytest.mark.parametrize("paper", ["A4", "A3"])
+def test_every_sheet_and_drawing_says_that_a_shell_is_not_buildable(paper: str) -> None:
+    reason = "with pinned ends the rods use 417 % of their design strength " + "and more " * 40
+    made = judged(styled(sample_archive(3, 2), paper=paper), "unbuildable", reason.strip(), "another reason")
+    for drawing in [*sheets(made), *drawing_set(made).values()]:
+        (line,) = (text for text in drawing.texts if text.text.startswith("Not buildable: with pinned ends"))
+        assert line.text.endswith(MORE)
+    for sheet in sheets(made):
+        block = [text for text in sheet.texts if text.layer == "TITLE" and text.at[1] < MARGIN + BLOCK]
+        rows = sorted({round(float(text.at[1]), 3) for text in block if text.anchor == "start" and text.at[0] < 20})
+        assert min(np.diff(rows)) > 0.9 * ROW
+        assert rows[0] > MARGIN + 1
+
+
+def test_a_verdict_that_fits_is_whole_and_a_good_one_is_not_said() -> None:
+    texts = [text.text for text in sheets(judged(sample_archive(3, 2), "check", "no strength is known"))[0].texts]
+    assert "Check: no strength is known" in texts
+    assert title_block(judged(sample_archive(3, 2), "good", "it pops up"), "").verdict == ""
 
 
 @pytest.mark.slow

@@ -34,12 +34,17 @@ from rodshell.output.schedules import (
     stock_table,
     supports_table,
 )
-from rodshell.results import Archive
+from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
+from rodshell.results.strength_used import ENDS
 
 __all__ = ["drawing_set", "sheet_set"]
 
 
+_HELD: dict[str | None, str] = {  # directions in the table are those of the draped shell
+    "popped_pinned": ", pinned ends (free to turn; directions as on the target)",
+    "popped_clamped": ", clamped ends (directions held)",
+}
 FINER = {"bracing": 0.5}  # smallest texts of a drawing at 1:1 over those of the plan, where more of them find room
 
 
@@ -55,15 +60,15 @@ def drawing_set(archive: Archive) -> dict[str, Drawing]:
 def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
     """All sheets in mm of paper, and the paper's size."""
     results, plan, paper = archive.results, flat_plan(archive), _paper(archive)
-    layouts = dict(_layouts(archive))
+    layouts, checked = dict(_layouts(archive)), _checked(results)
     sheets = [*layouts.pop("plan").sheets(paper), *_strips(plan, paper)]
     for name, layout in layouts.items():
         sheets += layout.sheets(paper)
         if name == "supports":
-            sheets += table("Supports", supports_table(archive, brief=True), paper)
+            sheets += table(f"Supports{_HELD.get(archive.final, '')}", supports_table(archive, brief=True), paper)
         elif name == "bracing":
-            sheets += table("Bracing", bracing_table(archive, brief=True), paper)
-    sheets += table("Rods", rods_table(archive, brief=True), paper)
+            sheets += table(f"Bracing{checked}", bracing_table(archive, brief=True), paper)
+    sheets += table(f"Rods{checked}", rods_table(archive, brief=True), paper)
     sheets += table("Joints", joints_table(archive, brief=True), paper)
     if any(rod.stiffness for rod in results.rods):
         sheets += table("Sections along the rods", sections_table(archive), paper)
@@ -72,6 +77,12 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
     if results.fabrication and results.fabrication.stock:
         sheets += table("Stock", stock_table(archive), paper)
     return bound(sheets, title_block(archive, plan.summary), paper), paper
+
+
+def _checked(results: Results) -> str:
+    """With which ends the final shape is that the bending of rods and the lengths of the bracing are of."""
+    shapes = results.bending.shapes() if results.bending else {}
+    return next((f", final shape with {ends} ends" for ends in ENDS if ends in shapes), "")
 
 
 @made_once

@@ -1,6 +1,7 @@
 """Sheets of paper: a frame with a title block, drawings at a standard scale, split where they are too large.
 
-The title block says what a drawing is, of which rods, by whom, when, to which tolerance, and what it is not.
+The title block says what a drawing is, of which rods, by whom, when, to which tolerance, what it is not, and the
+verdict on the shell where that is not good.
 """
 
 import os
@@ -20,10 +21,13 @@ from rodshell.results import Archive
 from rodshell.results.archive import input_hash
 from rodshell.results.records import Joint, Material, RodType, Section, json_text
 from rodshell.results.results import Drawings
+from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, rounding_of, stress
 
 NOTE = "Design aid, not code compliance"
 NOT_GIVEN = "not given"
+MORE = " (more: report.html)"  # after a verdict that is shortened or has several reasons
+WARNING = "#b3372c"
 COLUMNS = 4  # of entries, side by side
 TRUE_SIZE = ", 1:1"  # after the title of a drawing in a separate file
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
@@ -31,6 +35,7 @@ Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
 SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 250, 300, 400, 500, 1000, 2000, 5000)
 FINE = SMALL * TEXT  # of tables and of the title block: capitals of 1.9 mm, the least on a sheet
 MARGIN, BLOCK = 10.0, 34.0  # around the frame; height of the title block
+ROW = 1.45 * FINE  # from line to line of the title block
 LEADING = 1.9 * FINE  # from line to line of a table
 OVERLAP = 10.0  # mm of paper that a sheet shows beyond its match lines
 MOST_TILES = 12  # sheets that the parts of one drawing may take
@@ -44,11 +49,19 @@ class TitleBlock:
     ----------
     entries : what it is called and what it is: project, author, date, section, material, ...
     summary : the cut list in one line.
+    verdict : level and first reason of a verdict that is not good, with `MORE` where there are others; else "".
     """
 
     name: str
     entries: tuple[tuple[str, str], ...]
     summary: str
+    verdict: str = ""
+
+    def verdict_within(self, width: float, size: float) -> str:
+        """The verdict in a line of at most a width [mm] in a size [mm]."""
+        if len(self.verdict) <= int(width / (LETTER * size)):
+            return self.verdict
+        return shortened(self.verdict.removesuffix(MORE), width - len(MORE) * LETTER * size, size) + MORE
 
     def notes(self, drawing: Drawing) -> list[str]:
         """The lines below the entries of a drawing; the last names what it leaves out."""
@@ -81,7 +94,9 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
         ("Input", input_hash(source, archive.inputs)),
         ("Made by", f"rodshell {results.version_rodshell or '(version unknown)'}"),
     )
-    return TitleBlock(given.name or archive.name, entries, summary)
+    found = verdict_of(results)
+    verdict = "" if found.level == "good" else found.headline + (MORE if len(found.reasons) > 1 else "")
+    return TitleBlock(given.name or archive.name, entries, summary, verdict)
 
 
 def today() -> date:
@@ -133,6 +148,9 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     )
     for k, line in enumerate(lines, start=1):
         pencil.write(line, (left, y - 1.5 * k * size), size, "TITLE")
+    if block.verdict:
+        lines.append(block.verdict_within(max(right - left, max(map(len, lines)) * LETTER * size), size))
+        pencil.write(lines[-1], (left, y - 1.5 * len(lines) * size), size, "TITLE", bold=True, colour=WARNING)
     end = left + max(right - left, 0.25 * (right - left) + 4 * size)
     scale_bar(pencil, end, y - (1.5 * len(lines) + 2) * size, 0.25 * (right - left), size, 1.0)
     return drawing + pencil.done("", "", size)
@@ -418,14 +436,19 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
     )  # fmt: skip
     top = MARGIN + BLOCK
     pencil.line([(MARGIN, top), (width - MARGIN, top)], "TITLE", pen=Pen(INK, 0.35))
-    left, right, y = MARGIN + 4, width - MARGIN - 4, top - 7.0
+    left, right, y = MARGIN + 4, width - MARGIN - 4, top - 6.5
     title = shortened(f"{block.name}: {sheet.title}", right - left - 80, 5.0)
     pencil.write(title, (left, y), 5.0, "TITLE", bold=True)
     pencil.write(f"Sheet {number} of {count}", (right, y), TEXT, "TITLE", anchor="end")
-    y = write_entries(pencil, block, left, y - 6.2, right - left, FINE, 1.7 * FINE)
+    y = write_entries(pencil, block, left, y - 5.9, right - left, FINE, ROW)
     for k, line in enumerate(block.notes(sheet.content)):
         written = shortened(line, right - left - 75, FINE)
-        pencil.write(written, (left, y - 0.4 - 1.7 * FINE * k), FINE, "TITLE", colour=SOFT if k == 0 else "#b3372c")
+        pencil.write(written, (left, y - 0.3 - ROW * k), FINE, "TITLE", colour=SOFT if k == 0 else WARNING)
+    if block.verdict:
+        written = block.verdict_within(right - left - 75, FINE)
+        pencil.write(
+            written, (left, y - 0.3 - ROW * len(block.notes(sheet.content))), FINE, "TITLE", bold=True, colour=WARNING
+        )
     if sheet.scale:
         pencil.write(f"Scale 1:{sheet.scale:g}", (right - 38, top - 7.0), TEXT, "TITLE", anchor="end")
         scale_bar(pencil, right, MARGIN + 5.2, 60.0, TEXT, sheet.scale)
@@ -447,7 +470,7 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
     paths = [path.points for path in part.paths if not within(path.points, low, high)]
     ends = [points[:-1] for points in paths], [points[1:] for points in paths]
     drawn = np.stack([np.concatenate([np.empty((0, 2)), *points]) for points in ends], axis=1)
-    pen = Pen("#b3372c", 0.25, (6.0, 1.5, 1.0, 1.5))
+    pen = Pen(WARNING, 0.25, (6.0, 1.5, 1.0, 1.5))
     sides: tuple[tuple[bool, tuple[int, int], list[Floats], tuple[float, float], float], ...] = (
         (bool(row > 0), (row - 1, column), [np.array([low[0], high[1]]), high], (0.0, 1.5), 0.0),
         (bool(row < count[1] - 1), (row + 1, column), [low, np.array([high[0], low[1]])], (0.0, -1.5 - TEXT), 0.0),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
+from textwrap import wrap
 
 import numpy as np
 
@@ -25,9 +26,10 @@ from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.grid import joint_places, outlines_of, rods_of
 from rodshell.output.labels import Room, callouts, closed_segments, outward, runs_through, upright
 from rodshell.output.schedules import seam_meetings
-from rodshell.results import Archive
+from rodshell.results import Archive, Results
 from rodshell.results.results import Brace
-from rodshell.results.wording import Rounding, nice_ticks, rounding_of
+from rodshell.results.verdict import unknown_below
+from rodshell.results.wording import Rounding, nice_ticks, rounding_of, whole_percent
 
 SUPPORTS_LEGEND = (
     "Red: where each rod ends and how it continues. A thin line leads to its name: rod.0 its start, rod.1 its end.",
@@ -35,6 +37,7 @@ SUPPORTS_LEGEND = (
 )
 RADIUS, TICK = 0.3, 0.8  # radius of a support's mark, and how far its rod's direction is drawn, in text sizes
 NUMBER_SIZES = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
+NARROW = 40  # letters in a line below the paths of the rod ends
 SAME = 0.01  # mm: lines as near as this to each other are drawn once
 CLEAR = 0.2  # of its size, between a number and the middle of its cell
 SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, and its baseline off it in its sizes
@@ -101,6 +104,8 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     low, high = bounds(ways.reshape(-1, 2))
     pencil.write("Paths of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
     pencil.write("Closed lines: the ends at each stage", (low[0], low[1] - 4.8 * text), text, "LABEL")
+    for k, line in enumerate(wrap(_not_known(archive.results), NARROW)):
+        pencil.write(line, (low[0], low[1] - (6.6 + 1.4 * k) * text), text, "LABEL", bold=True, colour="#b3372c")
     left, top = high[0] + 8 * text, high[1]
     for k, (stage, positions) in enumerate(zip(stages, history, strict=True)):
         if k == len(stages) // 2 + 1:
@@ -114,7 +119,24 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
         words = f"{k}: deployment {100 * stage.share:.0f} %, {mm(stage.height)} mm high"
         pencil.write(words, (left, top - tall - 1.8 * text), text, "LABEL")
         top -= tall + 5 * text
-    return pencil.done("erection", "Erection stages, front elevations", text)
+    title = "Erection stages, front elevations"
+    if share := unknown_below(archive.results):
+        title += f"; not known below {whole_percent(share)}"
+    return pencil.done("erection", title, text)
+
+
+def _not_known(results: Results) -> str:
+    """Between which stages of the deployment the shape is not known; "" where all were followed."""
+    unknown, guided = unknown_below(results), results.deployment.guided if results.deployment else None
+    said = []
+    if unknown:
+        said.append(
+            f"The deployment could not be followed: no stage is known between flat and {whole_percent(unknown)} of it."
+        )
+    if guided:
+        start, stop = map(whole_percent, guided)
+        said.append(f"Between {start} and {stop} it has to be guided, and its shape is not known.")
+    return " ".join(said)
 
 
 def thinned(curve: Floats) -> Floats:
