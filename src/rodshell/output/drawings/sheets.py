@@ -29,6 +29,7 @@ NOT_GIVEN = "not given"
 MORE = " (more: report.html)"  # after a verdict that is shortened or has several reasons
 WARNING = "#b3372c"
 COLUMNS = 4  # of entries, side by side
+BAR = 95.0  # width that is left to the scale bar and its numbers [mm]
 TRUE_SIZE = ", 1:1"  # after the title of a drawing in a separate file
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
 
@@ -442,10 +443,10 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
     pencil.write(f"Sheet {number} of {count}", (right, y), TEXT, "TITLE", anchor="end")
     y = write_entries(pencil, block, left, y - 5.9, right - left, FINE, ROW)
     for k, line in enumerate(block.notes(sheet.content)):
-        written = shortened(line, right - left - 75, FINE)
+        written = shortened(line, right - left - BAR, FINE)
         pencil.write(written, (left, y - 0.3 - ROW * k), FINE, "TITLE", colour=SOFT if k == 0 else WARNING)
     if block.verdict:
-        written = block.verdict_within(right - left - 75, FINE)
+        written = block.verdict_within(right - left - BAR, FINE)
         pencil.write(
             written, (left, y - 0.3 - ROW * len(block.notes(sheet.content))), FINE, "TITLE", bold=True, colour=WARNING
         )
