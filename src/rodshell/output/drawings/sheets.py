@@ -29,7 +29,7 @@ NOT_GIVEN = "not given"
 MORE = " (more: report.html)"  # after a verdict that is shortened or has several reasons
 WARNING = "#b3372c"
 COLUMNS = 4  # of entries, side by side
-BAR = 95.0  # width that is left to the scale bar and its numbers [mm]
+BAR = 60.0  # length of the scale bar [mm], about
 TRUE_SIZE = ", 1:1"  # after the title of a drawing in a separate file
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
 
@@ -188,6 +188,16 @@ def shortened(text: str, width: float, size: float) -> str:
     return text if len(text) <= letters else text[: letters - 1].rstrip() + "\N{HORIZONTAL ELLIPSIS}"
 
 
+def bar_length(longest: float, scale: float) -> float:
+    """The round length of a scale bar [mm of the sheet].
+
+    Parameters
+    ----------
+    longest, scale : as of `scale_bar`.
+    """
+    return nice_step(scale * longest, 2) * 2 / scale
+
+
 def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
     """A bar of a round length of at most about `longest` [mm of the sheet], ending at `right`, at 1:`scale`.
 
@@ -198,7 +208,7 @@ def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: floa
     text : size of its numbers [mm of the sheet].
     scale : lengths of the object over those of the sheet.
     """
-    length = nice_step(scale * longest, 2) * 2 / scale
+    length = bar_length(longest, scale)
     for k in range(4):
         x = right - length + k * length / 4
         corners = np.array([[x, y], [x + length / 4, y], [x + length / 4, y + 0.4 * text], [x, y + 0.4 * text]])
@@ -442,17 +452,18 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
     pencil.write(title, (left, y), 5.0, "TITLE", bold=True)
     pencil.write(f"Sheet {number} of {count}", (right, y), TEXT, "TITLE", anchor="end")
     y = write_entries(pencil, block, left, y - 5.9, right - left, FINE, ROW)
+    room = right - left - (bar_length(BAR, sheet.scale) + 3 * TEXT if sheet.scale else 0.0)
     for k, line in enumerate(block.notes(sheet.content)):
-        written = shortened(line, right - left - BAR, FINE)
+        written = shortened(line, room, FINE)
         pencil.write(written, (left, y - 0.3 - ROW * k), FINE, "TITLE", colour=SOFT if k == 0 else WARNING)
     if block.verdict:
-        written = block.verdict_within(right - left - BAR, FINE)
+        written = block.verdict_within(room, FINE)
         pencil.write(
             written, (left, y - 0.3 - ROW * len(block.notes(sheet.content))), FINE, "TITLE", bold=True, colour=WARNING
         )
     if sheet.scale:
         pencil.write(f"Scale 1:{sheet.scale:g}", (right - 38, top - 7.0), TEXT, "TITLE", anchor="end")
-        scale_bar(pencil, right, MARGIN + 5.2, 60.0, TEXT, sheet.scale)
+        scale_bar(pencil, right, MARGIN + 5.2, BAR, TEXT, sheet.scale)
     return pencil.done("", "", TEXT)
 
 
