@@ -56,6 +56,11 @@ class Joint(Protocol):
         """Whether it prevents its rods from spinning about themselves; a spring in shear alone does not."""
         ...
 
+    @property
+    def resists_shear(self) -> bool:
+        """Whether it transmits moments about its normal, which bend its rods within the shell."""
+        ...
+
 
 @dataclass(frozen=True)
 class Ball:
@@ -72,7 +77,7 @@ class Ball:
     name = "ball"
     shear = out_of_plane = twist = eccentricity = 0.0
     rest_angle = None
-    turns_frames = holds_normals = False
+    turns_frames = holds_normals = resists_shear = False
 
     __repr__ = brief
 
@@ -96,6 +101,7 @@ class Pin:
     shear, out_of_plane, twist = 0.0, inf, inf
     rest_angle = None
     turns_frames = holds_normals = True
+    resists_shear = False
 
     __repr__ = brief
 
@@ -120,7 +126,7 @@ class Rigid:
     mass: float = 0.0
     name = "rigid"
     shear = out_of_plane = twist = inf
-    turns_frames = holds_normals = True
+    turns_frames = holds_normals = resists_shear = True
 
     __repr__ = brief
 
@@ -183,6 +189,11 @@ class Spring:
         """Whether it prevents its rods from spinning about themselves: stiffness in shear alone does not."""
         return self.out_of_plane + self.twist > 0 or self.eccentricity != 0.0
 
+    @property
+    def resists_shear(self) -> bool:
+        """Whether it transmits moments about its normal, which bend its rods within the shell."""
+        return self.shear > 0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Linker:
@@ -204,7 +215,7 @@ class Linker:
     mass: float = 0.0
     name = "linker"
     eccentricity = 0.0
-    turns_frames = holds_normals = True
+    turns_frames = holds_normals = resists_shear = True
 
     __repr__ = brief
 
