@@ -231,7 +231,7 @@ class Job:
             of the factorisations that the form took, so that it tries fewer starts after a warm start.
         progress : called as progress(stage, detail, residual) at every iteration.
         time_limit : [s] after which the job ends, at its next iteration, with what was found until then.
-        announce : called with a sentence for each value that the job chose itself, before the form is computed.
+        announce : called with a sentence for each value that the job chose itself, as soon as it is known.
         until : the last stage that is run now. With "drape" the form has the flat grid, but no popped-up shells; as
             `warm_start` of the next run it saves the drape. With "pop-up", checks and fabrication are made when first
             asked for.

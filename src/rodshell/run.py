@@ -10,7 +10,7 @@ from rodshell.case import Case
 from rodshell.case.case import Built, built
 from rodshell.case.rod_ends import RodEnds
 from rodshell.form import Form, Stages
-from rodshell.formfinding import Fall, PatchForm, find_stages, pop_up_stages
+from rodshell.formfinding import Bound, Fall, PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
 from rodshell.formfinding.search import Search, search
 from rodshell.progress import Progress
@@ -44,6 +44,11 @@ STAGES: dict[str, tuple[str, ...]] = {
 
 DECIDED_BY = ("target", "layout", "rod", "joint", "drape", "seams", "checks")
 """Tables that decide what a case leaves open: anchor, heading and rod."""
+
+SIZED_BY = (*DECIDED_BY, "pop_up", "strength")
+"""Tables that decide a section that is chosen by the bends of pop-ups."""
+
+MOST_SIZES = 6  # that are popped up: of like sections the second is right; with elastic joints up to four were needed
 
 
 class Run:
@@ -85,13 +90,17 @@ class Run:
         case, found = self.asked, self.asked.build(self.target)
         self._announce_sizes(found)
         case, found, searched = self._decided(case, found)
-        self._announce_rod(
-            found.rod,
-            lambda: case.fit_on(found.target, found.layout, anchor=None if case.seams.lines else found.anchor),
-        )
-        case = case.with_rod(found.rod)
+        rod, fit, stages, tried = found.rod, None, None, found._replace(method=Bound())
+        if case.rod.left_open:
+            fit = case.fit_on(found.target, found.layout, anchor=None if case.seams.lines else found.anchor)
+        if fit and found.joint.resists_shear and found.ends and self.pops_up and self._sizes(rod):
+            rod, fit, stages = self._sized(rod, fit, partial(self._stages, case, tried))
+            case.require_strength(rod, found.joint)
+        self._announce_rod(rod, fit)
+        if stages is None or found.method != tried.method:
+            stages = self._stages(case, found, rod)
+        case = case.with_rod(rod)
         same = self._unchanged(case)
-        stages = self._patches(case, found, same) if case.seams.lines else self._one_piece(case, found, same)
         return self._made(case, stages, searched, same, self._refined(case, stages, same))
 
     def table_form(self) -> Form:
@@ -101,15 +110,72 @@ class Run:
         case = self.asked
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
-        fit = partial(Fit.between, ends.lengths, ends.final, ends.grid.joint_counts())
-        rod = case.rod.held.value if case.rod.held else case.rod.build(fit, strength=case.permanent_strength)
+        fit, stages = Fit.between(ends.lengths, ends.final), None
+        rod = case.rod.held.value if case.rod.held else case.rod.build(lambda: fit, strength=case.permanent_strength)
+        if self._sizes(rod):
+            rod, fit, stages = self._sized(rod, fit, self._table_stages)
         self._announce_rod(rod, fit)
+        stages = stages or self._table_stages(rod)
         case = case.with_rod(rod)
-        same = self._unchanged(case)
-        joint, stages = built(case.joint), self.earlier.stages if self.earlier is not None else None
-        if not (isinstance(stages, PatchForm) and "pop-up" in same and stages.finished_pop_ups(stages.ends)):
-            stages = pop_up_stages(ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress)
-        return self._made(case, stages, None, same)
+        return self._made(case, stages, None, self._unchanged(case))
+
+    def _sizes(self, rod: Rod) -> bool:
+        """Whether a section was left open and its material has a strength by which it can be chosen."""
+        table, material = self.asked.rod, rod.material
+        left_open = table.held is None and "section" in table.left_open
+        return left_open and material is not None and self.asked.permanent_strength(material) is not None
+
+    def _sized(self, rod: Rod, estimate: "Fit", stages_of: Callable[[Rod], Stages]) -> "tuple[Rod, Fit, Stages]":
+        """The rod whose section is chosen by the bends of shells popped up with it; what it fits; those shells.
+
+        Parameters
+        ----------
+        rod : provisional, of which the first shell is made.
+        estimate : what decided it.
+        stages_of : the shells of a rod.
+        """
+        fit, weight, before = estimate, self.options.judged_by(rod).shear_weight, self._sized_before()
+        rod = before or rod
+        assert rod.material is not None
+        strength, stages = self.asked.permanent_strength(rod.material), stages_of(rod)
+        assert strength is not None
+        for popped_before in range(MOST_SIZES):
+            if stages.status != "converged":
+                break
+            shells = [shell for piece in _pieces(stages) for shell in piece.popped.values()]
+            fit = estimate.by_pop_ups(shells, rod, shear_weight=weight)
+            section = fit.section(rod.material, strength=strength, shape=self.asked.rod.shape)
+            chosen_so = popped_before > 0 or before is not None
+            if section == rod.section or (chosen_so and fit.allows(rod, strength)):
+                break
+            if popped_before + 1 < MOST_SIZES:
+                rod = Rod(section, rod.material)
+                stages = stages_of(rod)
+        return rod, fit, stages
+
+    def _sized_before(self) -> Rod | None:
+        """The rod of the earlier form, if its section was chosen by pop-ups and nothing that decided it has changed."""
+        earlier = self.earlier
+        if earlier is None or not self._same(earlier, SIZED_BY):
+            return None
+        stages = earlier.unrefined
+        return stages.rod if stages.status == "converged" and stages.popped else None
+
+    def _table_stages(self, rod: Rod) -> PatchForm:
+        case, earlier = self.asked.with_rod(rod), self.earlier
+        assert case.target.held is not None
+        ends: RodEnds = case.target.held.value
+        stages = earlier.stages if earlier is not None else None
+        if isinstance(stages, PatchForm) and "pop-up" in self._unchanged(case) and stages.finished_pop_ups(stages.ends):
+            return stages
+        joint = built(case.joint)
+        return pop_up_stages(ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress)
+
+    def _stages(self, case: Case, found: Built, rod: Rod) -> Stages:
+        """The shells of a rod on a target, of which those of the earlier form are taken over that are the same."""
+        same = self._unchanged(case.with_rod(rod))
+        made = found._replace(rod=rod)
+        return self._patches(case, made, same) if case.seams.lines else self._one_piece(case, made, same)
 
     def _one_piece(self, case: Case, found: Built, same: Sequence[str]) -> PatchForm:
         method = found.method
@@ -240,15 +306,15 @@ class Run:
             name = self.asked.drawings.name or found.target.name
             self.announce(f"{name}, {length_text(2 * found.target.size)} wide; {said}")
 
-    def _announce_rod(self, rod: Rod, fit: "Callable[[], Fit]") -> None:
+    def _announce_rod(self, rod: Rod, fit: "Fit | None") -> None:
         """A rod of which the case left something open, and what decided its size."""
         left_open = self.asked.rod.left_open
-        if not left_open or self.announce is None:
+        if not left_open or fit is None or self.announce is None:
             return
         said = f"rod: {rod_text(rod_type(rod))}; {chosen(left_open)}"
         if "section" in left_open and rod.material and not isinstance(rod.section, GivenSection):
             strength = self.asked.permanent_strength(rod.material)
-            why = fit().reason(rod.section, rod.material, strength=strength, shape=self.asked.rod.shape)
+            why = fit.reason(rod.section, rod.material, strength=strength, shape=self.asked.rod.shape)
             said += f", {why}"
         self.announce(said)
 
@@ -256,6 +322,11 @@ class Run:
 def inputs_of(case: Case) -> dict[str, bytes]:
     """What the files that a case names hold, by their path in its text."""
     return read_inputs(case.text()) if case.files else {}
+
+
+def _pieces(stages: Stages) -> tuple[PatchForm, ...]:
+    """The form of each patch, or the only one."""
+    return (stages,) if isinstance(stages, PatchForm) else tuple(stages.patches.values())
 
 
 def _same_drapes(now: Stages, before: Stages) -> bool:
@@ -271,7 +342,7 @@ def _same_drapes(now: Stages, before: Stages) -> bool:
 
 def _same_pop_ups(now: Stages, before: Stages) -> bool:
     """Whether all pop-ups of a form are those of an earlier one, which has no others."""
-    pieces = [(form,) if isinstance(form, PatchForm) else tuple(form.patches.values()) for form in (now, before)]
+    pieces = [_pieces(form) for form in (now, before)]
     if now.ends != before.ends or len(pieces[0]) != len(pieces[1]):
         return False
     pairs = zip(*pieces, strict=True)

@@ -32,7 +32,7 @@ LITERATURE: dict[str, tuple[Range, Range, Range]] = {
 }
 HOPEFUL = ("garden pavilion", "dome", "barrel vault", "freeform, OBJ", "freeform, 3dm", "ball below its equator")
 ROOF = "3*cos(x/6)*cos(y/5)"
-BECAUSE = ("not given: chosen to fit", "the permanent strength", "an estimate of the bends")
+BECAUSE = ("not given: chosen to fit", "the permanent strength")
 
 
 def preset_rows() -> Iterator[Row]:

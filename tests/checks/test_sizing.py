@@ -1,6 +1,5 @@
 """A rod that is not given: its material by name, its section by the bends of the target's net."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +8,12 @@ import pytest
 
 import rodshell as rs
 from rodshell.case import load_case
-from rodshell.checks.sizing import Bends, Fit, bends_of, net_bends
+from rodshell.case.rod_ends import RodEnds
+from rodshell.checks.bending import bending_of
+from rodshell.checks.sizing import Bends, Fit, bends_of, bends_of_pop_ups, largest_strain, net_bends
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
+from rodshell.layout import straight_rods
 from rodshell.results.summary import summary_text
 from rodshell.results.wording import percent
 from rodshell.rods.section import TRADE_SIZES
@@ -156,7 +158,7 @@ def test_the_rod_that_was_chosen_is_announced_said_in_the_summary_and_kept(
     assert "gfrp, E = 23 GPa" in announced
     chosen = "material and section were not given: chosen to fit, "
     assert (
-        f"{chosen}by an estimate of the bends, which aims at 75 % of the permanent strength at most and comes to "
+        f"{chosen}by an estimate of the bends, aiming at 75 % of the permanent strength at most and coming to "
         in announced
     )
     assert "; the next size that is sold, a tube of 76 x 6 mm, would use 87 % at the sharpest bend" in announced
@@ -168,10 +170,7 @@ def test_the_rod_that_was_chosen_is_announced_said_in_the_summary_and_kept(
     assert saved.results.plain()["bending"]["strength_of"] == "gfrp"
     used = saved.results.plain()["bending"]["clamped"]["utilisation"]
     assert used <= 1
-    assert (
-        f"{chosen}sized for the permanent strength by an estimate of the bends; reached {percent(used)} in the final"
-        in said.out
-    )
+    assert f"{chosen}sized for the permanent strength; reached {percent(used)} in the final" in said.out
     again = load_case(Path(out) / "case.toml")
     assert again.rod.left_open == ()
     assert again.build().rod.parameters() == {key: saved.results.plain()["rod"][key] for key in ("section", "material")}
@@ -193,7 +192,7 @@ def table_of_rods(path: Path, rods: int, share: float) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rods", "share"), [(4, 0.92), (8, 0.92), (8, 0.98)])
+@pytest.mark.parametrize(("rods", "share"), [(4, 0.92), (8, 0.92), (8, 0.98), (18, 0.95)])
 def test_rods_of_a_table_use_what_they_are_chosen_for_and_the_summary_says_so(
     rods: int, share: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -202,10 +201,123 @@ def test_rods_of_a_table_use_what_they_are_chosen_for_and_the_summary_says_so(
     main(["popup", table, "--unit", "m", "--rod.material.preset", "larch", "--checks.stages", "0", "--out", out])
     said = capsys.readouterr()
     used = rs.read(out).results.plain()["bending"]["pinned"]["utilisation"]
-    estimate = float(re.findall(r"75 % of the permanent strength at most and comes to (\d+) %", said.err)[0]) / 100
-    assert 0.8 * estimate < used < 1.2 * estimate
-    assert 0.2 < used < 1
+    assert 0.75 / 2 < used <= 0.75
+    assert (
+        f"by the bends of a pop-up, aiming at 75 % of the permanent strength at most and coming to {percent(used)}"
+        in (said.err)
+    )
     assert f"reached {percent(used)} in the final shape" in said.out
+
+
+def permanent_use(form: rs.Form) -> float:
+    """Share of larch's permanent strength (0.6/1.3 of 30 MPa) by the largest stress in any popped-up shell."""
+    shells = form.stages.popped.values()
+    stresses = [bending_of(shell.shell, shell.state, form.rod, shear_weight=30 / 4).stress for shell in shells]
+    assert all(stress is not None for stress in stresses)
+    return max(float(stress.max()) for stress in stresses if stress is not None) / (30e6 * PERMANENT["larch"])
+
+
+def net_table(target: rs.Target, spacing: float) -> RodEnds:
+    """Rods whose ends lie on a target where its net has them, so that each bends as the target does."""
+    layout = rs.GridLayout.orthogonal(spacing=spacing)
+    stages = rs.find_form(target, layout, rs.Rod(rs.Circle(0.005), rs.Material.preset("gfrp")), ends=()).stages
+    flat = np.array([rod.point([rod.start, rod.end]) for rod in stages.footprint.mesh.grid.rods])
+    return RodEnds(straight_rods(flat), stages.boundary.points.reshape(-1, 2, 3))
+
+
+@pytest.mark.parametrize("spacing", [1.6, 0.9])
+def test_rods_of_a_table_with_many_joints_are_as_thick_as_those_with_few(spacing: float) -> None:
+    """On a cap of radius 12 m laths bend by 1/12 m and in their own plane not at all; ends bend a quarter more."""
+    form = rs.Job.of_table(net_table(rs.Cap(radius=12.0, base=10.5), spacing), rod__material__preset="larch").run(
+        until="pop-up"
+    )
+    assert form.status == "converged"
+    assert 0.75 / 2 < permanent_use(form) <= 0.75
+    section = form.rod.section
+    assert isinstance(section, rs.RectangularSection)
+    strain = 30e6 * PERMANENT["larch"] / form.rod.material.youngs_modulus  # type: ignore[union-attr]
+    assert section.width / 2 / 12.0 < 0.75 * strain < 2 * 1.25 * section.width / 2 / 12.0
+
+
+@pytest.mark.parametrize("joint", [rs.Ball(), rs.Rigid()])
+def test_shells_of_any_size_of_rod_bend_alike(joint: rs.Ball | rs.Rigid) -> None:
+    """Moments grow with EI; what is left is stretch, as the square of slenderness."""
+    target, layout = half_sphere(5.0)
+    shapes = []
+    for radius in (1e-3, 4e-3):
+        rod = rs.Rod(rs.Circle(radius), rs.Material.preset("gfrp"))
+        form = rs.find_form(target, layout, rod, joint=joint, ends=("pinned",))
+        shapes.append(bends_of_pop_ups(form.stages.popped.values(), rod))
+    thin, thick = shapes
+    for one, other in zip(thin[:3], thick[:3], strict=True):
+        assert np.abs(one - other).max() <= 0.01 * np.abs(other).max()
+
+
+@pytest.mark.parametrize("keys", [{}, {"rod.section.kind": "circle"}])
+def test_moments_of_rigid_joints_count_when_a_section_is_chosen(keys: dict[str, str]) -> None:
+    """By the net alone the laths would use three times the permanent strength."""
+    said = list[str]()
+    rigid = {"joint.kind": "rigid", "layout.spacing": "0.9 m", "rod.material.preset": "larch", **keys}
+    job = rs.Job.of_case(roof(**rigid))
+    form = job.run(until="pop-up", announce=said.append)
+    assert form.status == "converged"
+    used = permanent_use(form)
+    assert 0.75 / 2 < used <= 0.75
+    assert (
+        f"by the bends of a pop-up, aiming at 75 % of the permanent strength at most and coming to {percent(used)}"
+        in (said[-1])
+    )
+    by_net = rs.Rod(job.case.build().rod.section, form.rod.material)
+    thick = rs.find_form(form.target, form.layout, by_net, joint=rs.Rigid(), ends=("clamped",))
+    assert permanent_use(thick) > 1.5
+    assert form.case.rod.left_open == ()
+    solved = list[str]()
+    again = job.run(until="pop-up", warm_start=form, progress=lambda stage, *_: solved.append(stage))
+    assert again.rod == form.rod
+    assert "pop-up" in again.reused
+    assert not {"drape", "pop-up"} & set(solved)
+
+
+def test_without_a_pop_up_rigid_joints_are_said_not_to_be_in_the_estimate() -> None:
+    said = list[str]()
+    rs.Job.of_case(roof(**{"joint.kind": "rigid"})).run(until="drape", announce=said.append)
+    assert "chosen to fit, by an estimate of the bends without the moments of the joints, aiming at 75 %" in said[-1]
+
+
+def test_elastic_joints_bend_thin_rods_more_than_thick_ones_and_the_section_that_is_kept_is_checked() -> None:
+    """The stiffness of the joints stays, while EI falls with the fourth power of the radius."""
+    spring = {"joint.kind": "spring", "joint.shear": "20 N m/rad", "joint.out_of_plane": "5 kN m/rad"}
+    keys = {**spring, "layout.spacing": "0.9 m", "rod.material.preset": "larch", "rod.section.kind": "circle"}
+    saddle = {"target.formula": "2 + 0.08*x^2 - 0.1*y^2", "target.size": "8 m, 7 m"}
+    form = rs.Job.of_case(roof(**saddle, **keys)).run(until="pop-up")
+    assert form.status == "converged"
+    assert 0.75 / 2 < permanent_use(form) <= 0.75
+
+
+def test_a_bolt_as_wide_as_the_rod_that_rigid_joints_leave_room_for_is_refused() -> None:
+    """The net alone would have allowed laths of 8 x 20 mm."""
+    keys = {"joint.kind": "rigid", "layout.spacing": "0.9 m", "rod.material.preset": "larch", "strength.hole": "8 mm"}
+    with pytest.raises(InputError, match="hole"):
+        rs.Job.of_case(roof(**keys)).run(until="pop-up")
+
+
+def test_torsion_counts_where_rods_are_twisted_and_hardly_bent() -> None:
+    """On z = c x y rods along the axes are straight, and pins twist them by c per length at the middle; a round rod's
+    stress is that of bending and torsion at its outline [Timoshenko and Goodier, section 101]."""
+    c = 0.1
+    target = rs.HeightField(formula=f"{c}*x*y", domain=rs.Rectangle((6.0, 6.0)))
+    rod = rs.Rod(rs.Circle(0.01), rs.Material.preset("larch"))
+    form = rs.find_form(
+        target, rs.GridLayout.orthogonal(spacing=1.0), rod, anchor=(0.0, 0.0), joint=rs.Pin(), ends=("pinned",)
+    )
+    bends = bends_of_pop_ups(form.stages.popped.values(), rod)
+    assert np.abs(bends.twist).max() == pytest.approx(c, rel=0.1)
+    assert np.hypot(bends.normal, bends.geodesic).max() < 0.3 * c
+    alone = Bends(np.array([0.02]), np.array([0.0]), np.array([0.1]))
+    assert rod.material is not None
+    young, shear = rod.material.youngs_modulus, rod.material.shear_modulus
+    expected = 0.01 * np.hypot(0.02, 7.5 * shear / young * 0.1)
+    assert largest_strain(rod, alone, shear_weight=7.5) == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_summary_claims_no_share_of_the_strength_that_is_not_so(tmp_path: Path) -> None:
@@ -214,7 +326,7 @@ def test_a_summary_claims_no_share_of_the_strength_that_is_not_so(tmp_path: Path
     main(["popup", table, "--unit", "m", "--checks.stages", "0", "--quiet", "--out", out])
     found = rs.read(out).results
     bent = found.bending.model_copy(update={"pinned": found.bending.pinned.model_copy(update={"utilisation": 0.98})})
-    assert "sized for the permanent strength by an estimate of the bends; reached 98 % in the final" in (
+    assert "sized for the permanent strength; reached 98 % in the final" in (
         summary_text(found.model_copy(update={"bending": bent}))
     )
 
@@ -266,17 +378,17 @@ def test_a_given_strength_wins_over_the_presets(tmp_path: Path, capsys: pytest.C
     assert bending["clamped"]["utilisation"] == bending["clamped"]["max_stress"] / 80e6
 
 
-def test_a_table_of_rods_is_sized_by_how_far_its_ends_come_together() -> None:
+def test_the_provisional_rod_of_a_table_is_sized_by_how_far_its_ends_come_together() -> None:
     """A rod whose tangent turns by 0.3 cos(pi s / L) is bent by 0.3 pi / L at its middle; its chord is the integral."""
     s = (np.arange(1000) + 0.5) / 1000
     chord = 2.0 * float(np.mean(np.cos(0.3 * np.cos(np.pi * s))))
-    fit = Fit.between(np.array([2.0]), np.array([[[0.0, 0.0, 0.0], [chord, 0.0, 0.0]]]), [0])
+    fit = Fit.between(np.array([2.0]), np.array([[[0.0, 0.0, 0.0], [chord, 0.0, 0.0]]]))
     np.testing.assert_allclose(fit.bends().normal, 0.3 * np.pi / 2.0, rtol=0.01)  # theta^2 / 32 of it
     assert fit.preset == "gfrp"
 
 
 def test_a_table_whose_rods_bend_to_rings_still_has_a_size() -> None:
-    fit = Fit.between(np.array([2.0]), np.zeros((1, 2, 3)), [0])
+    fit = Fit.between(np.array([2.0]), np.zeros((1, 2, 3)))
     assert 0 < fit.section(rs.Material.preset("petg")).depth < 0.01
 
 

@@ -94,6 +94,8 @@ class FakeFinder:
     def stand_in(self, monkeypatch: pytest.MonkeyPatch) -> None:
         for name in ("find_stages", "pop_up_stages"):
             monkeypatch.setattr(rodshell.run, name, lambda *args, **options: self.find_stages(*args, **options))
+        unsized = "_sized", lambda run, rod, estimate, stages_of: (rod, estimate, stages_of(rod))  # nothing bends here
+        monkeypatch.setattr(rodshell.run.Run, *unsized)
         monkeypatch.setattr(rodshell.run, "Form", FakeForm)
         monkeypatch.setattr("rodshell.output.files.save", lambda archive, *args, **more: archive.save(*args, **more))
 

@@ -233,6 +233,11 @@ class Case(Table):
                 f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
             )
         rod = self.rod_on(target, layout, anchor=anchor)
+        self.require_strength(rod, joint)
+        return Built(target, layout, rod, joint, method, anchor, self.ends)
+
+    def require_strength(self, rod: "Rod", joint: "Joint") -> None:
+        """InputError where what is said of the strength does not suit the rod, such as bolts as wide as it."""
         options = self.output_options()
         options.require_known_stress(rod, joint)
         if self.strength != StrengthTable():
@@ -242,7 +247,6 @@ class Case(Table):
             options.limits(rod, strength)
             if strength.hole:
                 net_section(rod.section, strength.hole)
-        return Built(target, layout, rod, joint, method, anchor, self.ends)
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""

@@ -1,47 +1,63 @@
-"""A rod that fits its target: the section that withstands the bends of the target's net in a given material."""
+"""A rod that fits: the thickest section of a given material that withstands the bends of its shell.
 
-from collections.abc import Callable
-from dataclasses import dataclass
+The shape of a shell of equal rods does not depend on their size, since rods bend and twist, and hardly stretch: all
+moments grow with EI, those of rigid joints too. So the curvatures of a shell popped up with a provisional rod are those
+of any other size, and its strains are in proportion to it. Only proportions matter: of bending about either axis and
+torsion (laths of other proportions, tubes), and of elastic joints to rods. A section chosen in this way is therefore
+popped up itself, and chosen again where it uses too much.
+
+Shells with ball joints and pins bend as the net of their target does, and are sized by it before anything is solved.
+What joints that resist shear add is not in the net; and what a table of rods bends to follows from all its rods: the
+arc over a single rod's chord is right only where the ends of all rods belong to one net.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
-from rodshell.checks.bending import fibre_strain
+from rodshell.checks.bending import VON_MISES, bending_of, largest_stress
 from rodshell.errors import InputError, NetLimitError
+from rodshell.formfinding.popup import PopUp
 from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.materials import Material, PresetName
-from rodshell.rods.section import TRADE_SIZES, Circle, Rod, Section, Tube, scaled, size_text
+from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, Tube, scaled, size_text
 from rodshell.targets import Target
 from rodshell.units import length_text, rounded_down
 
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
 SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker
-# Of the permanent strength, by the bends of the net: an estimate, since the free shell bends up to 1.2 times as sharply
-# (measured on the gallery), a clamped barrel 1.35 times at its ends. During deployment flat roofs bend 3 times as
-# sharply, those with several waves more.
+# Of the permanent strength. By the bends of the net it is an estimate, since the free shell bends up to 1.2 times as
+# sharply (measured on the gallery), a clamped barrel 1.35 times at its ends. During deployment flat roofs bend 3 times
+# as sharply, those with several waves more.
 AIM = 3 / 4
-# Rods of a table bend the more sharply the more others they are joined to, which lie low near their own ends: 1.3 to
-# 1.4 times the root of the joints along one, measured on square tables of 4, 8 and 12 rods each way.
-JOINED = 1.4
 ROOM = 1 / 6  # depth of a rod over the spacing: joints need room
-ANY = Material(1.0, 1.0)  # strains do not depend on it
 PLAN = 41  # points each way at which a target without a net is sampled
 
 
 class Bends(NamedTuple):
-    """Curvatures (k,) [1/m] of the rods of a net: out of the target, along its normal, and within it."""
+    """How rods bend, whatever their size.
+
+    Parameters
+    ----------
+    normal, geodesic : (k,) curvatures out of the shell, along its normal, and within it [1/m].
+    twist : (k,) twist per length [rad/m].
+    force : (k,) axial force over EI [1/m2].
+    """
 
     normal: Floats
     geodesic: Floats
+    twist: Floats = np.zeros(1)
+    force: Floats = np.zeros(1)
 
     def rolled(self) -> "Bends":
         """The same of laths that are free to turn about their own axes: they bend towards their thin side alone."""
-        return Bends(np.hypot(self.normal, self.geodesic), np.zeros_like(self.geodesic))
+        return self._replace(normal=np.hypot(self.normal, self.geodesic), geodesic=np.zeros_like(self.geodesic))
 
 
 @dataclass(frozen=True)
@@ -55,6 +71,8 @@ class Fit:
     thickest : largest depth of a rod between its joints [m].
     bends : called if they are needed.
     thickest_of : what that depth is a share of, in words.
+    bends_from : where the bends are taken from, in words.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.bending`.
     """
 
     width: float
@@ -62,6 +80,8 @@ class Fit:
     thickest: float
     bends: Callable[[], Bends]
     thickest_of: str = "a hundredth of half the shell's width"
+    bends_from: str = "an estimate of the bends"
+    shear_weight: float = VON_MISES
 
     @classmethod
     def on(
@@ -88,27 +108,51 @@ class Fit:
             found = bends_of(target, layout, anchor)
             return found if (joint or Ball()).holds_normals else found.rolled()
 
-        crowded = {"thickest_of": "a sixth of the spacing"} if room < 2 * slender else {}
-        return cls(2 * target.size, slender, min(2 * slender, room), bends, **crowded)
+        fit = cls(2 * target.size, slender, 2 * slender, bends)
+        if room < fit.thickest:
+            fit = replace(fit, thickest=room, thickest_of="a sixth of the spacing")
+        if joint is not None and joint.resists_shear:
+            fit = replace(fit, bends_from="an estimate of the bends without the moments of the joints")
+        return fit
 
     @classmethod
-    def between(cls, lengths: Floats, ends: Floats, joints: ArrayLike) -> Self:
-        """By rods of `lengths` (m,) whose ends come to lie at `ends` (m, 2, 3) [m]: each bends like a sine, and more
-        sharply by the number of `joints` (m,) along it.
+    def between(cls, lengths: Floats, ends: Floats) -> Self:
+        """By rods whose ends come to lie at given points: each bends like a sine, as if it were joined to no other.
 
         Parameters
         ----------
         lengths : (m,) of the rods [m].
         ends : (m, 2, 3) where their ends come to lie [m].
-        joints : (m,) number of joints along each rod.
         """
         chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         ring = float(lengths.max()) / np.pi  # of a rod whose ends meet
         width = max(float(np.ptp(ends[:, :, :2], axis=(0, 1)).max()), ring)
         rise = 2 * np.sqrt(np.clip(1 - chords / lengths, 0.0, 1.0))  # amplitude of the tangent's angle [rad]
         slender = SLENDER * width / 2
-        sharper = np.maximum(1.0, JOINED * np.sqrt(joints))
-        return cls(width, slender, 2 * slender, lambda: Bends(sharper * np.pi * rise / lengths, np.zeros(len(lengths))))
+        alone = "an estimate of the bends of single rods"
+        bends = Bends(np.pi * rise / lengths, np.zeros(len(lengths)))
+        return cls(width, slender, 2 * slender, lambda: bends, bends_from=alone)
+
+    def by_pop_ups(self, shells: Iterable[PopUp], rod: Rod, *, shear_weight: float) -> Self:
+        """The same by the bends that shells of a provisional `rod` have in equilibrium.
+
+        Parameters
+        ----------
+        shells : popped up from flat rods that are all alike.
+        rod : of which they are.
+        shear_weight : strength over shear strength of its material.
+        """
+        bends = bends_of_pop_ups(shells, rod)
+        return replace(self, bends=lambda: bends, bends_from="the bends of a pop-up", shear_weight=shear_weight)
+
+    def allows(self, rod: Rod, strength: float) -> bool:
+        """Whether a rod uses at most three quarters of a permanent strength [Pa]."""
+        assert rod.material is not None
+        assert not isinstance(rod.section, GivenSection)
+        return self._strain(rod.section, rod.material) * rod.material.youngs_modulus <= AIM * strength
+
+    def _strain(self, section: Section, material: Material, bends: Bends | None = None) -> float:
+        return largest_strain(Rod(section, material), bends or self.bends(), shear_weight=self.shear_weight)
 
     @property
     def preset(self) -> PresetName:
@@ -137,15 +181,17 @@ class Fit:
         strength = strength or permanent_strength(material)
         if strength is None:
             return Tube(self.slender, shape.thickness) if isinstance(shape, Tube) else Circle(self.slender)
-        bends, allowed = self.bends(), AIM * strength / material.youngs_modulus
+        allowed = AIM * strength / material.youngs_modulus
         stock = _sold(material, shape)
         thin = [section for section in stock if section.depth <= self.thickest]
-        fitting = [section for section in thin if largest_strain(section, bends) <= allowed]
+        fitting = [section for section in thin if self._strain(section, material) <= allowed]
         if fitting:
             return fitting[-1]
         like = shape or (stock[0] if stock else Circle(self.slender))
-        strain = largest_strain(like, bends)
-        most = self.thickest if strain == 0 else min(self.thickest, like.depth * allowed / strain)
+        strain = self._strain(
+            scaled(like, self.thickest / like.depth), material
+        )  # of thinner ones at most in proportion
+        most = self.thickest if strain <= allowed else self.thickest * allowed / strain
         return _of_depth(like, rounded_down(most), wall_stays=shape is not None)
 
     def reason(
@@ -170,27 +216,30 @@ class Fit:
         strength = strength or permanent_strength(material)
         if strength is None:
             return "as slender as the paper's rods, since no strength is known"
-        bends, bears = self.bends(), strength / material.youngs_modulus
+        bears = strength / material.youngs_modulus
 
         def kept_out(other: Section) -> str:
-            used = largest_strain(other, bends) / bears
-            if used <= AIM:
+            used = self._strain(other, material) / bears
+            if other.depth > self.thickest and used <= AIM:
                 return f"{size_text(other)}, is wider than {self.thickest_of}, {length_text(self.thickest)}"
-            rolls = largest_strain(other, bends.rolled()) / bears <= AIM
+            if used <= AIM:
+                return f"{size_text(other)}, would have used more by the bends of an earlier pop-up"
+            rolls = self._strain(other, material, self.bends().rolled()) / bears <= AIM
             edgewise = ", since the joints keep it from rolling and bend it edgewise too" if rolls else ""
             return f"{size_text(other)}, would use {_share(used)} at the sharpest bend{edgewise}"
 
         stock = _sold(material, shape)
-        share = _share(largest_strain(section, bends) / bears)
-        said = f"by an estimate of the bends, which aims at {_share(AIM)} of the permanent strength "
-        said += f"at most and comes to {share}; "
+        share = _share(self._strain(section, material) / bears)
+        said = (
+            f"by {self.bends_from}, aiming at {_share(AIM)} of the permanent strength at most and coming to {share}; "
+        )
         if (section,) == stock[-1:]:
             return said + "no thicker one is sold"
         if section in stock:
             return f"{said}the next size that is sold, {kept_out(stock[stock.index(section) + 1])}"
         if stock:
             return f"{said}no size that is sold fits: the thinnest, {kept_out(stock[0])}"
-        if largest_strain(scaled(section, self.thickest / section.depth), bends) > AIM * bears:
+        if self._strain(scaled(section, self.thickest / section.depth), material) > AIM * bears:
             return said + "a thicker one would use more at the sharpest bend"
         return f"{said}the next step would be wider than {self.thickest_of}, {length_text(self.thickest)}"
 
@@ -226,15 +275,42 @@ def net_bends(net: ChebyshevNet) -> Bends:
     return Bends(np.concatenate(normal), np.concatenate(geodesic))
 
 
-def largest_strain(section: Section, bends: Bends) -> float:
-    """Largest bending strain of the section by such bends [-].
+def bends_of_pop_ups(shells: Iterable[PopUp], rod: Rod) -> Bends:
+    """The bends at every node of every rod, at joints on the side that bends more.
 
     Parameters
     ----------
-    section : of the rods.
-    bends : curvatures (k,) of the rods [1/m].
+    shells : at least one.
+    rod : section and material of every rod.
     """
-    return float(np.max(fibre_strain(Rod(section, ANY), bends.normal, bends.geodesic), initial=0.0))
+    parts = list[Bends]()
+    for popped in shells:
+        bent = bending_of(popped.shell, popped.state, rod)
+        normal, geodesic = bent.normal_curvature, bent.geodesic_curvature
+        if normal is None or geodesic is None:  # some rod crosses no other
+            normal, geodesic = bent.curvature, np.zeros_like(bent.curvature)
+        parts.append(Bends(normal, geodesic, bent.twist_rate, bent.axial_strain / _bend_over_stretch(rod)))
+    return Bends(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+
+
+def largest_strain(rod: Rod, bends: Bends, *, shear_weight: float = VON_MISES) -> float:
+    """Largest strain of a section that bends like this, with stretch, and torsion by its stress [-].
+
+    Parameters
+    ----------
+    rod : section and material.
+    bends : of rods like it.
+    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
+    """
+    assert rod.material is not None
+    axial = bends.force * _bend_over_stretch(rod)
+    stress = largest_stress(rod, bends.normal, bends.geodesic, axial, bends.twist, weight=shear_weight)
+    return float(np.max(stress, initial=0.0)) / rod.material.youngs_modulus
+
+
+def _bend_over_stretch(rod: Rod) -> float:
+    """EI over EA [m2], towards the side that bends more easily."""
+    return min(rod.bend_stiffnesses) / rod.stretch_stiffness
 
 
 def _sold(material: Material, shape: Circle | Tube | None) -> tuple[Section, ...]:

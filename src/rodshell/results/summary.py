@@ -115,7 +115,7 @@ def _reached(bending: Bending | None) -> str:
     final = [bent.utilisation for bent in (bending.pinned, bending.clamped) if bent]
     known = [used for used in final if used is not None]
     reached = f"reached {percent(max(known))} in the final shape" if known else "what is reached is not known"
-    return f", sized for the permanent strength by an estimate of the bends; {reached}"
+    return f", sized for the permanent strength; {reached}"
 
 
 def _refinement(results: Results) -> Iterator[str]:
