@@ -8,9 +8,11 @@ import pytest
 import rodshell as rs
 from rodshell.checks.reactions import cut_forces, reactions
 from rodshell.errors import InputError
+from rodshell.geometry.frames import dot, unit
 from rodshell.loads.strength import Limits, Spans, Utilisation, net_section, preset_limits
 from tests.loads.shells import ROPE, TUBE, grid, one, shell
 
+THIN = rs.Rod(rs.Tube(0.02, 0.003), rs.Material.preset("gfrp"))
 TIMBER = rs.Rod(rs.RectangularSection(width=0.035, height=0.05), rs.Material.preset("larch"))
 
 
@@ -95,7 +97,7 @@ def test_spans_run_from_joint_to_joint() -> None:
     spans = Spans.of(mesh)
     assert len(spans.lengths) == 2 * len(mesh.joint_nodes) + len(mesh.rod_start)
     assert spans.lengths.sum() == pytest.approx(mesh.edge_lengths.sum())
-    jumps = spans.jumps(np.arange(len(spans.lengths), dtype=float))
+    jumps = spans.jumps(np.repeat(np.arange(len(spans.lengths), dtype=float), spans.last - spans.first))
     assert jumps.sum() == 2 * len(mesh.joint_nodes)
     assert not jumps[mesh.rod_start].any()
     assert np.all(
@@ -138,6 +140,27 @@ def test_stress_over_strength_is_what_is_used_and_the_erected_shell_counts_with_
     drilled = one(rs.Snow(200.0), bracing=bracing, strength=replace(given, hole=0.01))
     more = rs.check_loads(form, drilled).shells["all"]["pinned"].used.largest
     assert 1 < more["bending"] / loaded.used.largest["bending"] <= net_section(TUBE.section, 0.01)
+
+
+def test_slip_is_what_a_joint_adds_to_the_force_in_a_rod_at_any_mesh() -> None:
+    """By the whole forces on both sides of each joint, along the rod there; the edges next to it are bent, by as much
+    as they are long, to second order."""
+    apart, largest = list[float](), list[float]()
+    for edge in (0.25, 0.125):
+        form = rs.find_form(rs.Cap(5.0, 3.0), grid(1.0, edge), THIN, ends="pinned")
+        popped = form.popped["pinned"]
+        spans, forces = Spans.of(popped.shell.mesh), popped.forces[: len(popped.shell.mesh.edges)]
+        (first, last), cuts = spans.edges, cut_forces(popped.shell, popped.state)
+        a, b = popped.shell.stretch.blocks[: len(cuts)].T
+        tangents = unit(popped.state[b] - popped.state[a])
+        joined = spans.last[:-1] == spans.first[1:]
+        before, after = last[:-1][joined], first[1:][joined]
+        added = np.abs(dot(cuts[after] - cuts[before], unit(tangents[after] + tangents[before])))
+        found = spans.jumps(forces)[spans.last[:-1][joined]]
+        apart.append(float(np.abs(found - added).max()))
+        largest.append(float(added.max()))
+    assert apart[0] < 0.03 * largest[0]
+    assert apart[1] < 0.4 * apart[0]
 
 
 def test_the_unloaded_shell_is_judged_by_the_same_strength_with_loads_and_without() -> None:

@@ -278,7 +278,7 @@ def utilisation(
         if bent.torsion_stress is not None and (peak := _shear_peak(section)) is not None:
             sheared = spans.on_entries(across) * peak / (limits.cracked * area_of(rod) * areas)
             uses["shear"] = net * limits.shear_weight * (bent.torsion_stress + sheared) / strength
-    slips = [] if asked.slip is None else [spans.jumps(axial) / asked.slip]
+    slips = [] if asked.slip is None else [spans.jumps(forces) / asked.slip]
     slips += [] if slip_moment is None else [turned / slip_moment]
     if slips:
         uses["slip"] = np.sqrt(np.sum(np.square(slips), axis=0))
@@ -386,14 +386,20 @@ class Spans:
         middle = (first + last - 1) // 2 - rods[:-1][same]  # edges are counted rod by rod
         return Spans(first, last, middle, mesh.stations[last] - mesh.stations[first])
 
+    @property
+    def edges(self) -> tuple[Ints, Ints]:
+        """(s,) first and last edge of each."""
+        count = self.last - self.first
+        first = self.middle - (count - 1) // 2
+        return first, first + count - 1
+
     def towards_joints(self, values: Floats) -> Floats:
         """(s,) largest of the `values` (e,) of each span, continued in a straight line from its inner edges to those
         next to joints, whose own shear forces contain moments of the joints."""
         result = values[self.middle].copy()
-        edges = self.last - self.first
-        begins = self.middle - (edges - 1) // 2
-        for s in np.flatnonzero(edges >= 4).tolist():
-            inner = values[begins[s] + 1 : begins[s] + edges[s] - 1]
+        first, last = self.edges
+        for s in np.flatnonzero(last - first >= 3).tolist():
+            inner = values[first[s] + 1 : last[s]]
             result[s] = max(inner.max(), 2 * inner[0] - inner[1], 2 * inner[-1] - inner[-2])
         return result
 
@@ -410,8 +416,12 @@ class Spans:
         return result
 
     def jumps(self, values: Floats) -> Floats:
-        """(k,) differences of the `values` (s,) on both sides of each joint; elsewhere 0."""
+        """(k,) differences of the `values` (e,), continued in straight lines to each joint from both sides; elsewhere
+        0."""
         result = np.zeros(int(self.last.max()) + 1)
+        first, last = self.edges
+        begin = 1.5 * values[first] - 0.5 * values[np.minimum(first + 1, last)]
+        end = 1.5 * values[last] - 0.5 * values[np.maximum(last - 1, first)]
         next_to = self.last[:-1] == self.first[1:]
-        result[self.last[:-1][next_to]] = np.abs(np.diff(values))[next_to]
+        result[self.last[:-1][next_to]] = np.abs(begin[1:] - end[:-1])[next_to]
         return result
