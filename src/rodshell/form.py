@@ -230,7 +230,7 @@ class Form:
 
     @property
     def verdict(self) -> Verdict:
-        """What the form is worth, all checks done: good, check or unbuildable, with the reasons."""
+        """What the form is worth, all checks done: good, check, unbuildable or unknown, with the reasons."""
         return self._archive.verdict
 
     def with_options(self, options: OutputOptions) -> "Form":

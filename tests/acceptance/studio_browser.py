@@ -17,7 +17,7 @@ from tests.output.browser import CHROMIUM
 from tests.output.sample_archive import sample_archive
 
 OPTIONS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-CHECKED = ", ".join(f"#verdict.{level}:not(.old)" for level in ("good", "check", "unbuildable"))
+CHECKED = ", ".join(f"#verdict.{level}:not(.old)" for level in ("good", "check", "unbuildable", "unknown"))
 PATIENCE = 120_000  # ms
 
 

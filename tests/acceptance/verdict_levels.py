@@ -17,7 +17,7 @@ from rodshell.formfinding import pipeline
 from tests.acceptance.rows import Row
 from tests.formfinding.altered import with_report
 
-CODES = {"good": 0, "check": 0, "unbuildable": 4}
+CODES = {"good": 0, "check": 0, "unbuildable": 4, "unknown": 3}
 
 
 @dataclass(frozen=True)

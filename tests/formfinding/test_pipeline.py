@@ -250,7 +250,10 @@ def test_a_drape_that_does_not_converge_leaves_a_partial_result_that_is_saved(tm
     assert kept.results.plain()["pop_up"] == {}
     assert kept.final == "draped"
     np.testing.assert_array_equal(kept.states["draped"], form.trimmed.positions)
-    assert "Not buildable: it did not converge: drape stopped" in form.summary()
+    assert (
+        "Not known: the computation did not converge, which says nothing about the shell itself: drape"
+        in form.summary()
+    )
 
 
 @pytest.mark.usefixtures("hurried")

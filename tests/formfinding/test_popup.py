@@ -13,11 +13,13 @@ from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 import rodshell as rs
-from rodshell.errors import InputError
+from rodshell.cli import main
+from rodshell.errors import InputError, OutOfTimeError
+from rodshell.formfinding import popup
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.model import Shell
 from rodshell.solve import newton_step
-from rodshell.solve.equilibrium import find_equilibrium, find_stable
+from rodshell.solve.equilibrium import Status, find_equilibrium, find_stable
 from rodshell.solve.problem import Problem, Supports
 from tests.formfinding.altered import at_positions
 from tests.formfinding.elastic_twins import ElasticTwin
@@ -377,3 +379,94 @@ def test_where_the_way_up_from_flat_has_a_limit_point_the_grid_snaps_on_to_its_s
     )
     assert flat.report.stable
     np.testing.assert_allclose(flat.positions, draped.positions, atol=1e-9)
+
+
+# Where Newton's method does not lead from flat to a shell
+
+
+@cache
+def thin_roof(spacing=1.6):
+    """A flat roof of thin laths on ball joints, which nothing holds upright: its first saddle has ten modes."""
+    target = rs.HeightField(formula="0.3*cos(pi*x/9)*cos(pi*y/9)", domain=rs.Rectangle((8.0, 8.0)))
+    lath = rs.Rod(rs.RectangularSection(width=0.04, height=0.01), rs.Material.preset("gfrp"))
+    return rs.find_form(target, rs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 4), lath, ends="pinned")
+
+
+def test_laths_that_roll_pop_up_from_flat_to_the_shell_that_the_target_leaves():
+    """The other way comes from the target, through other states; both stop at steps of 1e-6 of the size."""
+    form = thin_roof()
+    flat = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat")
+    assert flat.report.stable
+    np.testing.assert_allclose(flat.positions, form.popped["pinned"].positions, atol=1e-9)
+
+
+def test_a_wave_of_laths_pops_up_from_flat_stable():
+    """Newton's method stalls there at once; the shell snaps several times on its way, and may end in another shape."""
+    target = rs.HeightField(formula="0.5*cos(x)*cos(0.75*y)", domain=rs.Disc(3.0))
+    lath = rs.Rod(rs.RectangularSection(width=0.01, height=0.04), rs.Material.preset("gfrp"))
+    form = rs.find_form(target, rs.GridLayout.orthogonal(spacing=1.0, edge=0.25), lath, ends="pinned")
+    flat = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat")
+    assert flat.report.stable
+    ends = form.footprint.mesh.ends
+    np.testing.assert_allclose(flat.positions[ends], form.boundary.points.reshape(-1, 2, 3), atol=1e-12)
+
+
+def test_a_time_limit_ends_the_short_steps_too():
+    form = thin_roof()
+
+    def progress(stage, detail, residual):
+        if "short steps" in detail:
+            raise OutOfTimeError("out of time after 3 s")
+
+    flat = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat", progress=progress)
+    assert flat.report.status is Status.OUT_OF_TIME
+    assert flat.report.reason == "out of time after 3 s"
+
+
+def test_a_limit_of_factorisations_is_kept_from_flat():
+    form = thin_roof()
+    few = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat", most_factorizations=100)
+    assert few.report.status is Status.STALLED
+    assert few.report.factorizations < 600  # one descent more
+
+
+def test_how_far_a_lost_pop_up_from_flat_was_followed_is_known(monkeypatch):
+    """Of the way of the ends, measured here at the end that goes farthest."""
+    form = thin_roof()
+    monkeypatch.setattr(popup._Stages, "traced", lambda stages, problem_at, arch, failed: failed)
+    lost = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat")
+    assert lost.report.status is Status.STALLED
+    mesh, goals = form.footprint.mesh, form.boundary.points
+    first = popup.flat_below(mesh, goals)[mesh.ends.ravel()]
+    way = np.linalg.norm(goals - first, axis=1)
+    moved = np.linalg.norm(lost.positions[mesh.ends.ravel()] - first, axis=1)
+    k = int(way.argmax())
+    assert 0.05 < lost.followed < 0.9
+    assert lost.followed == pytest.approx(moved[k] / way[k], rel=1e-9)
+    assert form.popped["pinned"].followed == 1.0
+
+
+def test_a_result_whose_pop_up_from_flat_is_lost_is_a_failure_of_the_computation(tmp_path, monkeypatch, capsys):
+    """The advice names options that popup has; what the shell is worth is not known."""
+    folder, out = thin_roof().save(tmp_path / "roof", kinds=[]), tmp_path / "popped"
+    monkeypatch.setattr(popup._Stages, "traced", lambda stages, problem_at, arch, failed: failed)
+    assert main(["popup", str(folder), "--only", "csv", "--quiet", "--out", str(out)]) == 3
+    said = capsys.readouterr().err
+    assert said.startswith("rodshell: NOT CONVERGED: pop-up (pinned) could be followed from flat only up to 20 % of")
+    assert "(rod.section)" in said
+    assert "spacing" not in said
+    assert "mesh" not in said
+    verdict = rs.read(out).verdict
+    assert verdict.level == "unknown"
+    assert verdict.headline.startswith(
+        "Not known: the computation did not converge, which says nothing about the shell"
+    )
+
+
+def test_a_result_is_popped_up_again_by_the_command(tmp_path):
+    folder, out = thin_roof().save(tmp_path / "roof", kinds=[]), tmp_path / "popped"
+    assert main(["popup", str(folder), "--only", "csv", "--quiet", "--out", str(out)]) == 0
+    saved, again = rs.read(folder).results, rs.read(out).results
+    assert again.pop_up["pinned"].stable
+    stresses = [found.bending.pinned.max_stress for found in (saved, again)]
+    assert stresses[1] == pytest.approx(stresses[0], rel=1e-6)

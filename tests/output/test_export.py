@@ -196,7 +196,7 @@ def test_a_job_that_stopped_before_the_pop_up_still_gives_its_files(tmp_path: Pa
     assert "deployment" not in result
     assert result["rods"][0]["cut_length"] == result["rods"][0]["length"]
     assert "min_radius" not in result["rods"][0]
-    assert "Not buildable: there is no pop-up in this result" in (out / "report.html").read_text()
+    assert "Not known: there is no pop-up in this result" in (out / "report.html").read_text()
 
 
 @pytest.mark.slow

@@ -170,13 +170,13 @@ def test_names_in_the_view_cannot_end_its_script(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("level", ["good", "check", "unbuildable"])
+@pytest.mark.parametrize("level", ["good", "check", "unbuildable", "unknown"])
 def test_the_verdict_comes_first_with_its_colour_and_all_reasons(level: str, tmp_path: Path) -> None:
     made = archive("dome")
     reasons = ["the <first> reason", "the second"]
     result = {**made.results.plain(), "verdict": {"level": level, "reasons": reasons}}
     page = page_of(replace(made, results=Results.of(result)), tmp_path).read_text()
-    words = {"good": "Good", "check": "Check", "unbuildable": "Not buildable"}
+    words = {"good": "Good", "check": "Check", "unbuildable": "Not buildable", "unknown": "Not known"}
     notice = f'<section class="notice {level}" aria-label="Verdict">'
     places = [page.index(text) for text in (notice, f"{words[level]}: the &lt;first&gt; reason", "the second", "<h2>")]
     assert places == sorted(places)

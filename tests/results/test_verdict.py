@@ -94,8 +94,9 @@ def test_one_end_condition_with_a_fault_is_to_be_checked_and_two_cannot_be_built
     assert one.level == "check"
     assert "pinned ends" in one.headline
     both = verdict(changed((path.format("pinned"), value), (path.format("clamped"), value)))
-    assert both.level == "unbuildable"
-    assert both.headline.startswith("Not buildable: ")
+    level, word = ("unknown", "Not known") if name == "status" else ("unbuildable", "Not buildable")
+    assert both.level == level
+    assert both.headline.startswith(f"{word}: ")
     assert {"pinned", "clamped"} == {ends for ends in ("pinned", "clamped") if any(ends in r for r in both.reasons)}
 
 
@@ -116,12 +117,37 @@ def test_different_faults_of_all_end_conditions_leave_none_to_build() -> None:
      ([("contact.deployment", TOUCHING)], "5 pairs of rods touch or cross, worst: U03 and U04 overlap by 3.00 mm"),
      ([("target.flat", True)], "the target is flat, nothing pops up"),
      ([("agreement.pinned.max_relative", 0.2), ("agreement.clamped.max_relative", 0.051)], "deviates from the target"),
-     ([("pop_up", {}), ("status", "drape stalled")], "did not converge: drape stalled")],
+     ([("pop_up.pinned.status", "buckled"), ("pop_up.clamped.status", "buckled")], "did not converge: buckled")],
 )  # fmt: skip
 def test_what_no_support_can_cure_cannot_be_built(changes: list[tuple[str, Any]], words: str) -> None:
     found = verdict(changed(*changes))
     assert found.level == "unbuildable"
     assert words in found.headline
+
+
+LOST = [("pop_up.pinned.status", "stalled"), ("pop_up.pinned.stable", False)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [([("pop_up", {}), ("status", "drape stalled")],
+      "the computation did not converge, which says nothing about the shell itself: drape stalled"),
+     ([("pop_up", {})], "there is no pop-up in this result"),
+     ([*LOST, ("pop_up.clamped", MISSING), ("status", "pop-up (pinned) was lost")],
+      "the computation did not converge, which says nothing about the shell itself: pop-up (pinned) was lost")],
+)  # fmt: skip
+def test_where_no_shell_was_computed_nothing_is_known(changes: list[tuple[str, Any]], words: str) -> None:
+    found = verdict(changed(*changes))
+    assert found.level == "unknown"
+    assert found.headline == f"Not known: {words}"
+
+
+def test_what_cannot_be_built_is_said_of_the_shell_that_was_computed() -> None:
+    """The other one did not converge, which is said after it."""
+    found = verdict(changed(*LOST, ("pop_up.clamped.stable", False), ("pop_up.clamped.negative_modes", 1)))
+    assert found.level == "unbuildable"
+    assert found.headline.startswith("Not buildable: with clamped ends the shell is unstable (1 buckling mode)")
+    assert "the pop-up with pinned ends did not converge: stalled" in found.reasons[1:]
 
 
 def test_no_more_is_promised_than_the_shell_carries() -> None:

@@ -33,7 +33,7 @@ from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
-from rodshell.units import length_text
+from rodshell.units import length_text, percent_text
 from rodshell.validation import choices_of, instance
 
 STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
@@ -196,8 +196,17 @@ class PatchForm:
             return f"drape {sentence}{other}"
         for ends, shell in self.popped.items():
             if not shell.report.converged:
-                return shell.report.reason or f"pop-up ({ends}) {shell.report.status.sentence}"
+                return shell.report.reason or f"pop-up ({ends}) {self._lost(shell)}"
         return "converged"
+
+    def _lost(self, shell: PopUp) -> str:
+        """How a pop-up ended that did not converge, and what to do. A table of rods has neither spacing nor target."""
+        if not self.from_table:
+            return shell.report.status.sentence
+        return (
+            f"could be followed from flat only up to {percent_text(shell.followed)} of the way of the rods' ends; rods "
+            "of another section may be followed further (rod.section), and rodshell form starts from a target instead"
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:

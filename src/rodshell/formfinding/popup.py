@@ -14,7 +14,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from rodshell.arrays import Floats, Ints, median
-from rodshell.errors import InputError
+from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.curves import on_curve
@@ -26,7 +26,7 @@ from rodshell.model.shell import UP
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
-from rodshell.solve.path import MOST_STEPS, follow, relax
+from rodshell.solve.path import MOST_STEPS, follow, relax, trace
 from rodshell.solve.problem import Pattern, Problem, Supports, half_width
 from rodshell.units import length_text
 from rodshell.validation import choice, instance
@@ -37,6 +37,8 @@ ENDS: tuple[Ends, ...] = get_args(Ends)
 STARTS: tuple[Start, ...] = get_args(Start)
 
 FIRST_RISE = 0.05  # share of the ends' paths in the step that leaves the plane
+SHORTEST_RISE = 0.001  # share of the ends' paths: where no step of this length succeeds, the shell snaps
+MOST_TRACED = 8000  # factorisations of a path in short steps
 CLAMP_STEP = 0.25  # share of the clamps' rotation in the first step
 MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70; to descend the energy takes longer
 MOST_AGAIN = 8  # iterations from an earlier pop-up, before starting from the draped state
@@ -89,6 +91,16 @@ class PopUp:
     def forces(self) -> Floats:
         """(e,) axial forces of the edges [N]."""
         return self.equilibrium.forces
+
+    @property
+    def followed(self) -> float:
+        """Share of the ends' straight paths from flat that was followed; 1 where they arrived, as without paths."""
+        if self.start == "draped" or self.report.converged:
+            return 1.0
+        mesh, goals = self.footprint.mesh, self.boundary.points
+        first = flat_below(mesh, goals)[mesh.ends.ravel()]
+        moved = self.positions[mesh.ends.ravel()] - first
+        return float(np.sum(moved * (goals - first)) / np.sum((goals - first) ** 2))
 
 
 def pop_up(
@@ -273,21 +285,64 @@ class _Stages:
         return None if strayed or not found.report.stable else (shell, found)
 
     def rise(self) -> tuple[Shell, Equilibrium]:
-        """Pop up pinned, from the flat grid: the ends move straight to the boundary while the grid rises."""
+        """Pop up pinned, from the flat grid: the ends move straight to the boundary while the grid rises.
+
+        In steps as long as Newton's method allows, or, where these do not lead to a stable shell, in short ones.
+        """
         mesh, boundary = self.footprint.mesh, self.boundary
         shell = self.shell("pinned")
-        flat = laid_below(mesh, boundary.points, float(boundary.points.mean(axis=0)[2]))
+        flat = flat_below(mesh, boundary.points)
         first = flat[mesh.ends.ravel()]
+        arch = self.upright(shell, arched(self.footprint, flat, first, boundary))
+
+        def problem_at(t: float) -> Problem:
+            return self.problem(shell, (1 - t) * first + t * boundary.points)
+
         found = follow(
-            lambda t: self.problem(shell, (1 - t) * first + t * boundary.points),
-            self.upright(shell, arched(self.footprint, flat, first, boundary)),
+            problem_at,
+            arch,
             np.zeros(len(mesh.edges)),
             first_step=FIRST_RISE,
             snap=True,
             most_factorizations=self.most_factorizations,
             progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
         )
-        return shell, found
+        late = found.report.status is Status.OUT_OF_TIME
+        if found.report.stable or late or self.most_factorizations is not None:
+            return shell, found
+        return shell, self.traced(problem_at, arch, found)
+
+    def traced(self, problem_at: Callable[[float], Problem], arch: Floats, failed: Equilibrium) -> Equilibrium:
+        """The path from flat along branches of stable equilibria: down the energy from the arch, then from one branch
+        to the next.
+
+        Newton's method leads from the arch to saddles where rods may roll, such as laths between ball joints, and on
+        from saddle to saddle.
+        """
+        here = relax(
+            problem_at(FIRST_RISE),
+            arch,
+            progress=lambda k, step: self.progress(
+                "pop-up", f"from flat, descending, step {k} of at most {MOST_STEPS}", step
+            ),
+        )
+        if not here.report.stable:
+            kept, other = (here, failed) if here.report.status is Status.OUT_OF_TIME else (failed, here)
+            return replace(kept, report=kept.report.after(other.report))
+        try:
+            path = trace(
+                problem_at, here, FIRST_RISE, 1.0,
+                shortest=SHORTEST_RISE, snap=True, most_factorizations=MOST_TRACED,
+                progress=lambda t: self.progress("pop-up", f"from flat in short steps, {100 * t:.1f} %", 0.0),
+            )  # fmt: skip
+        except OutOfTimeError as late:
+            return replace(failed, report=replace(failed.report, status=Status.OUT_OF_TIME, reason=str(late)))
+        work = path.found.report.after(failed.report, here.report)
+        if path.t == 1:
+            return replace(path.found, report=work)
+        if failed.report.converged:  # the ends arrived, and the shell there is unstable
+            return replace(failed, report=failed.report.after(here.report))
+        return replace(path.found, report=replace(work, status=Status.STALLED))
 
     def turn_clamps(self, free: Shell, pinned: Equilibrium) -> tuple[Shell, Equilibrium]:
         """Turn the end directions of the pinned state to those of the boundary."""
@@ -349,6 +404,11 @@ def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
     result[:, :2] = (flat - centre)[:, :2] @ turn + there[:2]
     result[:, 2] = height + flat[:, 2]
     return result
+
+
+def flat_below(mesh: GridMesh, points: Floats) -> Floats:
+    """(n, 3) the flat grid laid out at the mean height of the points (2m, 3) to which its ends go [m]."""
+    return laid_below(mesh, points, float(points.mean(axis=0)[2]))
 
 
 def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary) -> Floats:

@@ -195,7 +195,7 @@ class Archive:
 
     @property
     def verdict(self) -> Verdict:
-        """What the result is worth: good, check or unbuildable, with the reasons."""
+        """What the result is worth: good, check, unbuildable or unknown, with the reasons."""
         return verdict_of(self.results)
 
     @property

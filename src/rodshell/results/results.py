@@ -51,7 +51,7 @@ FORMAT = "rodshell-result"
 VERSION = 2
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
 
-Level = Literal["good", "check", "unbuildable"]
+Level = Literal["good", "check", "unbuildable", "unknown"]
 
 
 class WorstBent(Bent):
@@ -241,20 +241,24 @@ class Drawings(Record):
     date: Text = Field(default="", description='a day as "2026-11-22"; "": the day of writing')
 
 
+LEVELS: dict[Level, str] = {"good": "Good", "check": "Check", "unbuildable": "Not buildable", "unknown": "Not known"}
+"""The levels in words."""
+
+
 class Verdict(Record):
     """What a result is worth."""
 
     level: Level = Field(
         description='"good": it pops up, stands under its own weight and can be built; "check": something has to be '
-        'checked first; "unbuildable": no end condition gives a shell that can be built'
+        'checked first; "unbuildable": no end condition gives a shell that can be built; "unknown": no shell was '
+        "computed, as where the computation did not converge"
     )
     reasons: tuple[Text, ...] = Field(min_length=1, description="sentences, the gravest first")
 
     @property
     def headline(self) -> str:
         """The first sentence, after the level in words."""
-        words: dict[Level, str] = {"good": "Good", "check": "Check", "unbuildable": "Not buildable"}
-        return f"{words[self.level]}: {self.reasons[0]}"
+        return f"{LEVELS[self.level]}: {self.reasons[0]}"
 
 
 # The whole

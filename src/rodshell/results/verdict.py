@@ -1,4 +1,5 @@
-"""The verdict on a result, computed once from all that was found: good, check or unbuildable, and the reasons.
+"""The verdict on a result, computed once from all that was found: good, check, unbuildable or unknown, and the
+reasons.
 
 Summary, report, JSON and exit code show what stands here and judge nothing themselves. A figure that is missing was
 not checked, and then the result is not good.
@@ -36,7 +37,8 @@ NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which ano
 LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
 NEGLIGIBLE = 1e-3  # unless that gap is below this share of the target's size already
-CONVERGED = "converged"
+CONVERGED, BUCKLED = "converged", "buckled"  # statuses that say something about the shell: it crumples in the second
+NOT_COMPUTED = "the computation did not converge, which says nothing about the shell itself"
 
 
 def verdict_of(results: Results) -> Verdict:
@@ -48,7 +50,8 @@ def verdict(results: Results) -> Verdict:
     """The verdict on the figures of a result.
 
     An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
-    enough for their bends. Without one that can be used, or far off the target, the result is unbuildable.
+    enough for their bends. Without one that can be used, or far off the target, the result is unbuildable; unknown if
+    no shell was computed: a computation that does not converge says nothing about the shell.
 
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
@@ -65,15 +68,15 @@ def verdict(results: Results) -> Verdict:
         *_fibre_faults(results, "deployment"),
         *_contact_faults(results, "deployment"),
     ]
-    grave = [sentence for found in faults.values() for sentence in found] + deployment
+    lost = [ends for ends, shell in shells.items() if _status(shell) not in (CONVERGED, BUCKLED)]
+    in_order = [*(ends for ends in shells if ends not in lost), *lost]  # what is known of a shell comes first
+    grave = [sentence for ends in in_order for sentence in faults[ends]] + deployment
     if results.target and results.target.flat:
         warned = [word for word in results.warnings if word.startswith(FLAT)]
         return _verdict("unbuildable", warned or [FLAT])
+    failed = [] if results.status == CONVERGED else [f"{NOT_COMPUTED}: {results.status}"]
     if not shells:
-        why = "there is no pop-up in this result"
-        return _verdict(
-            "unbuildable", [why if results.status == CONVERGED else f"it did not converge: {results.status}"]
-        )
+        return _verdict("unknown", failed or ["there is no pop-up in this result"])
     best = _best(results, usable)
     off = 0.0 if best is None else best[1].max_relative or 0.0
     far = [_off_words(results, *best)] if best is not None and off > OFF else []
@@ -85,6 +88,8 @@ def verdict(results: Results) -> Verdict:
     to_check = [
         *gravest, *weight, *sinks, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings
     ]  # fmt: skip
+    if len(lost) == len(shells):
+        return _verdict("unknown", [*failed, *to_check])
     if not usable or deployment or off > FAR_OFF:
         return _verdict("unbuildable", to_check)
     if to_check:
