@@ -1,5 +1,6 @@
 """Targets cut by seams: patches that are formed alone, whose rods end at the same points on the seams."""
 
+import re
 from functools import cache
 from itertools import pairwise, product
 
@@ -479,3 +480,29 @@ def test_the_way_up_of_all_patches_ends_where_they_stand() -> None:
     np.testing.assert_allclose(
         [1 / stage["min_radius"] for stage in archive.results.plain()["deployment"]["stages"]], sharpest, rtol=1e-5
     )
+
+
+def rods_said_to_be_in_pieces(form: rs.Form) -> set[str]:
+    """The patches and rods that the warnings name so, such as A-U07."""
+    said = [re.match(r"patch (\w): .* several pieces, each with its own ends: (.*?);", word) for word in form.warnings]
+    return {f"{found[1]}-{name}" for found in said if found for name in found[2].split(", ")}
+
+
+@pytest.mark.slow
+def test_no_rod_is_warned_of_whose_pieces_are_all_left_out() -> None:
+    """Around an oval seam, askew: some rods meet none of the oval's rods, and both their pieces are left out."""
+    angles = np.append(np.linspace(0, 2 * np.pi, 40)[:-1], 0.0)
+    oval = np.column_stack([0.12 * np.cos(angles) + 0.02, 0.07 * np.sin(angles)])
+    form = rs.find_form(DOME, layout_of(0.025, rotate=0.2), ROD, seams=[oval], ends="pinned")
+    built = {rod.name[:-1] for rod in form.footprint.rods if rod.name[-1] in "ab"}
+    left_out = {name[:-1] for name, _ in form.dropped if name[-1] in "ab"}
+    assert len(left_out - built) > 3
+    assert rods_said_to_be_in_pieces(form) == built
+
+
+@pytest.mark.slow
+def test_a_rod_is_warned_of_whose_pieces_are_built() -> None:
+    form = sewn("crown")
+    built = {rod.name[:-1] for rod in form.footprint.rods if rod.name[-1] in "ab"}
+    assert len(built) == 14
+    assert rods_said_to_be_in_pieces(form) == built

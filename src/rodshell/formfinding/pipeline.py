@@ -215,7 +215,8 @@ class PatchForm:
             return _rolled(self.popped)
         tails = _long_tails(self.lying) if self.draped.converged else ()
         flat = flat_warnings(self.lying.positions, self.rod)
-        return (*flat, *self.draped.warnings, *_stretched(self.draped), *tails, *_rolled(self.popped))
+        pieces = _in_pieces(self.lying)
+        return (*flat, *self.draped.warnings, *pieces, *_stretched(self.draped), *tails, *_rolled(self.popped))
 
 
 def find_stages(
@@ -401,6 +402,20 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     return (
         f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; another offset or "
         "anchor of the layout may help, or leave such rods out",
+    )
+
+
+def _in_pieces(trimmed: Trimmed) -> tuple[str, ...]:
+    """A warning where rods that are built do not run from rim to rim."""
+    built, net = {rod.name for rod in trimmed.mesh.grid.rods}, trimmed.draped.net
+    names = [] if net is None else [name for name, pieces in net.pieces.items() if not built.isdisjoint(pieces)]
+    if not names:
+        return ()
+    are = "rods are" if len(names) > 1 else "rod is"
+    return (
+        f"{len(names)} {are} on the target in several pieces, each with its own ends: {', '.join(names)}; an opening "
+        "where they end needs a ring that carries their reactions; where they only cross the edge twice, another "
+        "offset of the layout may help",
     )
 
 

@@ -49,6 +49,7 @@ class ChebyshevNet:
     min_angle : smallest angle between the families on the target [rad].
     min_angle_at : x, y, z of the point where it is [m].
     dropped : rods of the layout that are not in `rods`, with the reason.
+    pieces : of each rod of the layout that is on the target in several pieces, the names of those in `rods`.
     warnings : sentences.
     """
 
@@ -61,6 +62,7 @@ class ChebyshevNet:
     min_angle: float
     min_angle_at: tuple[float, float, float]
     dropped: tuple[tuple[str, str], ...]
+    pieces: dict[str, tuple[str, ...]]
     warnings: tuple[str, ...]
 
     def positions(self, rod: FlatRod, s: Floats) -> Floats:
@@ -155,10 +157,11 @@ def chebyshev_net(
     if degrees(angle) < SMALLEST_ANGLE:
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
     ends, error, loosest = _extrapolate(target, lines, (coarse, fine), GRAZING * min(layout.spacing))
-    rods, dropped, warnings = _name_rods(layout, lines, ends)
+    rods, dropped, pieces = _name_rods(layout, lines, ends)
     _require_names(layout, [*(rod.name for rod in rods), *(name for name, _ in dropped)])
     if all(rod.virtual for rod in rods):
         raise InputError("no rod of the layout touches the target: move the layout (offset, anchor), or give more rods")
+    warnings = list[str]()
     if error > LOOSE * min(layout.spacing):
         x, y, z = np.where(np.abs(loosest) < 1e-6 * target.size, 0.0, loosest)
         warnings.append(
@@ -168,7 +171,7 @@ def chebyshev_net(
         )
     _require_length(layout, rods)
     return ChebyshevNet(
-        target, layout, rods, (lines.u, lines.v), fine, error, angle, where, tuple(dropped), tuple(warnings)
+        target, layout, rods, (lines.u, lines.v), fine, error, angle, where, tuple(dropped), pieces, tuple(warnings)
     )
 
 
@@ -325,9 +328,10 @@ def _extrapolate(
 
 def _name_rods(
     layout: GridLayout, lines: LatticeLines, ends: tuple[Cuts, Cuts]
-) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], list[str]]:
-    """Rods from the lines: those of the layout get their names, all other lines are virtual."""
-    rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), list[str]()
+) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], dict[str, tuple[str, ...]]]:
+    """Rods from the lines: those of the layout get their names, all other lines are virtual; those that are dropped;
+    and the names of the pieces of rods that have several."""
+    rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), dict[str, tuple[str, ...]]()
     families: tuple[tuple[Family, Floats, Cuts], ...] = (("u", lines.v, ends[0]), ("v", lines.u, ends[1]))
     spacing = max(layout.spacing)
     for family, every, cuts in families:
@@ -346,23 +350,15 @@ def _name_rods(
                 dropped.append((name, "it never touches the target"))
                 continue
             parts = pieces.pop(offset)
-            for label, (start, end) in zip(piece_names(name, len(parts)), parts, strict=True):
+            names = piece_names(name, len(parts))
+            for label, (start, end) in zip(names, parts, strict=True):
                 rods.append(make(label, offset, start, end, virtual=label in layout.left_out))
             if len(parts) > 1:
-                broken.append(name)
+                broken[name] = tuple(names)
         for offset, parts in pieces.items():
             labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
             rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
-    return tuple(rods), dropped, [_in_pieces(broken)] if broken else []
-
-
-def _in_pieces(names: list[str]) -> str:
-    """The warning that some rods do not run from rim to rim."""
-    return (
-        f"{len(names)} rods are on the target in several pieces, each with its own ends: {', '.join(names)}; an "
-        "opening where they end needs a ring that carries their reactions; where they only cross the edge twice, "
-        "another offset of the layout may help"
-    )
+    return tuple(rods), dropped, broken
 
 
 def piece_names(rod: str, count: int) -> list[str]:
