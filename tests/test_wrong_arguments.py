@@ -130,6 +130,126 @@ def test_a_wrong_argument_is_refused_in_one_sentence(call, sentence):
         call()
 
 
+SNOW = {"snow": rs.Snow(500.0)}
+WINTER = {"winter": {"snow": 1.5}}
+FOUND = form()
+MESH, POPPED = FOUND.footprint.mesh, FOUND.popped["pinned"]
+RODS = [rod.name for rod in FOUND.footprint.rods]
+LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("start",))
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (
+            lambda: rs.Settlement(supports="U03.1", move=(0, 0, 0.1)),
+            r'the supports of a settlement must be a list of rod ends such as \["U03.1"\], not "U03.1"',
+        ),
+        (lambda: rs.Settlement(supports=[3], move=(0, 0, 0.1)), "each of the supports of a settlement must be text"),
+        (lambda: rs.LineLoad(line=None, force=(0, 0, -1)), "the line of a load must be points x, y in m, not None"),
+        (lambda: rs.Fabrication(kerf="3"), 'the kerf must be a number in m, not "3"'),
+        (lambda: rs.Fabrication(end_allowance=-0.1), "the end allowance must be 0 or more, not -0.1 m"),
+        (lambda: rs.Fabrication(stock_length=np.nan), "the stock length must be positive, not nan m"),
+        (lambda: rs.trim(FOUND.draped, fewest="3"), 'fewest must be a whole number of 0 or more, not "3"'),
+        (lambda: rs.trim(FOUND.draped, fewest=-1), "fewest must be a whole number of 0 or more, not -1"),
+        (lambda: rs.fabricate(None, ROD, rs.Fabrication()), "mesh must be a rodshell GridMesh, not None"),
+        (lambda: rs.fabricate(MESH, ROD, None), "options must be a rodshell Fabrication, not None"),
+        (lambda: rs.fabricate(MESH, TARGET, rs.Fabrication()), "rod must be a rodshell Rod, not a Hemisphere"),
+        (lambda: rs.fabricate(MESH, ROD, rs.Fabrication(), final="x"), "final must be numbers of the shape"),
+        (lambda: rs.fabricate(MESH, ROD, rs.Fabrication(), curvature=[1.0]), "curvature must have the shape"),
+        (lambda: rs.fabricate(MESH, ROD, rs.Fabrication(), to_supports="no"), "to_supports must be True or False"),
+        (lambda: rs.Cables(rod=ROD, pattern=None), "the pattern of diagonals must be text .*, not None"),
+        (lambda: rs.Damping(rate="1"), 'the damping rate must be a number in 1/s, not "1"'),
+        (lambda: rs.Damping(coefficients="1 2"), "the damping coefficients must be"),
+        (lambda: rs.FlatGrid.of(None), "rods must be a list of rodshell.FlatRod, not None"),
+        (lambda: rs.FlatGrid.of([ROD]), "each of the rods must be a rodshell FlatRod, not a Rod"),
+        (lambda: rs.FlatGrid.of(CROSS.rods, margin="1"), 'margin must be a number in m, not "1"'),
+        (lambda: CROSS.with_profiles(3), "each of the profiles must be a rodshell Profile, not 3"),
+        (lambda: rs.GridLayout.orthogonal(spacing=0.1, left_out=None), "layout left_out must be names of rods, not"),
+        (lambda: rs.GridLayout.orthogonal(spacing=0.1, left_out="U03"), 'must be names of rods, not "U03"'),
+        (lambda: rs.Job(TARGET, LAYOUT, ROD, rotate="45"), 'rotate must be a number in rad, not "45"'),
+        (lambda: rs.Job(TARGET, LAYOUT, ROD, rotate=np.nan), "rotate must be finite, not nan rad"),
+        (lambda: rs.Job(TARGET, LAYOUT, ROD, seams=3), "seams must be a list of lines, .*, not 3"),
+        (lambda: rs.Job(TARGET, LAYOUT, ROD, patches=[3]), "patches must be settings by the names .*, not a list"),
+        (lambda: rs.PatchLayout(spacing="3"), "a patch's spacing must be two lengths in m, not '3'"),
+        (lambda: rs.PatchLayout(anchor=0.0), "a patch's anchor must be two finite numbers x, y in m, not 0.0"),
+        (lambda: rs.Loads(loads=None, combinations=WINTER), "loads must be loads by their names, .*, not None"),
+        (lambda: rs.Loads(loads=SNOW, combinations=[1]), "combinations must be factors by the names .*, not a list"),
+        (
+            lambda: rs.Loads(loads=SNOW, combinations={"winter": 1.5}),
+            'the combination "winter" must be factors by the names of loads, .*, not 1.5',
+        ),
+        (lambda: rs.Loads(loads=SNOW, combinations=WINTER, stability=3), "stability must be a rodshell Stability, not"),
+        (lambda: rs.Loads(loads=SNOW, combinations=WINTER, durations="x"), 'durations must be durations .*, not "x"'),
+        (lambda: rs.Profile((0.0, None), (1.0, 1.0)), "each of the stations of a profile must be a number, not None"),
+        (lambda: rs.Profile.symmetric(None), "the factors of a profile must be a sequence of numbers, not None"),
+        (lambda: rs.Profile.double("0.5"), 'length that is double must be a number, not "0.5"'),
+        (lambda: rs.chebyshev_net(LAYOUT, TARGET), "target must be a rodshell Target, not a GridLayout"),
+        (lambda: rs.chebyshev_net(TARGET, None), "layout must be a rodshell GridLayout, not None"),
+        (lambda: rs.chebyshev_net(TARGET, LAYOUT, warm_start="x"), 'warm_start must be a net .*, not "x"'),
+        (lambda: rs.check(POPPED, ROD), 'popped must be shells by their ends, such as {"pinned": .*, not a PopUp'),
+        (lambda: rs.check({"pinned": None}, ROD), "the shell with pinned ends must be what .*, not None"),
+        (lambda: rs.check({"x": POPPED}, ROD), 'the ends of popped must be "pinned" or "clamped", not "x"'),
+        (lambda: rs.check({"pinned": POPPED}, ROD, stages=-1), "stages must be a whole number, 0 to 1000, not -1"),
+        (lambda: rs.check({"pinned": POPPED}, ROD, shear_weight=np.nan), "shear_weight must be positive, not nan"),
+        (lambda: rs.OutputOptions(stages=1001), "stages must be a whole number, 0 to 1000, not 1001"),
+        (lambda: rs.OutputOptions(rod_chosen="section"), 'rod_chosen must be parts of a rod .*, not "section"'),
+        (lambda: rs.dynamic_pop_up(None, BOUNDARY, ROD), "footprint must be a rodshell Footprint, not None"),
+        (lambda: rs.dynamic_pop_up(FOOTPRINT, None, ROD), "boundary must be a rodshell Boundary, not None"),
+        (lambda: rs.dynamic_pop_up(FOOTPRINT, BOUNDARY, ROD, joint="pin"), 'joint must be a .*, not "pin"'),
+        (lambda: rs.dynamic_pop_up(FOOTPRINT, BOUNDARY, ROD, joint=(rs.Pin(),)), "joint must be one rodshell joint"),
+        (lambda: rs.dynamic_pop_up(FOOTPRINT, BOUNDARY, ROD, settings=3), "settings must be a rodshell Dynamic.*, not"),
+        (lambda: rs.pop_up(FOOTPRINT, BOUNDARY, ROD, most_factorizations="9"), "most_factorizations must be a whole"),
+        (lambda: rs.Boundary("x", np.zeros((4, 3))), "the boundary's points must be numbers of the shape"),
+        (lambda: rs.Boundary(np.zeros((4, 3)), np.zeros((2, 3))), "the boundary's tangents must have the shape"),
+        (lambda: rs.Footprint(CROSS), "mesh must be a rodshell GridMesh, not a FlatGrid"),
+        (lambda: rs.mesh_grid(None, 0.1), "grid must be a rodshell FlatGrid, not None"),
+        (lambda: rs.mesh_grid(CROSS, "0.1"), 'edge must be a number in m, not "0.1"'),
+        (lambda: rs.mesh_grid(CROSS, -0.1), "edge must be 0 or more, not -0.1 m"),
+        (lambda: rs.mesh_grid(CROSS, 0.0), "edge must be positive, not 0 m"),
+        (lambda: rs.mesh_grid(CROSS, 0.1, marks=[[0.5]]), "2 rods need as many lists of marks, not 1"),
+        (lambda: rs.mesh_grid(CROSS, 0.1, marks=[["x"], []]), "marks must be numbers"),
+        (lambda: rs.straight_rods(np.zeros((1, 2, 2)), names="R"), 'names must be a list of different names, not "R"'),
+        (lambda: rs.pop_up_table(CROSS, "x", ROD), "finals must be numbers of the shape"),
+        (lambda: rs.pop_up_table(CROSS, np.zeros((2, 2, 3)), ROD, edge="1"), 'edge must be a number in m, not "1"'),
+        (lambda: rs.pop_up_table(CROSS, np.zeros((2, 2, 3)), ROD, edge=np.nan), "edge must be positive, not nan m"),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, time_limit="60"), 'the time limit must be a number in s, not "60"'),
+        (lambda: rs.save(FOUND.unchecked(), "x", [], more="x"), 'more must be texts by the names .*, not "x"'),
+        (lambda: rs.save(FOUND.unchecked(), "x", [], force="no"), 'force must be True or False, not "no"'),
+        (lambda: rs.search(LAYOUT, TARGET, ROD), "target must be a rodshell Target, not a GridLayout"),
+        (lambda: rs.search(TARGET, LAYOUT, "rod"), 'rod must be a rodshell Rod, not "rod"'),
+        (lambda: rs.search(TARGET, LAYOUT, ROD, anchors=(0.0, 0.0)), "each of the anchors must be two finite numbers"),
+        (lambda: rs.search(TARGET, LAYOUT, ROD, anchors=[]), "anchors must be points .*, not an empty list"),
+        (lambda: rs.search(TARGET, LAYOUT, ROD, headings=0.3), "headings must be angles in rad, .*, not 0.3"),
+        (lambda: rs.Job.load("hemisphere", "layout"), 'overrides must be values by key, .*, not "layout"'),
+        (lambda: rs.solve_rod(FOUND), "rod must be a rodshell ElasticRod, not a Form"),
+        (lambda: rs.solve_rod(LINE, rs.RodLoads()), "supports must be a rodshell RodSupports, not a RodLoads"),
+        (lambda: rs.solve_rod(LINE, steps="3"), 'steps must be a whole number of 1 or more, not "3"'),
+        (lambda: rs.solve_rod(LINE, start="x"), "start must be numbers of the shape"),
+        (lambda: rs.RodSupports(positions=[0]), "positions must be a mapping from nodes, .*, not a list"),
+        (lambda: rs.RodSupports(spinning="start"), 'spinning must be a list of ends .*, not "start"'),
+        (lambda: rs.RodLoads(moments=3.0), "moments must be a mapping from edges or ends .*, not 3.0"),
+        (lambda: rs.GravityForce("all"), "the nodes that gravity acts on must be integers"),
+        (lambda: rs.PointLoads([0], [1.0, 2.0]), "the forces of point loads must be numbers of the shape"),
+        (lambda: rs.ExplicitForce(3), "the force must be a function of time, state and velocity, not 3"),
+        (lambda: rs.Archive(None, {}), "results must be a rodshell Results, not None"),
+    ],
+)
+def test_a_value_of_another_kind_is_named_with_what_would_do(call, sentence):
+    with pytest.raises(rs.InputError, match=sentence) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+def test_lists_and_arrays_do_in_place_of_tuples():
+    assert rs.GridLayout.orthogonal(spacing=0.1, left_out=["U03"]).left_out == ("U03",)
+    assert rs.Profile([0.0, 1.0], np.array([1.0, 2.0])) == rs.Profile((0.0, 1.0), (1.0, 2.0))
+    assert rs.OutputOptions(rod_chosen=["section"]) == rs.OutputOptions(rod_chosen=("section",))
+    line = np.array([[(-1.0, 0.3), (1.0, 0.3)]])
+    assert rs.Job(TARGET, rs.GridLayout.orthogonal(spacing=0.06), ROD, seams=line).case.seams.lines
+    assert len(rs.trim(FOUND.draped, fewest=np.int64(3)).mesh.grid.rods) == len(RODS)
+
+
 def test_numpy_s_numbers_are_numbers():
     options = rs.OutputOptions(
         strength=np.float32(1e6), stages=np.int64(4), drawings=rs.DrawingStyle(tolerance=np.float32(1))

@@ -5,7 +5,6 @@ The command line, a studio, a sweep or a script load or make a `Job`, change it,
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import Literal, Self, get_args
@@ -34,7 +33,7 @@ from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run, inputs_of
 from rodshell.targets import Target
 from rodshell.units import length_text, shown
-from rodshell.validation import choice, choices_of, file_path, instance, point
+from rodshell.validation import array, choice, choices_of, file_path, instance, listed, mapping, number, point, positive
 
 Auto = Literal["auto"]
 AskedEnds = Literal["pinned", "clamped", "both"]
@@ -100,15 +99,19 @@ class Job:
         require_joint(joint)
         if anchor is not None and anchor != "auto":
             point("anchor", anchor)
+        if rotate is not None and rotate != "auto":
+            number("rotate", rotate, "rad")
         if options is not None:
             instance("options", options, OutputOptions)
-        for name, patch in (patches or {}).items():
+        for name, patch in mapping("patches", patches or {}, 'settings by the names of patches, such as "A"').items():
+            instance("the name of each patch", name, str, "text")
             instance(f"patches {name}", patch, PatchLayout)
         case = case_of(
             target, layout, rod,
             joint=joint or Ball(), method=method, anchor=anchor, rotate=rotate,
             objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
-            seams=seams, patches=patches or {}, options=options or OutputOptions(),
+            seams=listed("seams", seams, "a list of lines, each of points x, y in m"),
+            patches=patches or {}, options=options or OutputOptions(),
         )  # fmt: skip
         self._set(case, target, inputs_of(case))
 
@@ -132,7 +135,7 @@ class Job:
         ------
         InputError : no such case or file, an unknown key, a value that cannot be used; in one sentence.
         """
-        return cls.of_case(load_case(source, flattened({**(overrides or {}), **more})))
+        return cls.of_case(load_case(source, _changes(overrides, more)))
 
     @classmethod
     def of_case(cls, case: Case) -> Self:
@@ -171,7 +174,7 @@ class Job:
         require_joint(joint)
         if rod is not None:
             instance("rod", rod, Rod)
-        changes = flattened({**(overrides or {}), **more})
+        changes = _changes(overrides, more)
         require_keys_of_rods(changes)
         ends, case = _ends_and_case(source, unit, changes)
         given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
@@ -188,7 +191,7 @@ class Job:
         InputError : as of `load`; also a key of a table that was made from an object which no key describes, and one
             that a table of rods does not use.
         """
-        changes = flattened({**(overrides or {}), **more})
+        changes = _changes(overrides, more)
         job = type(self).of_case(changed_case(self._case, changes))
         if job._case.target == self._case.target:
             job._set(job._case, self._target, self._inputs)
@@ -251,7 +254,7 @@ class Job:
             instance("warm_start", warm_start, Form, FOUND)
         choice("until", until, ("drape", "pop-up", "fabrication"))
         if time_limit is not None:
-            instance("time_limit", time_limit, Real, "a number in s")
+            positive("the time limit", time_limit, "s")
         limit = limited(progress, time_limit)
         run = Run(
             self._case,
@@ -302,6 +305,13 @@ class Job:
         object.__setattr__(self, "_case", case)
         object.__setattr__(self, "_target", target)
         object.__setattr__(self, "_inputs", inputs)
+
+
+def _changes(overrides: Mapping[str, object] | None, more: Mapping[str, object]) -> dict[str, object]:
+    """The values by dotted key that are given in a mapping or as arguments."""
+    wanted = 'values by key, such as {"layout.spacing": "0.5 m"}'
+    given = mapping("overrides", {} if overrides is None else overrides, wanted)
+    return flattened({**given, **more})
 
 
 def _ends(given: AskedEnds | Sequence[AskedEnds]) -> tuple[Ends, ...]:
@@ -441,5 +451,5 @@ def pop_up_table(
     ------
     InputError : `finals` does not fit `grid`; no rod has three joints; the joint is eccentric.
     """
-    job = Job.of_table(RodEnds(grid, np.asarray(finals, dtype=float), edge), rod=rod, joint=joint)
+    job = Job.of_table(RodEnds(grid, array("finals", finals, np.float64, None, 2, 3), edge), rod=rod, joint=joint)
     return job.run(progress=progress, time_limit=time_limit, until="pop-up")

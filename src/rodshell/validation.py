@@ -3,11 +3,11 @@
 Every check raises InputError with one sentence, which calls the argument by its `name`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
 from math import inf, isfinite
-from numbers import Real
+from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from reprlib import repr as short
@@ -100,6 +100,62 @@ def not_negative(name: str, value: object, unit: str = "", *, infinite: bool = F
     if not 0 <= real <= inf or (real == inf and not infinite):
         raise InputError(f"{name} must be 0 or more, not {described(value)}{unit and ' ' + unit}")
     return real
+
+
+def whole(name: str, value: object, least: int, most: int | None = None) -> int:
+    """Return `value`, a whole number from `least` to `most` (None: no limit), as an int."""
+    if isinstance(value, Integral) and not isinstance(value, bool):
+        given = int(value)
+        if least <= given and (most is None or given <= most):
+            return given
+    wanted = f"of {least} or more" if most is None else f"{least} to {most}"
+    separator = " " if most is None else ", "
+    raise InputError(f"{name} must be a whole number{separator}{wanted}, not {described(value)}")
+
+
+def flag(name: str, value: object) -> bool:
+    """Return `value` if it is True or False."""
+    if not isinstance(value, bool):
+        raise InputError(f"{name} must be True or False, not {described(value)}")
+    return value
+
+
+def listed(name: str, value: object, wanted: str) -> tuple[Any, ...]:
+    """Return a list, a tuple or an array as a tuple.
+
+    Parameters
+    ----------
+    name : of the argument.
+    value : of the argument; text is not a list of its letters, a mapping not one of its keys.
+    wanted : what it must be, in words, such as "a list of rods".
+    """
+    given: Any = value
+    if isinstance(value, str | bytes | Mapping) or not (isinstance(value, Sequence) or getattr(value, "ndim", None)):
+        raise InputError(f"{name} must be {wanted}, not {described(value)}")
+    return tuple(given)
+
+
+def some(name: str, value: object, wanted: str) -> tuple[Any, ...]:
+    """As `listed`, of one item or more."""
+    items = listed(name, value, wanted)
+    if not items:
+        raise InputError(f"{name} must be {wanted}, not an empty list")
+    return items
+
+
+def texts(name: str, value: object, wanted: str) -> tuple[str, ...]:
+    """Return a list of texts as a tuple; see `listed`."""
+    items = listed(name, value, wanted)
+    for item in items:
+        instance(f"each of {name}", item, str, "text")
+    return tuple(map(str, items))
+
+
+def mapping(name: str, value: object, wanted: str) -> Mapping[Any, Any]:
+    """Return `value` if it is a mapping; `wanted` is what it must be, in words."""
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name} must be {wanted}, not {described(value)}")
+    return value
 
 
 def numbers(name: str, value: object, wanted: str, count: int) -> tuple[float, ...]:

@@ -481,7 +481,7 @@ FLAT = rs.Rod(rs.Ellipse(1e-3, 2e-3), rs.Material(1e9, 1e3))
         (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(angles={0: np.nan})), "angle of edge 0 must be finite"),
         (lambda: rs.solve_rod(CLAMPED, loads=rs.RodLoads(moments={0: np.nan})), "moment at 0 must be finite"),
         (lambda: rs.solve_rod(CLAMPED, start=CLAMPED.state() * np.nan), "to start from must be finite"),
-        (lambda: rs.solve_rod(CLAMPED, steps=1.5), "1, 2, ... steps"),
+        (lambda: rs.solve_rod(CLAMPED, steps=1.5), "steps must be a whole number of 1 or more, not 1.5"),
         (lambda: rs.Rod(rs.GivenSection(1, 1, 1, 1), rs.Material(1.0, 1.0)), "leave the material out"),
         (lambda: rs.Rod(rs.Circle(1.0)), "needs a material"),
         (lambda: FLAT.bend_stiffness, "two bending stiffnesses"),

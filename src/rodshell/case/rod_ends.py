@@ -14,7 +14,7 @@ from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, Profile, straight_rods
 from rodshell.results.records import Stiffness
 from rodshell.units import length_text, parse_quantity, read_unit, shown
-from rodshell.validation import instance
+from rodshell.validation import instance, positive
 
 COLUMNS = (
     "flat_x0", "flat_y0", "flat_x1", "flat_y1",
@@ -45,6 +45,8 @@ class RodEnds:
 
     def __post_init__(self) -> None:
         instance("grid", self.grid, FlatGrid)
+        if self.edge is not None:
+            positive("edge", self.edge, "m")
         points = np.asarray(self.final, dtype=float)
         object.__setattr__(self, "final", points)
         if points.shape != (len(self.grid.rods), 2, 3) or not np.isfinite(points).all():

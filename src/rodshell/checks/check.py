@@ -16,15 +16,16 @@ from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reacti
 from rodshell.checks.self_weight import SelfWeightCheck, self_weight, weakest
 from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import PopUp
-from rodshell.formfinding.popup import Ends
+from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.load_path import MOST_FACTORIZATIONS
 from rodshell.units import length_text, stress_text
-from rodshell.validation import brief
+from rodshell.validation import brief, choice, instance, mapping, positive, whole
 
+MOST_STAGES = 1000
 WORTH = 0.01  # of the stress: less torsion is not worth a word
 
 
@@ -179,7 +180,18 @@ def check(
     shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.bending`.
     progress : called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and what
         was found until then is returned.
+
+    Raises
+    ------
+    InputError : a value is of the wrong kind.
     """
+    by_ends = 'shells by their ends, such as {"pinned": rodshell.pop_up(...)}'
+    for ends, shape in mapping("popped", popped, by_ends).items():
+        choice("the ends of popped", ends, ENDS)
+        instance(f"the shell with {ends} ends", shape, PopUp, "what rodshell.pop_up returned")
+    instance("rod", rod, Rod)
+    whole("stages", stages, 0, MOST_STAGES)
+    positive("shear_weight", shear_weight)
     done = {ends: _settled(shape) for ends, shape in popped.items() if shape.report.converged}
     checks = Checks(
         bending={

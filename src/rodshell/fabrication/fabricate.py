@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import partial
-from math import isfinite
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from rodshell.layout.flatgrid import layers
 from rodshell.rods.section import Rod
 from rodshell.rods.varied import varied
 from rodshell.units import length_text
+from rodshell.validation import array, flag, instance, not_negative, number, positive
 
 SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
 
@@ -46,9 +46,10 @@ class Fabrication:
     kerf: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in (("end allowance", self.end_allowance), ("kerf", self.kerf)):
-            if not (isfinite(value) and value >= 0):
-                raise InputError(f"the {name} must not be negative, but is {value} m")
+        not_negative("the end allowance", self.end_allowance, "m")
+        not_negative("the kerf", self.kerf, "m")
+        if self.stock_length is not None:
+            positive("the stock length", self.stock_length, "m")
         if self.stock_length is None and self.kerf > 0:
             raise InputError(
                 f"the kerf of {self.kerf} m is lost where stock is cut: give its stock_length, or leave the kerf out"
@@ -126,7 +127,22 @@ def fabricate(
     pattern : of the bracing; default: both diagonals of every cell.
     prestrain : by which cables are shortened when they are put in [-]; None: the bracing is not of cables.
     to_supports : diagonals also from the outermost joints to the rod ends.
+
+    Raises
+    ------
+    InputError : a value is of the wrong kind.
     """
+    instance("mesh", mesh, GridMesh)
+    instance("rod", rod, Rod)
+    instance("options", options, Fabrication)
+    instance("pattern", pattern, Pattern)
+    flag("to_supports", to_supports)
+    if curvature is not None:
+        curvature = array("curvature", curvature, np.float64, len(mesh.rod_nodes))
+    if final is not None:
+        final = array("final", final, np.float64, mesh.node_count, 3)
+    if prestrain is not None:
+        number("prestrain", prestrain)
     rods, crossings = mesh.grid.rods, mesh.grid.crossings
     lengths = np.array([rod_line.length for rod_line in rods])
     cut = lengths + 2 * options.end_allowance
@@ -196,7 +212,7 @@ def _laths(
         apart = median(np.diff(np.sort(joints))) if len(joints) > 1 else 0.0
         beyond = () if rod.profile is None else rod.profile.laths(rod.length, more)
         spliced = list[float]()
-        for number, (start, stop) in enumerate([(-more, rod.length + more), *beyond], start=1):
+        for lath, (start, stop) in enumerate([(-more, rod.length + more), *beyond], start=1):
             found: list[float] | None = []
             if stock is not None:
                 inside = joints[(joints > start) & (joints < stop)]
@@ -205,10 +221,10 @@ def _laths(
                     short=short * apart, taken=np.array(spliced) - start,
                 )  # fmt: skip
             if found is None:
-                hopeless.setdefault(k, rod.name if number == 1 else f"{rod.name} (lath {number})")
+                hopeless.setdefault(k, rod.name if lath == 1 else f"{rod.name} (lath {lath})")
             mine = tuple(at + start for at in found or ())
             spliced += mine
-            made.append(Lath(k, number, start, stop, mine))
+            made.append(Lath(k, lath, start, stop, mine))
     if not hopeless:
         return tuple(made), ()
     first = next(iter(hopeless.values()))

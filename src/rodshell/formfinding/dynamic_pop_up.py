@@ -15,7 +15,7 @@ from rodshell.formfinding.popup import FIRST_RISE, arched, laid_below
 from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.frames import dot
-from rodshell.joints import Coupling, Joint, SharedDofs
+from rodshell.joints import Coupling, Joint, SharedDofs, require_joint
 from rodshell.model import Shell
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
@@ -24,7 +24,7 @@ from rodshell.solve.linear_stability import step_limit
 from rodshell.solve.newton_matrix import narrow_or_dissected
 from rodshell.solve.problem import Damping, Supports
 from rodshell.solve.simulate import Sample, simulate
-from rodshell.validation import not_negative, positive
+from rodshell.validation import instance, not_negative, positive
 
 BALANCED = 1e-3  # of EI over the square of the shell's half-width: out-of-balance force on a node
 STILL = 1e-6  # of the elastic energy: kinetic energy
@@ -106,6 +106,13 @@ def dynamic_pop_up(
     StabilityError : explicit ties are too stiff for any step.
     ConvergenceError : a step fails.
     """
+    instance("footprint", footprint, Footprint)
+    instance("boundary", boundary, Boundary)
+    instance("rod", rod, Rod)
+    require_joint(joint)
+    if isinstance(joint, Sequence):
+        raise InputError("joint must be one rodshell joint for all crossings, not a sequence of joints")
+    instance("settings", settings, DynamicPopUpSettings)
     if joint and joint.eccentricity and not footprint.mesh.layered:
         footprint, boundary = in_layers(footprint, boundary, joint.eccentricity)
     mesh = footprint.mesh

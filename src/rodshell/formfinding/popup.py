@@ -29,7 +29,7 @@ from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_st
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
 from rodshell.solve.problem import Pattern, Problem, Supports, half_width
 from rodshell.units import length_text
-from rodshell.validation import choice, instance
+from rodshell.validation import choice, instance, whole
 
 Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
@@ -154,6 +154,8 @@ def pop_up(
     instance("boundary", boundary, Boundary)
     instance("rod", rod, Rod)
     require_joint(joint)
+    if most_factorizations is not None:
+        whole("most_factorizations", most_factorizations, 1)
     joint = joint or Ball()
     joints = joint if isinstance(joint, Sequence) else (joint,)
     apart = max((joint.eccentricity for joint in joints), default=0.0)

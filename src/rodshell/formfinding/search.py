@@ -15,7 +15,7 @@ from rodshell.nets.net_ends import inside_nodes
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
-from rodshell.validation import choice
+from rodshell.validation import choice, instance, number, point, some
 
 Objective = Literal["shear", "curvature", "gap"]
 Auto = Literal["auto"]
@@ -94,7 +94,16 @@ def search(
     ------
     InputError : no trial has a net; an unknown objective.
     """
+    instance("target", target, Target)
+    instance("layout", layout, GridLayout)
+    instance("rod", rod, Rod)
     choice("objective", objective, get_args(Objective))
+    if anchors != "auto":
+        for given in some("anchors", anchors, 'points x, y in m, or "auto"'):
+            point("each of the anchors", given)
+    if headings != "auto":
+        for angle in some("headings", headings, 'angles in rad, or "auto"'):
+            number("each of the headings", angle, "rad")
     coarse = target.size / COARSE
     tried = GridLayout.orthogonal(spacing=coarse, edge=coarse / 3, rotate=layout.rotate)
     points = _spread_anchors(target) if anchors == "auto" else list(anchors)

@@ -11,7 +11,7 @@ from rodshell.formfinding.methods import Bound, Draped
 from rodshell.geometry.frames import unit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
-from rodshell.validation import instance
+from rodshell.validation import array, instance, whole
 
 NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
 FEWEST_JOINTS = 3  # a rod with fewer swings about the line through its joints
@@ -34,6 +34,13 @@ class Boundary:
     draped: Floats | None = None
     normals: Floats | None = None
 
+    def __post_init__(self) -> None:
+        points = array("the boundary's points", self.points, np.float64, None, 3)
+        array("the boundary's tangents", self.tangents, np.float64, len(points), 3)
+        for name in ("draped", "normals"):
+            if (given := getattr(self, name)) is not None:
+                array(f"the boundary's {name}", given, np.float64, None, 3)
+
     def __repr__(self) -> str:
         return f"<Boundary: ends of {len(self.points) // 2} rods>"
 
@@ -48,6 +55,9 @@ class Footprint:
     """
 
     mesh: GridMesh
+
+    def __post_init__(self) -> None:
+        instance("mesh", self.mesh, GridMesh)
 
     def __repr__(self) -> str:
         return f"<Footprint: {len(self.rods)} rods, {self.mesh.node_count} nodes>"
@@ -99,6 +109,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     InputError : `draped` is of another kind; no rod is left, or a hanging rod is too short to reach the target's end.
     """
     instance("draped", draped, Draped, "what rodshell.drape returned")
+    whole("fewest", fewest, 0)
     margin = NEAREST_JOINT * min(draped.layout.spacing)
     rods, positions, dropped = draped.rods, draped.positions, list(draped.dropped)
     if isinstance(draped.method, Bound):

@@ -10,6 +10,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import FlatGrid
 from rodshell.units import shown
+from rodshell.validation import instance
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Pattern:
         ------
         InputError : it is something else.
         """
+        instance("the pattern of diagonals", words, str, 'text such as "both"')
         if words in ("both", "one"):
             return Pattern(2 if words == "both" else 1)
         name, _, number = words.replace("=", " ").strip().partition(" ")

@@ -13,6 +13,7 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout.profile import Profile
+from rodshell.validation import instance, listed, number, texts
 
 Family = Literal["u", "v", "free"]
 
@@ -184,7 +185,10 @@ class FlatGrid:
         rods : straight rods.
         margin : crossings closer to an end of either rod are not joined [m].
         """
-        rods = tuple(rods)
+        rods = listed("rods", rods, "a list of rodshell.FlatRod")
+        for rod in rods:
+            instance("each of the rods", rod, FlatRod)
+        number("margin", margin, "m")
         lines = np.array([(*rod.origin, *rod.direction, rod.start, rod.end) for rod in rods]).reshape(-1, 6)
         return FlatGrid(rods, Crossings(*_crossings(lines, margin)))
 
@@ -211,6 +215,9 @@ class FlatGrid:
             raise InputError(
                 f"the grid has {len(self.rods)} rods: give one profile for all, or one for each, not {len(each)}"
             )
+        for profile in each:
+            if profile is not None:
+                instance("each of the profiles", profile, Profile)
         rods = tuple(rod._replace(profile=profile) for rod, profile in zip(self.rods, each, strict=True))
         return replace(self, rods=rods)
 
@@ -258,7 +265,9 @@ def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> Fla
     if not np.isfinite(points).all():
         raise InputError(f"rod {int(np.argwhere(~np.isfinite(points))[0, 0]) + 1} has an end that is not finite")
     digits = len(str(len(points)))
-    labels = list(names) if names is not None else [f"R{k + 1:0{max(digits, 2)}d}" for k in range(len(points))]
+    labels = [f"R{k + 1:0{max(digits, 2)}d}" for k in range(len(points))]
+    if names is not None:
+        labels = [*texts("names", names, "a list of different names")]
     if not len(labels) == len(set(labels)) == len(points):
         raise InputError(f"{len(points)} rods need as many different names, not {len(set(labels))}")
     apart = points[:, 1] - points[:, 0]

@@ -12,7 +12,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod
 from rodshell.units import NUMBER
-from rodshell.validation import instance, number, numbers, positive
+from rodshell.validation import instance, number, numbers, positive, texts
 
 Auto = Literal["auto"]
 
@@ -69,9 +69,7 @@ class GridLayout:
             values["length"] = positive("layout length", self.length, "m")
         if not _is_auto(self.rods):
             values["rods"] = _counts(self.rods)
-        if isinstance(self.left_out, str) or not all(isinstance(name, str) for name in self.left_out):
-            raise InputError(f"layout left_out must be names of rods, not {short(self.left_out)}")
-        values["left_out"] = tuple(self.left_out)
+        values["left_out"] = texts("layout left_out", self.left_out, "names of rods")
         for name, value in values.items():
             object.__setattr__(self, name, value)
         if not FLATTEST <= self.crossing <= pi - FLATTEST:

@@ -11,10 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError
 from rodshell.geometry.curves import on_curve
 from rodshell.kernels import njit
 from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, sides, whole_rods
 from rodshell.layout.profile import Profile
+from rodshell.validation import finite, instance, listed, not_negative
 
 CROWDED = 0.01  # of the usual edge: nodes closer to an end are left out: round-off in forces grows as the inverse cube
 
@@ -258,9 +260,20 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
     Parameters
     ----------
     grid : rods and joints.
-    edge : longest edge [m].
+    edge : longest edge [m]; infinite: as few edges as possible.
     marks : for each rod the material coordinates of further points that must be nodes [m].
+
+    Raises
+    ------
+    InputError : a value is of the wrong kind; the edge is not positive; not as many marks as rods.
     """
+    instance("grid", grid, FlatGrid)
+    if not_negative("edge", edge, "m", infinite=True) == 0:
+        raise InputError("edge must be positive, not 0 m")
+    if marks is not None:
+        marks = [finite("marks", row, np.size(row)).tolist() for row in listed("marks", marks, "a list for each rod")]
+        if len(marks) != len(grid.rods):
+            raise InputError(f"{len(grid.rods)} rods need as many lists of marks, not {len(marks)}")
     first, s, nodes, count, joint_nodes = _fixed_points(grid, [()] * len(grid.rods) if marks is None else marks)
     lines = np.array([(*rod.origin, *rod.direction) for rod in grid.rods])
     edges = edge_counts(np.diff(s), edge)

@@ -12,7 +12,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.validation import choice, positive
+from rodshell.validation import choice, listed, number, positive
 
 Varies = Literal["size", "width", "height", "a", "b", "laths"]
 GAUSS = 5  # points a piece: 1e-5 of the mean of 1/f where f grows eightfold over it
@@ -44,9 +44,8 @@ class Profile:
         choice("varies", self.varies, get_args(Varies))
         for name in ("stations", "factors"):
             values = getattr(self, name)
-            if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray):
-                raise InputError(f"the {name} of a profile must be a sequence of numbers, not {values!r}")
-            object.__setattr__(self, name, tuple(float(value) for value in values))
+            given = listed(f"the {name} of a profile", values, "a sequence of numbers")
+            object.__setattr__(self, name, tuple(number(f"each of the {name} of a profile", value) for value in given))
         if len(self.stations) != len(self.factors) or len(self.stations) < 2:
             raise InputError(
                 f"a profile needs a factor at each of two stations or more, not {len(self.factors)} factors at "
@@ -71,7 +70,7 @@ class Profile:
         factors : from an end to the middle [-].
         varies : as of the class.
         """
-        half = tuple(factors)
+        half = listed("the factors of a profile", factors, "a sequence of numbers")
         whole = (*half, *half[-2::-1])
         return Profile(tuple(np.linspace(0.0, 1.0, len(whole))), whole, varies)
 
@@ -87,7 +86,7 @@ class Profile:
         ------
         InputError : the share is not between 0 and 1.
         """
-        if not 0.0 < share < 1.0:
+        if not 0.0 < number("the share of a rod's length that is double", share) < 1.0:
             raise InputError(f"the share of a rod's length that is double must lie between 0 and 1, not {share!r}")
         first, last = 0.5 * (1.0 - share), 0.5 * (1.0 + share)
         return Profile((0.0, first, first, last, last, 1.0), (1.0, 1.0, 2.0, 2.0, 1.0, 1.0), "laths")
@@ -114,10 +113,10 @@ class Profile:
         found = list[tuple[float, float]]()
         parts = list(zip(self.stations, self.stations[1:], self.factors, self.factors[1:], strict=False))
         parts = [part for part in parts if part[0] < part[1]]
-        for number in range(2, int(max(self.factors)) + 1 if self.varies == "laths" else 0):
+        for count in range(2, int(max(self.factors)) + 1 if self.varies == "laths" else 0):
             runs = list[list[float]]()
             for low, high, *factors in parts:
-                if min(factors) < number:
+                if min(factors) < count:
                     continue
                 if runs and runs[-1][1] == low:
                     runs[-1][1] = high

@@ -10,7 +10,7 @@ from rodshell.loads.locked_joints import LockedJoints
 from rodshell.loads.strength import Strength
 from rodshell.rods.design_strength import DURATIONS, Duration
 from rodshell.units import shown
-from rodshell.validation import brief, choice, instance, not_negative, positive
+from rodshell.validation import brief, choice, described, instance, mapping, not_negative, positive
 
 Bracing = Cables | Laths
 LASTING: dict[type, Duration] = {
@@ -99,6 +99,12 @@ class Loads:
 
     def __post_init__(self) -> None:
         instance("strength", self.strength, Strength)
+        instance("stability", self.stability, Stability)
+        mapping("loads", self.loads, 'loads by their names, such as {"snow": rodshell.Snow(500.0)}')
+        by_name = 'factors by the names of loads, such as {"winter": {"snow": 1.5}}'
+        for name, factors in mapping("combinations", self.combinations, by_name).items():
+            mapping(f"the combination {shown(name)}", factors, 'factors by the names of loads, such as {"snow": 1.5}')
+        mapping("durations", self.durations, 'durations by the names of loads, such as {"snow": "short"}')
         for name, duration in self.durations.items():
             if name not in self.loads:
                 raise InputError(
@@ -116,7 +122,9 @@ class Loads:
             instance("locked_joints", self.locked_joints, LockedJoints, "rodshell.LockedJoints(...)")
         for name, load in self.loads.items():
             if not isinstance(load, Load):
-                raise InputError(f"the load {shown(name)} must be a load such as rodshell.Snow(500.0), not {load!r}")
+                raise InputError(
+                    f"the load {shown(name)} must be a load such as rodshell.Snow(500.0), not {described(load)}"
+                )
         for name, factors in self.combinations.items():
             if not factors:
                 raise InputError(f"the combination {shown(name)} has no loads: give factors such as {{ snow = 1.5 }}")

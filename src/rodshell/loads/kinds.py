@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.loads.tributary import Tributary
 from rodshell.targets.heightfield import Formula, parse_formula
 from rodshell.units import length_text, shown
-from rodshell.validation import brief, choice, not_negative, number, numbers, positive
+from rodshell.validation import brief, choice, listed, not_negative, number, numbers, positive, texts
 
 GRAVITY = 9.81  # [m/s2]
 Distribution = Literal["uniform", "half", "drifted"]
@@ -223,7 +223,7 @@ class LineLoad:
     force: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        if len(self.line) < 2:
+        if len(listed("the line of a load", self.line, "points x, y in m")) < 2:
             raise InputError("a line load needs two points or more")
         for point in self.line:
             numbers("a point of a line load", point, "two finite numbers x, y in m", 2)
@@ -260,7 +260,8 @@ class Settlement:
     move: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        if not self.supports:
+        wanted = 'a list of rod ends such as ["U03.1"]'
+        if not texts("the supports of a settlement", self.supports, wanted):
             raise InputError('a settlement needs supports: give rod ends such as "U03.1"')
         numbers("the movement of supports", self.move, "three finite numbers in m", 3)
 

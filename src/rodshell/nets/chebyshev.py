@@ -25,7 +25,7 @@ from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
 from rodshell.targets import Target
 from rodshell.units import length_text
-from rodshell.validation import number, point
+from rodshell.validation import instance, number, point
 
 SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
 SEARCHES = (2, 4, 8)  # steps per spacing of the march that finds the lines; more where the net extends further
@@ -125,6 +125,10 @@ def chebyshev_net(
     NetLimitError : the crossing angle falls below 10 degrees or the march fails inside the target; names the place.
     InputError : the anchor is outside the target, the spacing is too large, or a rod is too short to reach the end.
     """
+    instance("target", target, Target)
+    instance("layout", layout, GridLayout)
+    if warm_start is not None:
+        instance("warm_start", warm_start, ChebyshevNet, "a net that rodshell.chebyshev_net returned")
     if anchor is not None:
         point("anchor", anchor)
     number("eccentricity", eccentricity, "m")

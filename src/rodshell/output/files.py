@@ -12,7 +12,7 @@ from rodshell.errors import InputError
 from rodshell.progress import Progress, silent
 from rodshell.results.archive import SHELLS, Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
-from rodshell.validation import described
+from rodshell.validation import described, flag, instance, mapping
 
 if TYPE_CHECKING:
     from rodshell.output.drawing import Drawing
@@ -45,6 +45,10 @@ def save(
         `force` is False. OutputError : the folder cannot be written.
     """
     _require_archive(archive)
+    flag("force", force)
+    for name, content in mapping("more", more or {}, "texts by the names of their files").items():
+        instance("the name of each file", name, str, "text")
+        instance(f"the content of {name}", content, str, "text")
     wanted = wanted_kinds(kinds)
     names = [*archive_names(archive), *reserved(wanted), *(more or ())]
     with open_folder(folder, reserved=names, force=force) as place:
@@ -76,6 +80,7 @@ def export(
     InputError : as of `save`, or a kind needs a package that is not installed. OutputError : as of `save`.
     """
     _require_archive(archive)
+    flag("force", force)
     names = list[str]()
     wanted = wanted_kinds(kinds)
     with open_folder(folder, reserved=reserved(wanted), force=force) as place:

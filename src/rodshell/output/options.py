@@ -3,21 +3,20 @@
 import datetime
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from rodshell.checks.bending import VON_MISES, require_known_stress
+from rodshell.checks.check import MOST_STAGES
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.joints import Joint
 from rodshell.rods.section import Rod
-from rodshell.validation import described, instance, positive
+from rodshell.validation import choice, instance, listed, positive, whole
 
 if TYPE_CHECKING:
     from rodshell.loads.strength import Limits, Strength
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
-MOST_STAGES = 1000
 
 
 @dataclass(frozen=True)
@@ -111,13 +110,14 @@ class OutputOptions:
                 f"a shear strength of {self.shear_strength:g} Pa does not say what bending may be: "
                 "give the strength too (checks.strength), or leave it out"
             )
-        if isinstance(self.stages, bool) or not isinstance(self.stages, Integral):
-            raise InputError(f"stages must be a whole number, 0 to {MOST_STAGES}, not {described(self.stages)}")
-        object.__setattr__(self, "stages", int(self.stages))
+        object.__setattr__(self, "stages", whole("stages", self.stages, 0, MOST_STAGES))
         instance("fabrication", self.fabrication, Fabrication)
         instance("drawings", self.drawings, DrawingStyle)
-        if not 0 <= self.stages <= MOST_STAGES:
-            raise InputError(f"the deployment can have 0 to {MOST_STAGES} stages, not {self.stages}")
+        for part in listed("rod_chosen", self.rod_chosen, 'parts of a rod such as ("section",)'):
+            choice("each of rod_chosen", part, ("material", "section"))
+        object.__setattr__(self, "rod_chosen", tuple(self.rod_chosen))
+        if self.strength_of is not None:
+            instance("strength_of", self.strength_of, str, "the name of a material")
 
     @property
     def shear_weight(self) -> float:

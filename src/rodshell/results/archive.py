@@ -25,7 +25,7 @@ from rodshell.results.folder import ResultFolder, reading
 from rodshell.results.results import Results, Verdict, read_results
 from rodshell.results.summary import summary_text
 from rodshell.results.verdict import verdict_of
-from rodshell.validation import instance
+from rodshell.validation import instance, mapping
 
 LARGEST = 20_000_000  # bytes of a file that is copied
 FOLDER = "inputs"
@@ -165,6 +165,12 @@ class Archive:
     case_toml: str = ""
     inputs: Mapping[str, bytes] = field(default_factory=dict)
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        instance("results", self.results, Results)
+        mapping("states", self.states, "arrays by their names")
+        instance("case_toml", self.case_toml, str, "text")
+        mapping("inputs", self.inputs, "contents of files by their paths")
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Archive):

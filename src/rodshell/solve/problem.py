@@ -18,7 +18,7 @@ from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.elements import Elements, Stretch
 from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl, product, upper_triangle
-from rodshell.validation import finite
+from rodshell.validation import array, finite, instance, number, vector
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -286,6 +286,11 @@ class GravityForce:
     nodes: slice | Ints
     acceleration: tuple[float, float, float] = (0.0, 0.0, -9.81)
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.nodes, slice):
+            array("the nodes that gravity acts on", self.nodes, np.int64, None)
+        vector("the acceleration of gravity", self.acceleration)
+
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
         """The weight of the nodes.
 
@@ -305,6 +310,10 @@ class PointLoads:
 
     blocks: Ints
     forces: Floats
+
+    def __post_init__(self) -> None:
+        blocks = array("the blocks of point loads", self.blocks, np.int64, None)
+        finite("the forces of point loads", self.forces, len(blocks), 3)
 
     @classmethod
     def on(cls, block: int, *force: float) -> "PointLoads":
@@ -345,9 +354,10 @@ class Damping:
     coefficients: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
-        if not self.rate >= 0:
+        if number("the damping rate", self.rate, "1/s") < 0:
             raise InputError(f"the damping rate must not be negative, not {self.rate} 1/s: it would feed energy in")
-        if not np.all(np.asarray(self.coefficients) >= 0):
+        coefficients = "the damping coefficients"
+        if (finite(coefficients, self.coefficients, *np.shape(self.coefficients)) < 0).any():
             raise InputError("damping coefficients must not be negative: they would feed energy in")
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> None:
@@ -368,6 +378,9 @@ class ExplicitForce:
     """
 
     force: Callable[[float, Floats, Floats], Floats]
+
+    def __post_init__(self) -> None:
+        instance("the force", self.force, Callable, "a function of time, state and velocity")  # type: ignore[arg-type]
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
         """The force, evaluated once for the step.

@@ -21,7 +21,7 @@ from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import NUDGE, Equilibrium, SolveReport, Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
-from rodshell.validation import direction, finite, vector
+from rodshell.validation import array, direction, finite, flag, instance, mapping, texts, vector, whole
 
 SPIN = (1.0, 0.0, 0.0)
 
@@ -48,6 +48,11 @@ class RodSupports:
     turns: Mapping[End, float] = field(default_factory=dict)
     spinning: Sequence[End] = ()
     angles: Mapping[int, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("positions", "along", "tangents", "directors", "turns", "angles"):
+            mapping(name, getattr(self, name), "a mapping from nodes, edges or ends")
+        texts("spinning", self.spinning, 'a list of ends such as ("start",)')
 
     def require(self, rod: ElasticRod) -> None:
         """Raise InputError where this rod cannot be held so."""
@@ -76,6 +81,9 @@ class RodLoads:
     forces: Mapping[int, ArrayLike] | ArrayLike = field(default_factory=dict)
     moments: Mapping[int | End, float] = field(default_factory=dict)
     gravity: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        mapping("moments", self.moments, "a mapping from edges or ends to moments in N m")
 
     def on(self, rod: ElasticRod, spinning: Sequence[End]) -> Floats:
         """(N, 3) load on each block [N, at angles N m].
@@ -327,8 +335,13 @@ def solve_rod(
     InputError : a support or a load that this rod does not have.
     ConvergenceError : the goal was not reached, or not in a stable equilibrium; `report` holds the figures.
     """
-    if not (isinstance(steps, int) and steps >= 1):
-        raise InputError(f"a path takes 1, 2, ... steps, not {steps}")
+    instance("rod", rod, ElasticRod)
+    whole("steps", steps, 1)
+    flag("stable", stable)
+    if supports is not None:
+        instance("supports", supports, RodSupports)
+    if loads is not None:
+        instance("loads", loads, RodLoads)
     supports, loads = supports or RodSupports(), loads or RodLoads()
     state = _start_state(rod, start)
     path, load = SupportPath.of(rod, state, supports), loads.on(rod, supports.spinning)
@@ -382,7 +395,7 @@ def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
         if start.rod is not rod:
             raise InputError("twist angles belong to their frames: continue from a shape with its own rod, shape.rod")
         return start.state
-    state = rod.state() if start is None else np.array(start, dtype=float)
+    state = rod.state() if start is None else array("start", start, np.float64, None, 3)
     if state.shape != (rod.block_count, 3):
         raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
     return finite("the state to start from", state, *state.shape).copy()
