@@ -218,6 +218,28 @@ def test_the_case_kept_with_the_form_of_a_python_function_is_not_run_with_anothe
     assert main(["popup", saved, "--out", str(tmp_path / "popped"), "--only", "csv"]) in (0, 1)
 
 
+@pytest.mark.parametrize(
+    ("comment", "what"),
+    [
+        ("# the target was the Python function bowl: no case file can give it again\n", "the Python function bowl:"),
+        (
+            "# no case file can give the Python function bowl as a target again\n",
+            "the Python function bowl as a target:",
+        ),
+        ("# no case file can give joints with linkers of another rod again\n", "joints with linkers of another rod:"),
+    ],
+)
+def test_the_comments_that_earlier_versions_kept_in_place_of_a_case_are_refused_too(
+    comment: str, what: str, tmp_path: Path
+) -> None:
+    """As they were written from c6f8537 and from 0177034 on; a comment of one's own still is an empty case."""
+    (tmp_path / "case.toml").write_text(comment)
+    for case in (tmp_path / "case.toml", comment):
+        with pytest.raises(InputError, match=f"cannot be run again: no case file can describe {what}"):
+            rs.Job.load(case)
+    assert rs.Job.load("# no case file can give me joy\n") == rs.Job.load("hemisphere")
+
+
 def test_a_job_is_read_only_and_says_what_it_is_in_one_line() -> None:
     job = dome(seams__lines="-1,0; 1,0")
     with pytest.raises(AttributeError, match=r"use job.changed\(...\)"):

@@ -1,5 +1,6 @@
 """From a name, a file, a text or a mapping, and changed keys, to a complete case or one clear sentence."""
 
+import re
 import tomllib
 import warnings
 from collections.abc import Iterator, Mapping
@@ -60,6 +61,12 @@ TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
 RENAMED: dict[str, str] = {}
 """Keys that were called otherwise in the last version, old -> new: still read, with a warning, for this version."""
 
+
+UNDESCRIBED_BEFORE = (
+    re.compile(r"# no case file can give (.+) again"),
+    re.compile(r"# the target was (.+): no case file can give it again"),
+)
+"""The one comment that earlier versions kept in place of a case with `UNDESCRIBED`."""
 
 NOT_A_WORD = "the keys of a case are words such as target.radius, not {!r}"
 
@@ -299,9 +306,14 @@ def _raw_of(source: "str | PathLike[str] | Mapping[str, object] | None") -> Raw:
 
 def _parsed(name: str, text: str, wrong_type: str = "") -> Raw:
     try:
-        return tomllib.loads(text)
+        raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as reason:
         raise InputError(wrong_type or f"{name} is not valid TOML: {reason}") from None
+    if not raw:
+        for comment in UNDESCRIBED_BEFORE:
+            if found := comment.fullmatch(text.strip()):
+                return {UNDESCRIBED: found[1]}
+    return raw
 
 
 def _nested(mapping: Mapping[str, object]) -> Raw:
