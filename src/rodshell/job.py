@@ -254,7 +254,7 @@ class Job:
             instance("warm_start", warm_start, Form, FOUND)
         choice("until", until, ("drape", "pop-up", "fabrication"))
         if time_limit is not None:
-            positive("the time limit", time_limit, "s")
+            positive("time_limit", time_limit, "s")
         limit = limited(progress, time_limit)
         run = Run(
             self._case,

@@ -46,7 +46,7 @@ def test_a_time_limit_raises_from_the_first_late_call_on_and_names_the_first(clo
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan")])
 def test_a_time_limit_must_be_positive(seconds):
-    with pytest.raises(rs.InputError, match="time limit must be positive"):
+    with pytest.raises(rs.InputError, match="time_limit must be positive"):
         rs.find_form(HEMISPHERE, LAYOUT, ROD, time_limit=seconds)
 
 

@@ -389,5 +389,5 @@ def test_styles_that_no_file_can_hold_are_refused(style: dict, reason: str) -> N
 def test_options_that_make_no_sense_are_refused() -> None:
     with pytest.raises(InputError, match="strength must be positive"):
         OutputOptions(strength=0.0)
-    with pytest.raises(InputError, match="0 to 1000 stages"):
+    with pytest.raises(InputError, match="stages must be a whole number, 0 to 1000, not -1"):
         OutputOptions(stages=-1)

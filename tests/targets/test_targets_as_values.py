@@ -102,7 +102,7 @@ def test_what_is_no_length_is_refused_in_one_sentence(name, wrong):
             'layout rods must be two counts .* "auto", not .all',
         ),
         (lambda: replace(LAYOUT, lines=(1, 2)), "layout lines must be two lists of finite offsets in m, not"),
-        (lambda: replace(LAYOUT, left_out="U01"), "layout left_out must be names of rods, not 'U01'"),
+        (lambda: replace(LAYOUT, left_out="U01"), 'layout left_out must be names of rods, not "U01"'),
         (lambda: rs.straight_rods("rods.csv"), r"rod ends must be numbers of the shape \(rods, 2, 2\), not 'rods.csv'"),
         (lambda: rs.chebyshev_net(rs.Hemisphere(0.2), LAYOUT, anchor="0,0"), "anchor must be two finite numbers"),
         (lambda: rs.chebyshev_net(rs.Hemisphere(0.2), LAYOUT, eccentricity="1"), "eccentricity must be a number in m"),
