@@ -3,12 +3,14 @@
 import os
 import time
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 import rodshell as rs
 from rodshell.errors import InputError
+from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.joints import Joint, joint_parameters
 from rodshell.output.drawing import CAPITAL, LETTER, TEXT, Drawing
 from rodshell.output.drawings import drawing_set, sheet_set
@@ -16,6 +18,8 @@ from rodshell.output.drawings.flat import flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import BLOCK, MARGIN, MORE, ROW, laid_out, room, title_block
 from rodshell.output.options import PAPERS, DrawingStyle
 from rodshell.results import Archive, Results
+from rodshell.results.wording import rounding_of
+from tests.acceptance.cases import ROD
 from tests.output.forms import archive, wished
 from tests.output.hostile import hostile_archive
 from tests.output.sample_archive import sample_archive, table_archive
@@ -181,3 +185,102 @@ def test_a_result_without_rod_or_joint_says_so() -> None:
     bare = {key: value for key, value in sample_archive(3, 2).results.plain().items() if key not in ("rod", "joint")}
     entries = dict(title_block(replace(sample_archive(3, 2), results=Results.of(bare)), "").entries)
     assert entries["Section"] == entries["Material"] == "not given"
+
+
+# What tables and stages are of
+
+
+@cache
+def small(*ends: Ends) -> Archive:
+    """A dome of seven rods each way, its four stages followed."""
+    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.015)
+    return rs.find_form(rs.Hemisphere(0.2), layout, ROD, ends=ends).archive(options=rs.OutputOptions(stages=4))
+
+
+def titled(made: Archive, first: str) -> list[Drawing]:
+    """The sheets whose titles begin so."""
+    return [sheet for sheet in sheets(made) if sheet.title.startswith(first)]
+
+
+def cells(found: list[Drawing]) -> list[str]:
+    return [text.text for sheet in found for text in sheet.texts if text.layer == "LABEL"]
+
+
+def figures(made: Archive, table: str) -> set[str]:
+    """What depends on the final shape: smallest radii of rods, lengths of diagonals [mm]."""
+    if table == "Rods":
+        return {f"{1e3 * (rod.min_radius or 0.0):.4g}" for rod in made.results.rods}
+    fabricated = made.results.fabrication
+    assert fabricated is not None
+    return {rounding_of(made.results).mm(brace.final) for brace in fabricated.bracing}
+
+
+@pytest.mark.parametrize("table", ["Rods", "Bracing"])
+def test_tables_of_the_final_shape_say_with_which_ends_it_is(table: str) -> None:
+    """A shell popped up with both ends has the table of the one that its title names: here of the clamped one."""
+    named = {ends: f"{table}, final shape with {ends} ends" for ends in ENDS}
+    for ends, other in (ENDS, ENDS[::-1]):
+        assert titled(small(ends), named[ends])
+        assert not titled(small(ends), named[other])
+    both = [ends for ends in ENDS if titled(small(*ENDS), named[ends])]
+    assert both == ["clamped"]
+    shown, of = set(cells(titled(small(*ENDS), table))), {ends: figures(small(ends), table) for ends in ENDS}
+    assert of["clamped"] <= shown
+    assert not of["pinned"] - of["clamped"] <= shown
+
+
+def test_the_table_of_supports_says_how_the_ends_are_held() -> None:
+    held = {"pinned": "pinned ends (free to turn; directions as on the target)", "clamped": "clamped ends"}
+    for ends, words in held.items():
+        assert titled(small(ends), f"Supports, {words}")
+    assert titled(small(*ENDS), "Supports, clamped ends (directions held)")
+    assert not titled(small(*ENDS), "Supports, pinned")
+
+
+def test_tables_of_a_shell_that_is_only_draped_name_no_ends() -> None:
+    sample = sample_archive(3, 2)
+    states = {name: state for name, state in sample.states.items() if "pinned" not in name and "clamped" not in name}
+    known = {key: value for key, value in sample.results.plain().items() if key not in ("pop_up", "bending")}
+    titles = [sheet.title for sheet in sheets(replace(sample, results=Results.of(known), states=states))]
+    assert "Rods" in titles
+    assert any(title == "Supports" or title.startswith("Supports, 1 of ") for title in titles)
+
+
+def followed(made: Archive, first: int, **known: object) -> Archive:
+    """The archive without the stages between flat and the `first` that is known."""
+    plain, states = made.results.plain(), dict(made.states)
+    kept = [0, *range(first, len(states["history"]))]
+    stages = [plain["deployment"]["stages"][k] for k in kept]
+    for name, values in made.states.items():
+        if name.startswith("history"):
+            states[name] = values[kept]
+    deployment = {**plain["deployment"], "stages": stages, **known}
+    return replace(made, results=Results.of({**plain, "deployment": deployment}), states=states)
+
+
+def erection_words(made: Archive) -> tuple[str, str]:
+    """Title of the sheet of erection stages, and what stands there in bold red."""
+    (sheet,) = titled(made, "Erection stages")
+    red = [text for text in sheet.texts if text.layer == "LABEL" and text.bold and text.colour == "#b3372c"]
+    return sheet.title, " ".join(text.text for text in sorted(red, key=lambda text: -text.at[1]))
+
+
+def test_the_erection_sheet_says_which_stages_are_not_known() -> None:
+    """Of 1/16, 1/4, 9/16 and all of the deployment the lowest two are taken away."""
+    made = small("pinned")
+    assert erection_words(made) == ("Erection stages, front elevations", "")
+    title, words = erection_words(followed(made, 3, lost_at=0.5625, reached_from_flat=None))
+    assert title == "Erection stages, front elevations; not known below 56 %"
+    assert words == "The deployment could not be followed: no stage is known between flat and 56 % of it."
+
+
+def test_the_erection_sheet_says_where_the_shell_has_to_be_guided() -> None:
+    made = followed(small("pinned"), 1, guided=[0.0625, 0.25], reached_from_flat=False)
+    title, words = erection_words(made)
+    assert title == "Erection stages, front elevations"
+    assert words == "Between 6 % and 25 % it has to be guided, and its shape is not known."
+    _, both = erection_words(followed(small("pinned"), 2, guided=[0.25, 0.5625], lost_at=0.25))
+    assert both == (
+        "The deployment could not be followed: no stage is known between flat and 25 % of it. Between 25 % and 56 % it "
+        "has to be guided, and its shape is not known."
+    )
