@@ -19,7 +19,7 @@ from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
 from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan, strips_drawing
-from rodshell.output.drawings.sheets import OVERLAP, SCALES, laid_out, room, tiled
+from rodshell.output.drawings.sheets import OVERLAP, SCALES, bound, laid_out, room, tiled, title_block
 from rodshell.output.drawings.shell import SAME, bracing_drawing, elevations_drawing, erection_drawing, rod_curves
 from rodshell.output.grid import joint_places, rods_of
 from rodshell.output.labels import boxes_meet, length_beneath, lines_meet, spread
@@ -149,6 +149,41 @@ def test_names_of_match_lines_that_find_no_free_place_cross_few_lines_and_lie_al
         met = np.array([line for line in drawn if lines_meet(name.box(), line[None])])
         assert len(met) == 1
         assert np.ptp(met[0], axis=0)[1] == 0.0
+
+
+def texts_about_the_edge(reach: float) -> Drawing:
+    """Two sheets wide, with letters everywhere within `reach` [mm] of the sheets' common edge."""
+    low, high = room(PAPER)
+    wide, tall = 1.5 * (high[0] - low[0]), high[1] - low[1] - 2 * OVERLAP
+    pencil = Pencil()
+    pencil.line([(0.0, 0.0), (wide, 0.0), (wide, tall), (0.0, tall)], "CUT", closed=True)
+    for x in np.arange(max(0.5 * wide - reach, 0.0), min(0.5 * wide + reach, wide) - 3.0, 4.0):
+        for y in np.arange(2.0, tall - 5.0, 5.0):
+            pencil.write("x", (x, y), TEXT, "LABEL")
+    return pencil.done("", "", TEXT)
+
+
+def test_a_name_of_a_match_line_without_a_free_place_is_led_aside() -> None:
+    """Letters stand within 10 mm of the edge, where the name would be; farther off there is room."""
+    low, high = room(PAPER)
+    for sheet in tiled(texts_about_the_edge(OVERLAP), PAPER):
+        (name,) = (text for text in sheet.content.texts if text.text.startswith("match line"))
+        others = [text.box() for text in sheet.content.texts if text is not name]
+        assert not boxes_meet(name.box(), others)
+        assert np.all((name.box() >= low) & (name.box() <= high))
+        *_, match, leader = [path.points for path in sheet.content.paths if path.layer == "TITLE"]
+        start, end = leader
+        assert abs(np.linalg.det(np.array([match[1] - match[0], start - match[0]]))) < 1e-6  # it begins on the line
+        assert np.abs(name.box() - end).min() < 0.2 * TEXT  # and ends next to the name
+        assert sheet.content.left_out == ()
+
+
+def test_a_name_of_a_match_line_without_any_place_is_counted() -> None:
+    for sheet in tiled(texts_about_the_edge(1e3), PAPER):
+        assert not any(text.text.startswith("match line") for text in sheet.content.texts)
+        assert sheet.content.left_out == ("all of 1 names of match lines",)
+        (bound_sheet,) = bound([sheet], title_block(sample_archive(3, 2), ""), PAPER)
+        assert "Left out for lack of room: all of 1 names of match lines." in [text.text for text in bound_sheet.texts]
 
 
 def test_length_beneath_is_that_within_the_box() -> None:

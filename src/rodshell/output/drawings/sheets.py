@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
+from itertools import product
 from math import ceil
 from textwrap import wrap
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
-from rodshell.output.labels import Room, length_beneath
+from rodshell.output.labels import Label, Room, length_beneath, nearby, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash
@@ -472,16 +473,15 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
 
     A name is next to its line or a row farther out, where it has the least length of drawn lines beneath it: none, or a
     few that cross it, rather than a rod that it lies along. Of equal positions the first is taken, in this order of
-    rows; lengths count in steps of the text's size, so that each line across the name counts as one.
+    rows; lengths count in steps of the text's size, so that each line across the name counts as one. A name that finds
+    no free position in its two rows is led aside; where there is none either, it is counted as left out.
     """
-    pencil, (row, column), free = Pencil(), here, Room(20.0)
+    pencil, (row, column), free, missing = Pencil(), here, Room(20.0), 0
     for text in part.texts:
         box = text.box()
         if not within(box, low, high):
             free.take(box)
-    paths = [path.points for path in part.paths if not within(path.points, low, high)]
-    ends = [points[:-1] for points in paths], [points[1:] for points in paths]
-    drawn = np.stack([np.concatenate([np.empty((0, 2)), *points]) for points in ends], axis=1)
+    drawn = _segments([path.points for path in part.paths if not within(path.points, low, high)])
     pen = Pen(WARNING, 0.25, (6.0, 1.5, 1.0, 1.5))
     sides: tuple[tuple[bool, tuple[int, int], list[Floats], tuple[float, float], float], ...] = (
         (bool(row > 0), (row - 1, column), [np.array([low[0], high[1]]), high], (0.0, 1.5), 0.0),
@@ -511,7 +511,44 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
             if free.claim(placed.box()):
                 pencil.texts.append(placed)
                 break
+        else:
+            aside = _led_aside(words, line, part, pencil.texts, low - OVERLAP, high + OVERLAP)
+            if aside is None:
+                missing += 1
+                continue
+            take(aside, TEXT, free)
+            pencil.line(aside.leader(TEXT), "TITLE", pen=Pen(WARNING, 0.18))
+            pencil.texts.append(aside.written(TEXT)._replace(layer="TITLE", colour=pen.colour))
+    pencil.leave_out(missing, sum(there for there, *_ in sides), "names of match lines")
     return pencil.done("", "", TEXT)
+
+
+def _led_aside(
+    words: str, line: Sequence[Floats], part: Drawing, names: Sequence[Text], low: Floats, high: Floats
+) -> Label | None:
+    """The name of a match line next to it, with a line to it, within a sheet from `low` to `high` (2,): clear of all
+    texts, and of drawn lines too where there is room for that. None: there is no free place."""
+    taken = Room(20.0)
+    for text in (*part.texts, *names):
+        taken.take(text.box())
+    (left, bottom), (right, top) = low, high
+    for a, b in (((left, bottom), (right, bottom)), ((left, top), (right, top)), ((left, bottom), (left, top)),
+                 ((right, bottom), (right, top))):  # fmt: skip
+        taken.take(thin(np.array([a, b]), 0.1))
+    inwards = 0.5 * (low + high) - 0.5 * (line[0] + line[1])
+    shares = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9])
+    drawn = _segments([path.points for path in part.paths])
+    for lines, share in product((drawn, drawn[:0]), shares):
+        label = nearby(words, line[0] + share * (line[1] - line[0]), inwards, TEXT, taken, lines)
+        if label is not None and within(label.box(TEXT), low, high):
+            return label
+    return None
+
+
+def _segments(lines: Sequence[Floats]) -> Floats:
+    """(m, 2, 2) the straight pieces of polylines (k, 2)."""
+    ends = [points[:-1] for points in lines], [points[1:] for points in lines]
+    return np.stack([np.concatenate([np.empty((0, 2)), *points]) for points in ends], axis=1)
 
 
 def _part(row: int, column: int) -> str:
