@@ -133,7 +133,7 @@ def pop_up(
     like : a pop-up of the same footprint, such as with other ends. Where its matrices have the same pattern they are
         not analysed again, which saves time and changes nothing else.
     most_factorizations : with start="flat", about how many each path (of the ends, and of the clamps) may take before
-        it is given up; None: no such limit.
+        it is given up; None: no such limit, and a path that Newton's method loses is followed in short steps.
 
     Raises
     ------

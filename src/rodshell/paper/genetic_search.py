@@ -34,6 +34,9 @@ SAME = 1e-4  # times the size: ends of G are much further apart
 MICRON = 6  # decimals of bounds in m
 POPULATION = 100
 MOST = 300  # generations
+NEVER_REACHED = (
+    10**6
+)  # factorisations: patience ends first, and what Newton's method loses is not followed in short steps
 DIFFERENCE, CROSSED = 0.6, 0.9  # smaller steps or populations converge to a worse minimum
 ROUGHNESS = 0.04  # of the first footprints; rougher ones are stable more rarely, and after many more iterations
 
@@ -119,7 +122,10 @@ class Design:
                 raise _OutOfPatience
 
         try:
-            return pop_up(footprint, self.boundary, ROD, ends="pinned", start="flat", progress=count_iteration)
+            return pop_up(
+                footprint, self.boundary, ROD, ends="pinned", start="flat", most_factorizations=NEVER_REACHED,
+                progress=count_iteration,
+            )  # fmt: skip
         except _OutOfPatience:
             return None
 
