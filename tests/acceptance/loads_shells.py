@@ -231,9 +231,11 @@ material = { preset = "larch" }
 """
 BAD = {
     "a negative load": (ROOF + TUBES, SNOWY.replace("0.5", "-0.5") + WINTER, "must not be negative"),
-    "a load's unknown kind": (ROOF + TUBES, SNOWY.replace('"snow"\nv', '"hail"\nv') + WINTER, "loads.0.kind must be"),
+    "a load's unknown kind": (
+        ROOF + TUBES, SNOWY.replace('"snow"\nv', '"hail"\nv') + WINTER, 'kind of load 1 ("snow") must be',
+    ),
     "an unknown load in a combination": (ROOF + TUBES, OWN + WINTER, 'factor for "snow", which is not a load'),
-    "an unknown key": (ROOF + TUBES, SNOWY + "depth = 3\n" + WINTER, "unknown key loads.0.depth"),
+    "an unknown key": (ROOF + TUBES, SNOWY + "depth = 3\n" + WINTER, 'unknown key depth of load 1 ("snow")'),
     "loads without combinations": (ROOF + TUBES, SNOWY, "has no combinations"),
     "bracing without a section": (
         ROOF + TUBES, SNOWY + WINTER + '[bracing]\nkind = "cables"\n', "bracing.section is missing",

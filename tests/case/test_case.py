@@ -34,6 +34,7 @@ height = "50 mm"
 """
 """The example of design.md, but for its anchor, which is the default."""
 
+WEIGHT = 'loads = [{ name = "own", kind = "self_weight" }, '
 FORMULA = {"target.kind": "heightfield", "target.formula": "0.1 - x**2"}
 
 
@@ -244,9 +245,23 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ('seams.unit = "mm"', "seams.unit is the unit of seams.file, which is missing"),
         ('seams.patches = [{ name = "B" }]', "seams.patches needs seams"),
         ('seams.patches = "B"', 'seams.patches = "B": give tables in a case file, such as [{ name'),
-        ("seams.patches = [3]", "seams.patches.0 = 3: give tables"),
-        ("seams.patches = [{ rotate = 1 }]", "seams.patches.0.name is missing: give the name of the patch"),
-        ("seams.patches = [{ name = 1 }]", "seams.patches.0.name = 1: must be text, the name of the patch"),
+        ("seams.patches = [3]", "patch 1 = 3: give tables"),
+        ("seams.patches = [{ rotate = 1 }]", "name of patch 1 is missing: give the name of the patch"),
+        ("seams.patches = [{ name = 1 }]", "name of patch 1 = 1: must be text, the name of the patch"),
+        (
+            WEIGHT + '{ name = "ice", kind = "snow", value = "x" }]',
+            'value of load 2 ("ice") = "x": not a finite number',
+        ),
+        (WEIGHT + '{ name = "ice", kind = "snow" }]', 'value of load 2 ("ice") is missing: give the snow load'),
+        (WEIGHT + '{ name = "ice", kind = "hail" }]', 'kind of load 2 ("ice") must be "self_weight", "snow"'),
+        (WEIGHT + '{ name = "ice" }]', 'kind of load 2 ("ice") is missing: give "self_weight"'),
+        (WEIGHT + '{ kind = "snow", value = 1 }]', "name of load 2 is missing: give the name of the load"),
+        (WEIGHT + '{ name = "ice", kind = "snow", value = 1, deep = 1 }]', 'unknown key deep of load 2 ("ice")'),
+        (WEIGHT + "5]", "load 2 = 5: give tables"),
+        (
+            'combinations = [{ name = "c", factors = { a = "x" } }]',
+            'factors of combination 1 ("c") = { a = "x" }: a = "x"',
+        ),
     ],
 )
 def test_a_bad_case_is_refused_in_one_clear_sentence(load: Any, text: str, message: str) -> None:

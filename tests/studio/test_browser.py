@@ -260,3 +260,83 @@ def test_the_dialog_of_loads_keeps_those_that_the_case_has(tmp_path: Path) -> No
         page.click("#loads")
         assert linked(page)["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0}}]
     assert errors(said) == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_wrong_load_is_named_as_it_is_counted_and_its_button_leads_to_it(tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import browser_page, errors
+
+    (tmp_path / "case.toml").write_text(CASE + LOADED)
+    said: list[str] = []
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
+        page.set_default_timeout(20_000)
+        page.goto(address)
+        page.wait_for_selector("#loads[aria-pressed=true]")
+        case = linked(page)
+        weight = {"name": "own", "kind": "self_weight"}
+        for loads, sentence, focused in (
+            (
+                [weight, {"name": "ice", "kind": "snow", "value": "thick"}],
+                'value of load 2 ("ice")',
+                "input[name=snow]",
+            ),
+            ([weight, {"name": "gale", "kind": "wind", "value": "much"}], 'of load 2 ("gale")', "#other-loads button"),
+        ):
+            link = {
+                **case,
+                "loads": loads,
+                "combinations": [{"name": "all", "factors": {"own": 1, loads[1]["name"]: 1}}],
+            }
+            page.goto(f"{address}#case={code(json.dumps(link))}")
+            expect(page.locator("#verdict.failed strong")).to_contain_text(sentence)
+            page.get_by_role("button", name="Go to load 2").click()
+            expect(page.locator(f"#load-values[open] {focused}")).to_be_focused()
+            if focused.startswith("input"):
+                page.keyboard.press("Escape")
+        page.keyboard.press("Enter")  # on the button that removes the gale
+        page.fill("input[name=snow]", "")
+        page.click("#load-values button[value=check]")
+        page.wait_for_selector("#verdict:not(.failed):not(.old)")
+        assert [load["name"] for load in linked(page)["loads"]] == ["own"]
+        assert linked(page)["combinations"] == [{"name": "all", "factors": {"own": 1}}]
+        link = {**case, "layout": {"spacing": "wide"}, "loads": [], "combinations": []}
+        page.goto(f"{address}#case={code(json.dumps(link))}")
+        page.get_by_role("button", name="Go to layout.spacing").click()
+        expect(page.locator("[data-path='layout.spacing']").last).to_be_focused()
+    assert errors(said) == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_dialog_of_loads_opens_whatever_a_case_has_in_their_place(tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import browser_page, errors
+
+    (tmp_path / "case.toml").write_text(CASE)
+    said: list[str] = []
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
+        page.set_default_timeout(20_000)
+        page.goto(address)
+        page.wait_for_selector("#verdict:not(.waiting):not(.old)")
+        case = linked(page)
+        for loads in (5, "gale", {"gale": 1}, [5, {"kind": 3}], [None]):
+            page.goto(f"{address}#case={code(json.dumps({**case, 'loads': loads, 'combinations': loads}))}")
+            expect(page.locator("#loads")).to_have_attribute("aria-pressed", "true")
+            page.wait_for_selector("#verdict.failed:not(.old)")
+            page.click("#loads")
+            page.wait_for_selector("#load-values[open]")
+            expect(page.locator("#unread-loads")).to_contain_text("cannot be read")
+            for button in page.locator("#kept-loads button").all()[::-1]:
+                button.click()
+            page.fill("input[name=snow]", "0.3 kN/m2")
+            page.click("#load-values button[value=check]")
+            page.wait_for_selector("#verdict:not(.failed):not(.old)")
+            assert {load["kind"] for load in linked(page)["loads"]} == {"snow", "self_weight"}
+            assert [row["name"] for row in linked(page)["combinations"]] == ["service"]
+    assert errors(said) == []

@@ -27,12 +27,12 @@ BY_KIND: dict[str, str] = {
 }
 """Tables whose `kind` decides which keys they have, and the kind that they are by default."""
 
-ROWS: dict[str, tuple[tuple[type[Table], ...], str]] = {
-    "seams.patches": ((PatchTable,), '[{ name = "B", rotate = "10 deg" }]'),
-    "loads": (get_args(AnyLoad), '[{ name = "snow", kind = "snow", value = "0.5 kN/m2" }]'),
-    "combinations": ((CombinationTable,), '[{ name = "winter", factors = { snow = 1.5 } }]'),
+ROWS: dict[str, tuple[str, tuple[type[Table], ...], str]] = {
+    "seams.patches": ("patch", (PatchTable,), '[{ name = "B", rotate = "10 deg" }]'),
+    "loads": ("load", get_args(AnyLoad), '[{ name = "snow", kind = "snow", value = "0.5 kN/m2" }]'),
+    "combinations": ("combination", (CombinationTable,), '[{ name = "winter", factors = { snow = 1.5 } }]'),
 }
-"""Keys that hold tables in a row, the tables that these may be, and an example."""
+"""Keys that hold tables in a row, what one of them is called, the tables that these may be, and an example."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
     row = min(error.errors(), key=lambda row: row["type"] != "extra_forbidden")
     path, value = _path(row), row["input"]
     if (within := _rows_of(path)) is not None:
-        return _fault_in_a_row(row, path, within)
+        return _fault_in_a_row(row, path, within, raw)
     match row["type"]:
         case "extra_forbidden":
             return unknown_key(path, value, raw)
@@ -143,10 +143,12 @@ def _rows_of(path: str) -> str | None:
     return next((name for name in ROWS if f"{path}.".startswith(f"{name}.")), None)
 
 
-def _fault_in_a_row(row: ErrorDetails, path: str, within: str) -> str:
+def _fault_in_a_row(row: ErrorDetails, path: str, within: str, raw: Mapping[str, Any]) -> str:
     """What is wrong with tables in a row, or with a key of one of them."""
-    models, example = ROWS[within]
-    value, name = row["input"], path.rpartition(".")[2]
+    noun, models, example = ROWS[within]
+    value, (index, _, key) = row["input"], path[len(within) + 1 :].partition(".")
+    table = _table_in_a_row(raw, within, index, noun) if index else within
+    place, name = f"{key} of {table}" if key else table, path.rpartition(".")[2]
     kinds = [_kind_of(model) for model in models] if len(models) > 1 else []
     kind = next((str(part) for part in row["loc"] if part in kinds), None)
     model = models[kinds.index(kind)] if kind is not None else models[0]
@@ -156,24 +158,32 @@ def _fault_in_a_row(row: ErrorDetails, path: str, within: str) -> str:
         case "extra_forbidden":
             near = get_close_matches(name, known, n=1)
             hint = f"did you mean {near[0]}?" if near else f"a table{what} has {', '.join(known)}"
-            return f"unknown key {path}: {hint}"
+            return f"unknown key {place}: {hint}"
         case "missing":
-            return f"{path} is missing: give the {known[name].description}"
+            return f"{place} is missing: give the {known[name].description}"
         case "union_tag_not_found":
-            return f"{path}.kind is missing: give {either(kinds)}"
+            return f"kind of {table} is missing: give {either(kinds)}"
         case "union_tag_invalid":
-            return not_a_choice(f"{path}.kind", value["kind"], kinds)
+            return not_a_choice(f"kind of {table}", value["kind"], kinds)
         case "literal_error":
-            return not_a_choice(path, value, _choices(known[name].annotation)[0])
+            return not_a_choice(place, value, _choices(known[name].annotation)[0])
         case "value_error":
-            return f"{path} = {shown(value)}: {row['ctx']['error']}"
+            return f"{place} = {shown(value)}: {row['ctx']['error']}"
         case "string_type":
-            return f"{path} = {shown(value)}: must be text, the {known[name].description}"
+            return f"{place} = {shown(value)}: must be text, the {known[name].description}"
         case "string_too_short":
-            return f"{path} is empty: give the {known[name].description}"
+            return f"{place} is empty: give the {known[name].description}"
         case "tuple_type" | "model_type" | "model_attributes_type":
-            return f"{path} = {shown(value)}: give tables in a case file, such as {example}"
-    return f"{path} = {shown(value)}: {row['msg']}"
+            return f"{place} = {shown(value)}: give tables in a case file, such as {example}"
+    return f"{place} = {shown(value)}: {row['msg']}"
+
+
+def _table_in_a_row(raw: Mapping[str, Any], within: str, index: str, noun: str) -> str:
+    """A table in a row, counted from one, with its name where it has one: load 2 ("snow")."""
+    outer, _, last = within.rpartition(".")
+    table = (_table_of(raw, outer) if outer else raw)[last][int(index)]
+    name = table.get("name") if isinstance(table, Mapping) else None
+    return f"{noun} {int(index) + 1}" + (f" ({shown(name)})" if isinstance(name, str) and name else "")
 
 
 def unknown_key(path: str, value: object, raw: Mapping[str, Any]) -> str:

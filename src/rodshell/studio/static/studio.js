@@ -14,7 +14,7 @@ const clone = value => JSON.parse(JSON.stringify(value));
 const get = (tables, path) => path.split(".").reduce((inner, name) => inner?.[name], tables);
 const set = (tables, path, value) => {
   const names = path.split("."), last = names.pop();
-  const table = names.reduce((inner, name) => (inner[name] = typeof inner[name] === "object" && inner[name] ? inner[name] : {}), tables);
+  const table = names.reduce((inner, name) => (inner[name] = isTable(inner[name]) ? inner[name] : {}), tables);
   value === undefined || value === "" ? delete table[last] : (table[last] = value);
 };
 
@@ -74,34 +74,57 @@ const DEPLOYMENT = 8;  // equilibria from flat
 function showTools() {
   const press = (name, on) => byId(name).setAttribute("aria-pressed", String(Boolean(on)));
   press("refine", get(base, "refine.vary")?.length);
-  press("loads", base.loads?.length);
+  press("loads", Array.isArray(base.loads) ? base.loads.length : base.loads);
   press("erection", get(base, "checks.stages") ?? DEPLOYMENT);
 }
 
-// The dialog edits the case's own weight and snow; its other loads and its combinations stay.
+// The dialog edits the case's own weight and snow; its other loads and its combinations stay unless they are removed.
 const EDITED = [["self_weight", "own", "cladding"], ["snow", "snow", "value"]];  // kind, name if it is new, key
+const tablesIn = value => (Array.isArray(value) ? value.filter(isTable) : []);  // a case from a link may hold anything
+const words = value => (typeof value === "string" ? value : JSON.stringify(value));
 
-function showLoads() {
-  const loads = base.loads || [], { elements } = byId("load-values").querySelector("form");
+// `wrong`: the load or combination that a message is about, such as { noun: "load", number: 2 }.
+function showLoads(wrong = null) {
+  const loads = tablesIn(base.loads), { elements } = byId("load-values").querySelector("form");
+  const isWrong = (noun, table) => wrong?.noun === noun && base[`${noun}s`][wrong.number - 1] === table;
+  let first = null;  // field or row that is wrong
   for (const [kind, , key] of EDITED) {
     const found = loads.find(load => load.kind === kind), given = found?.[key] ?? (kind === "snow" && loads.length ? "" : elements[kind].defaultValue);
-    elements[kind].value = typeof given === "number" ? `${given} ${elements[kind].dataset.unit}` : given;
+    elements[kind].value = typeof given === "number" ? `${given} ${elements[kind].dataset.unit}` : words(given);
+    if (found && isWrong("load", found)) first = elements[kind];
   }
-  const others = loads.filter(load => !EDITED.some(([kind]) => loads.find(first => first.kind === kind) === load));
-  byId("other-loads").replaceChildren(...others.map(({ name, kind, ...values }) => make("li", { textContent: `${name} (${kind.replaceAll("_", " ")}): ${Object.entries(values).map(([key, value]) => `${key} ${typeof value === "string" ? value : JSON.stringify(value)}`).join(", ")}` })));
-  byId("combined").replaceChildren(...(base.combinations || []).map(({ name, factors }) => make("li", { textContent: `${name}: ${Object.entries(factors || {}).map(([load, factor]) => `${factor} \u00d7 ${load}`).join(" + ")}` })));
-  byId("kept-loads").hidden = !others.length && !base.combinations?.length;
+  const row = (noun, table, text) => {
+    const remove = make("button", { type: "button", textContent: "\u00d7", ariaLabel: `Remove ${noun} ${words(table.name)}`, onclick: () => { dropped.push(table); item.remove(); } });
+    const item = make("li", { textContent: `${text} ` }, remove);
+    if (isWrong(noun, table)) { item.className = "wrong"; first = remove; }
+    return item;
+  };
+  const others = loads.filter(load => !EDITED.some(([kind]) => loads.find(other => other.kind === kind) === load));
+  dropped = [];
+  byId("other-loads").replaceChildren(...others.map(load => {
+    const { name, kind, ...values } = load;
+    return row("load", load, `${words(name)} (${words(kind)?.replaceAll("_", " ")}): ${Object.entries(values).map(([key, value]) => `${key} ${words(value)}`).join(", ")}`);
+  }));
+  const combined = tablesIn(base.combinations);
+  byId("combined").replaceChildren(...combined.map(table => row("combination", table, `${words(table.name)}: ${isTable(table.factors) ? Object.entries(table.factors).map(([load, factor]) => `${words(factor)} \u00d7 ${load}`).join(" + ") : words(table.factors)}`)));
+  byId("kept-loads").hidden = !others.length && !combined.length;
+  const unread = ["loads", "combinations"].filter(key => base[key] !== undefined && !(Array.isArray(base[key]) && base[key].every(isTable)));
+  byId("unread-loads").textContent = unread.map(key => `The case's ${key} cannot be read and go with Check: ${JSON.stringify(base[key])}. `).join("");
   byId("load-values").showModal();
+  first?.focus();
 }
+let dropped = [];  // tables of the case that the dialog is to remove
 
 function checkLoads(elements) {
+  const kept = name => tablesIn(base[name]).filter(table => !dropped.includes(table));
+  const gone = dropped.map(({ name }) => name);
+  const found = clone({ loads: kept("loads"), combinations: kept("combinations").map(table => ({ ...table, factors: isTable(table.factors) ? table.factors : {} })) });
   change(next => {
-    next.loads ||= [];
-    next.combinations ||= [];
+    Object.assign(next, found);
     for (const [kind, plain, key] of EDITED) {
-      const text = elements[kind].value.trim(), found = next.loads.find(load => load.kind === kind);
-      if (found && text) found[key] = text;
-      else if (found) dropLoad(next, found);
+      const text = elements[kind].value.trim(), load = next.loads.find(load => load.kind === kind);
+      if (load && text) load[key] = text;
+      else if (load) { next.loads = next.loads.filter(other => other !== load); gone.push(load.name); }
       else if (text) {
         let name = plain;
         while (next.loads.some(load => load.name === name)) name += "_";
@@ -109,22 +132,19 @@ function checkLoads(elements) {
         for (const { factors } of next.combinations) factors[name] = 1;
       }
     }
-    if (!next.combinations.length) next.combinations.push({ name: "service", factors: Object.fromEntries(next.loads.map(({ name }) => [name, 1])) });
+    const names = next.loads.map(({ name }) => name);
+    for (const { factors } of next.combinations) for (const name of gone) if (!names.includes(name)) delete factors[name];
+    next.combinations = next.combinations.filter(({ factors }) => Object.keys(factors).length);
+    if (!next.combinations.length) next.combinations.push({ name: "service", factors: Object.fromEntries(names.map(name => [name, 1])) });
     if (!next.loads.length) { delete next.loads; delete next.combinations; }
   });
-}
-
-function dropLoad(next, gone) {
-  next.loads = next.loads.filter(load => load !== gone);
-  for (const { factors } of next.combinations) delete factors[gone.name];
-  next.combinations = next.combinations.filter(({ factors }) => Object.keys(factors).length);
 }
 
 function wireTools() {
   byId("refine").onclick = () => change(next => set(next, "refine.vary", get(next, "refine.vary")?.length ? undefined : ["taper"]));
   byId("erection").onclick = () => change(next => set(next, "checks.stages", (get(next, "checks.stages") ?? DEPLOYMENT) ? 0 : DEPLOYMENT));
   const dialog = byId("load-values"), form = dialog.querySelector("form");
-  byId("loads").onclick = showLoads;
+  byId("loads").onclick = () => showLoads();
   form.onsubmit = ({ submitter }) => {
     if (submitter.value === "check") checkLoads(form.elements);
     if (submitter.value === "without") change(next => { delete next.loads; delete next.combinations; });
@@ -245,17 +265,24 @@ function notice(text) {
 
 function failed(sentence) {
   say("");
-  const box = byId("verdict"), key = named(sentence);
+  const box = byId("verdict"), place = named(sentence);
   box.className = "failed";
   box.replaceChildren(make("strong", { textContent: sentence }));
-  if (key) box.append(make("button", { type: "button", textContent: `Go to ${key.path}`, onclick: () => goTo(key) }));
+  if (place) box.append(make("button", { type: "button", textContent: `Go to ${place.name}`, onclick: place.show }));
   document.body.classList.add("old");  // the shapes are those of a case before
 }
 
-// The key that a sentence asks for, as in a case file (target.unit) or as an option (--unit).
+// Where on the page the value stands that a sentence is about: a load ('load 2 ("snow")'), or the field of the key that
+// it names first, as in a case file (target.unit) or as an option (--unit).
 function named(sentence) {
-  const usable = start.keys.filter(key => !IDLE.includes(key.path) && (!key.path.startsWith("target.") || !key.kinds.length || key.kinds.includes(base.target?.kind)));
-  return usable.find(({ path }) => sentence.includes(path)) || usable.find(({ path }) => new RegExp(`--${path.split(".").pop()}\\b`).test(sentence));
+  const load = /\b(load|combination) (\d+)\b/.exec(sentence), whole = /^(loads|combinations) =/.exec(sentence);
+  if (load) return { name: load[0], show: () => showLoads({ noun: load[1], number: Number(load[2]) }) };
+  if (whole) return { name: "loads", show: () => showLoads() };
+  const at = ({ path }, text) => sentence.search(new RegExp(`(?<![\\w.])${text.replaceAll(".", "\\.")}(?![\\w-]|\\.\\w)`));
+  const found = keysOfCase().filter(({ path }) => path.includes("."));
+  const first = text => found.map(key => [at(key, text(key)), key]).filter(([place]) => place >= 0).sort(([a], [b]) => a - b)[0]?.[1];
+  const key = first(({ path }) => path) || first(({ path }) => `--${path.split(".").pop()}`);
+  return key && { name: key.path, show: () => goTo(key) };
 }
 
 function goTo({ path }) {
@@ -286,13 +313,18 @@ function showFacts() {
 
 let typing = false, stale = false;  // while somebody types or drags in a control it is not made anew
 
+// The keys that the page has a field for: those of a case whose tables are of these kinds.
+function keysOfCase() {
+  const kinds = { target: base.target?.kind || "hemisphere", "rod.section": base.rod?.section?.kind || "circle", joint: base.joint?.kind || "ball" };
+  return start.keys.filter(key => !IDLE.includes(key.path) && (!key.kinds.length || key.kinds.includes(kinds[key.path.replace(/\.[^.]*$/, "")])));
+}
+
 function buildControls() {
   const focused = document.activeElement?.dataset.path;
   const open = gui ? gui.foldersRecursive().filter(folder => !folder._closed).map(folder => folder._title) : ["Design"];
   gui?.destroy();
   gui = new GUI({ container: byId("controls"), injectStyles: false, title: "Case" });
-  const kinds = { target: base.target?.kind || "hemisphere", "rod.section": base.rod?.section?.kind || "circle", joint: base.joint?.kind || "ball" };
-  const known = start.keys.filter(key => !IDLE.includes(key.path) && (!key.kinds.length || key.kinds.includes(kinds[key.path.replace(/\.[^.]*$/, "")])));
+  const known = keysOfCase();
   const design = gui.addFolder("Design");
   for (const [path, name, kind] of SLIDERS) {
     if (!known.some(key => key.path === path)) continue;
