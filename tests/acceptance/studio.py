@@ -288,7 +288,7 @@ def interruption_rows(folder: Path) -> Iterator[Row]:
         page = Page(address)
         page.found(DOME)
         page.order(kind="keep", name="kept")
-        page.until("session")
+        page.until("variants")
         job = page.show(dragged(50))
         page.until("progress", serial=job)
         for child in psutil.Process(process.pid).children(recursive=True):

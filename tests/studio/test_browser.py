@@ -340,3 +340,144 @@ def test_the_dialog_of_loads_opens_whatever_a_case_has_in_their_place(tmp_path: 
             assert {load["kind"] for load in linked(page)["loads"]} == {"snow", "self_weight"}
             assert [row["name"] for row in linked(page)["combinations"]] == ["service"]
     assert errors(said) == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_an_outline_ends_the_target_that_there_is_and_a_new_state_of_a_mesh_keeps_the_case(tmp_path: Path) -> None:
+    import ezdxf
+    import numpy as np
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page, errors
+    from tests.acceptance.targets_broken import as_obj, dome
+
+    (tmp_path / "case.toml").write_text(CASE)
+    drawing, angle = ezdxf.new(), np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)  # type: ignore[attr-defined]
+    drawing.modelspace().add_polyline3d(
+        np.column_stack([3.0 * np.cos(angle), 3.0 * np.sin(angle), np.full(60, 2.56)]).tolist(), close=True
+    )
+    drawing.saveas(tmp_path / "edge.dxf")
+    (tmp_path / "roof.obj").write_bytes(as_obj(*dome()))
+    said: list[str] = []
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
+        page.set_default_timeout(30_000)
+        robot = Robot(page, tmp_path, "studio")
+        page.goto(address)
+        robot.checked()
+        before = linked(page)
+        expect(page.locator("#outline")).to_be_hidden()
+        page.set_input_files("#file", tmp_path / "edge.dxf")  # as if it was dropped: a dome has its own edge
+        expect(page.locator("#state.wrong")).to_contain_text("upload the surface first")
+        assert linked(page) == before
+        page.set_input_files("#file", tmp_path / "roof.obj")
+        page.get_by_role("button", name="Go to target.unit").click()
+        page.keyboard.type("m")
+        page.keyboard.press("Enter")
+        robot.checked()
+        put(page, SPACING, "1")
+        robot.checked()
+        rods = page.inner_text("#figures td >> nth=1")
+        page.set_input_files("#file", tmp_path / "edge.dxf")
+        page.wait_for_selector("#no-outline:not([hidden])")
+        robot.checked()
+        assert page.inner_text("#no-outline").startswith("edge.dxf")
+        assert linked(page)["target"] == {
+            "kind": "mesh", "file": "upload:roof.obj", "unit": "m", "boundary": "upload:edge.dxf"
+        }  # fmt: skip
+        assert linked(page)["layout"] == {"spacing": 1}
+        assert float(page.inner_text("#figures td >> nth=1").split()[0]) < 0.6 * float(rods.split()[0])
+        page.click("#no-outline")
+        page.wait_for_selector("#no-outline", state="hidden")
+        robot.checked()
+        assert page.inner_text("#figures td >> nth=1") == rods
+        points, faces = dome()
+        (tmp_path / "roof.obj").write_bytes(as_obj(0.8 * points, faces))
+        page.set_input_files("#file", tmp_path / "roof.obj")
+        page.wait_for_selector("#verdict.old")
+        robot.checked()
+        assert linked(page)["layout"] == {"spacing": 1}
+        assert float(page.inner_text("#figures td >> nth=1").split()[0]) < 0.8 * float(rods.split()[0])
+    assert errors(said) == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_what_is_shown_is_marked_as_out_of_date_before_the_server_answers(tmp_path: Path) -> None:
+    import signal
+
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page
+
+    (tmp_path / "case.toml").write_text(CASE)
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, process), browser_page([]) as page:
+        page.set_default_timeout(20_000)
+        robot = Robot(page, tmp_path, "studio")
+        page.goto(address)
+        robot.checked()
+        parts = [page.locator(part) for part in ("#figures", "#view", "#plan", "#verdict")]
+        for part in parts:
+            expect(part).to_have_css("opacity", "1")
+        process.send_signal(signal.SIGSTOP)
+        try:
+            put(page, SPACING, "80")
+            for part in parts:
+                expect(part).not_to_have_css("opacity", "1")
+        finally:
+            process.send_signal(signal.SIGCONT)
+        robot.checked()
+        for part in parts:
+            expect(part).to_have_css("opacity", "1")
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_variant_is_listed_in_every_tab_at_once_and_those_that_are_ticked_stay_so(tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page, errors
+
+    (tmp_path / "case.toml").write_text(CASE)
+    said: list[str] = []
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as first:
+        second = first.context.new_page()
+        tabs = [Robot(page, tmp_path, "studio") for page in (first, second)]
+        for tab in tabs:
+            tab.page.goto(address)
+            tab.checked()
+        tabs[0].checked()
+        names = second.locator("#variants li span")
+        tabs[0].keep("one")
+        expect(names).to_have_text(["one"])
+        second.check("#variants input[value=one]")
+        tabs[0].keep("two")
+        expect(names).to_have_text(["one", "two"])
+        expect(second.locator("#variants input[value=one]")).to_be_checked()
+        second.get_by_role("button", name="Forget two").click()
+        expect(first.locator("#variants li span")).to_have_text(["one"])
+    assert errors(said) == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_controls_are_made_once_for_a_change_and_then_left_alone(tmp_path: Path) -> None:
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page
+
+    (tmp_path / "case.toml").write_text(CASE)
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page([]) as page:
+        page.set_default_timeout(20_000)
+        robot = Robot(page, tmp_path, "studio")
+        page.goto(address)
+        robot.checked()
+        put(page, SPACING, "80")
+        robot.checked()
+        page.wait_for_selector(f"{SPACING}:focus")
+        page.wait_for_timeout(300)  # ms, in which they may be made for the verdict
+        made = page.get_attribute(SPACING, "aria-labelledby")  # counts up with each control that is made
+        page.wait_for_timeout(500)
+        assert page.get_attribute(SPACING, "aria-labelledby") == made

@@ -111,6 +111,15 @@ def test_names_of_uploads_are_plain() -> None:
     for name in ("", ".obj", "a.py", "..", "a.obj/", "case.toml"):
         with pytest.raises(InputError, match="the studio reads"):
             upload_name(name)
+    with pytest.raises(InputError, match=r"save it as \.glb"):
+        upload_name("roof.gltf")
+
+
+def test_every_file_that_the_page_offers_can_be_uploaded(client: TestClient) -> None:
+    start, session = client.get("/api/start").json(), new_session(client)
+    for suffix in (*start["surfaces"], *start["outlines"]):
+        answer = client.post(f"/api/sessions/{session}/uploads?name=roof{suffix}", content=b"v")
+        assert answer.json() == {"file": f"upload:roof{suffix}"}
 
 
 def test_a_case_gets_the_paths_of_its_uploads(tmp_path: Path) -> None:
@@ -147,7 +156,16 @@ def test_a_session_shows_each_stage_and_ends_with_the_command_line_s_form(tmp_pa
                 assert all(stage["content"] for stage in stages)
             assert stages[-1]["verdict"]["headline"] == expected.verdict.headline
             socket.send_json({"kind": "keep", "name": "first"})
-            assert [variant["name"] for variant in socket.receive_json()["variants"]] == ["first"]
+            said = socket.receive_json()
+            assert (said["kind"], [variant["name"] for variant in said["variants"]]) == ("variants", ["first"])
+            with client.websocket_connect(f"/api/sessions/{session}/live") as other:
+                assert [variant["name"] for variant in other.receive_json()["variants"]] == ["first"]
+                for number, name in enumerate(("second", "third"), start=2):  # each page shows what another one keeps
+                    other.send_json({"kind": "keep", "name": name})
+                    assert len(socket.receive_json()["variants"]) == len(other.receive_json()["variants"]) == number
+                for name in ("second", "third"):
+                    socket.send_json({"kind": "drop", "name": name})
+                    assert socket.receive_json()["variants"] == other.receive_json()["variants"]
             socket.send_json({"kind": "case", "serial": 3, "case": {"target": {"radius": "no"}}})
             assert "target.radius" in until_done(socket, 3)[-1]["sentence"]
         packed = client.get(f"/api/sessions/{session}/files.zip")
@@ -237,6 +255,34 @@ def test_a_session_keeps_no_case_that_cannot_be_sent_back(client: TestClient) ->
         socket.send_text('{"kind": "case", "serial": 1, "case": {"layout": {"spacing": NaN}}}')
         assert "finite numbers" in socket.receive_json()["sentence"]
         assert socket.receive_json()["count"] == 0
+
+
+@pytest.mark.parametrize("number", ["NaN", "-Infinity"])
+def test_what_an_earlier_server_stored_with_numbers_that_are_no_json_is_served(tmp_path: Path, number: str) -> None:
+    name, case = "a" * 24, f'{{"layout": {{"spacing": {number}}}, "target": {{"kind": "\\ud800"}}}}'
+    for folder, file, text in (
+        ("jobs", "status.json", f'{{"status": "failed", "case": {case}, "sentence": "not a finite number"}}'),
+        ("sessions", "session.json", f'{{"cases": [{case}], "at": 0, "variants": []}}'),
+    ):
+        (tmp_path / folder / name).mkdir(parents=True)
+        (tmp_path / folder / name / file).write_text(text)
+    expected = {"layout": {"spacing": None}, "target": {"kind": "\ud800"}}
+    with TestClient(studio_app(settings(tmp_path))) as client:
+        job = client.get(f"/api/jobs/{name}")
+        assert job.status_code == 200
+        assert job.json() == {"id": name, "status": "failed", "case": expected, "sentence": "not a finite number"}
+        with client.websocket_connect(f"/api/sessions/{name}/live") as socket:
+            assert socket.receive_json()["cases"] == [expected]
+
+
+def test_a_job_with_numbers_that_are_no_json_and_still_waits_fails_in_a_sentence(tmp_path: Path) -> None:
+    name = "a" * 24
+    (tmp_path / "jobs" / name).mkdir(parents=True)
+    (tmp_path / "jobs" / name / "status.json").write_text('{"status": "queued", "case": {"layout": {"spacing": NaN}}}')
+    with TestClient(studio_app(settings(tmp_path))) as client:
+        status = wait(client, name)
+    assert status["status"] == "failed"
+    assert status["sentence"].startswith("layout.spacing = nan: not finite")
 
 
 @pytest.mark.parametrize(

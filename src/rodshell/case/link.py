@@ -15,7 +15,9 @@ from rodshell.validation import instance
 
 ADDRESS = "http://127.0.0.1:8731/"  # of `rodshell studio` without options
 UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
-UPLOADS = (*(suffix for suffix in BY_SUFFIX if suffix != ".gltf"), ".dxf")  # a .gltf names further files
+SURFACES = {suffix: kind for suffix, kind in BY_SUFFIX.items() if suffix != ".gltf"}  # a .gltf names further files
+OUTLINES = (".dxf", ".obj")  # closed curves that end a surface
+UPLOADS = tuple(dict.fromkeys((*SURFACES, *OUTLINES)))
 
 
 def studio_link(case: Case, *, address: str = ADDRESS) -> str:
@@ -83,6 +85,10 @@ def upload_name(name: str) -> str:
     """
     plain = re.sub(r"[^\w.() -]", "_", name.replace("\\", "/").rpartition("/")[2]).strip(". ")[-100:]
     suffix = Path(plain).suffix.lower()
+    if suffix == ".gltf":
+        raise InputError(
+            f"{shown(name)} may name further files, which are not uploaded: save it as .glb, a single file"
+        )
     if suffix not in UPLOADS or not Path(plain).stem:
         raise InputError(f"{shown(name)}: the studio reads {', '.join(UPLOADS)}")
     return plain

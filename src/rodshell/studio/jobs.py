@@ -58,10 +58,10 @@ class Jobs:
         path = self.folder / name / "status.json"
         if not NAME.fullmatch(name) or not path.is_file():
             return None
-        status: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        status: dict[str, Any] = _plain_json(path)
         result = self.folder / name / "result"
         if status["status"] == "done":
-            status["result"] = json.loads((result / "result.json").read_text(encoding="utf-8"))
+            status["result"] = _plain_json(result / "result.json")
             status["files"] = [
                 path.relative_to(result).as_posix() for path in sorted(result.rglob("*")) if path.is_file()
             ]
@@ -98,3 +98,8 @@ class Jobs:
         new = self.folder / name / "status.json.new"
         new.write_text(json.dumps(status), encoding="utf-8")
         new.replace(self.folder / name / "status.json")
+
+
+def _plain_json(path: Path) -> Any:
+    """What a file holds; null in the place of NaN and infinities, which JSON does not have but cases once held."""
+    return json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda _: None)

@@ -24,8 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rodshell.case.keys import case_keys
-from rodshell.case.link import UPLOAD, upload_name
-from rodshell.case.load import BY_SUFFIX
+from rodshell.case.link import OUTLINES, SURFACES, UPLOAD, upload_name
 from rodshell.errors import InputError
 from rodshell.output.viewer import viewer_script, viewer_style
 from rodshell.studio.jobs import Jobs
@@ -198,10 +197,12 @@ async def _version(_: Request) -> Response:
 
 
 async def _start(request: Request) -> Response:
-    """What the page needs once: the keys of a case, the built-in cases, and the case to begin with."""
+    """What the page needs once: the keys of a case, the built-in cases, kinds of files, and the case to begin with."""
     keys = [vars(key) for key in case_keys().values()]
     first = request.app.state.sessions.first
-    return JSONResponse({"keys": keys, "presets": presets(), "kinds": BY_SUFFIX, "first": first})
+    return JSONResponse(
+        {"keys": keys, "presets": presets(), "surfaces": SURFACES, "outlines": OUTLINES, "first": first}
+    )
 
 
 async def _new_session(request: Request) -> Response:
@@ -230,9 +231,9 @@ async def _live(socket: WebSocket) -> None:
             message = json.loads(await socket.receive_text())
             if error := _obey(session, message):
                 await socket.send_json({"kind": "failed", "serial": message.get("serial", 0), "sentence": error})
-            if message.get("kind") in ("step", "keep", "drop"):
-                await socket.send_json({"kind": "session", "after": message["kind"], **vars(session.state)})
-            elif not message.get("live"):
+            if message.get("kind") == "step":
+                await socket.send_json({"kind": "session", "after": "step", **vars(session.state)})
+            elif message.get("kind") == "case" and not message.get("live"):
                 await socket.send_json({"kind": "history", "at": session.state.at, "count": len(session.state.cases)})
     except (WebSocketDisconnect, json.JSONDecodeError, RecursionError):
         pass
@@ -365,7 +366,9 @@ def _without_files(case: dict[str, Any]) -> dict[str, Any]:
 
 async def _job(request: Request) -> Response:
     job = request.app.state.jobs.get(request.path_params["job"])
-    return JSONResponse(job) if job else _missing("job")
+    if not job:
+        return _missing("job")
+    return Response(json.dumps(job, allow_nan=False), media_type="application/json")  # any text, as ASCII
 
 
 async def _job_file(request: Request) -> Response:

@@ -183,7 +183,8 @@ class Session:
         self.uploads.mkdir(parents=True, exist_ok=True)
         self.state = State()
         if (folder / "session.json").is_file():
-            self.state = State(**json.loads((folder / "session.json").read_text(encoding="utf-8")))
+            kept = (folder / "session.json").read_text(encoding="utf-8")
+            self.state = State(**json.loads(kept, parse_constant=lambda _: None))  # NaN of an earlier version
         self.listeners: set[Heard] = set()
         self.worker = WorkerProcess(self._hear)
         self._newest: tuple[int, dict[str, Any]] = (0, {})  # serial of the newest order, and its case for the pages
@@ -236,19 +237,28 @@ class Session:
             raise InputError("a variant needs a name")
         if not self._facts or self.state.case is None:
             raise InputError("there is no verdict yet: keep the variant when it is there")
-        self.drop_variant(name)
+        self._drop(name)
         key = secrets.token_hex(8)
         (self.folder / f"{key}.scene").write_bytes(self._scene)
         kept = {"figures": self._facts["figures"], "verdict": self._facts["verdict"]}
         self.state.variants.append({"name": name.strip()[:80], "case": self.state.case, "scene": key, **kept})
         self._keep()
+        self._tell_variants()
 
     def drop_variant(self, name: str) -> None:
         """Forget a variant."""
+        self._drop(name)
+        self._keep()
+        self._tell_variants()
+
+    def _drop(self, name: str) -> None:
         for variant in [variant for variant in self.state.variants if variant["name"] == name.strip()[:80]]:
             self.state.variants.remove(variant)
             (self.folder / f"{variant['scene']}.scene").unlink(missing_ok=True)
-        self._keep()
+
+    def _tell_variants(self) -> None:
+        """Every page of the session shows the same variants."""
+        self._publish(News(0, "variants", {"variants": list(self.state.variants)}))
 
     def scene_of_variant(self, key: str) -> bytes | None:
         """The scene of a variant by its key."""
@@ -274,6 +284,9 @@ class Session:
             self._facts, self._scene = news.facts, news.content
         elif news.serial == serial and news.kind == "taken":  # every page of the session follows
             news = replace(news, facts={**case, "at": self.state.at, "count": len(self.state.cases)})
+        self._publish(news)
+
+    def _publish(self, news: News) -> None:
         for listener in list(self.listeners):
             listener(news)
 

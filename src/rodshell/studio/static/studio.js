@@ -46,10 +46,9 @@ function change(edit, live = false) {
 }
 
 function submit(next, live) {
+  outdate(!same(next, base), live);
   base = next;
-  byId("verdict").classList.add("old");
   notice("");
-  offer(false);
   const soon = waiting;
   serial = TABS * (Math.floor(serial / TABS) + 1) + tab;
   waiting = { kind: "case", serial, case: base, live };  // at most one waits: the newest
@@ -58,6 +57,16 @@ function submit(next, live) {
   if (!live) remember();
   showTools();
 }
+
+// What is shown is of a case before, at once. While somebody drags, the shapes follow the hand: they are not marked.
+function outdate(changed, live) {
+  byId("verdict").classList.add("old");
+  if (changed) byId("figures").classList.add("old");
+  if (changed && !dragging) document.body.classList.add("old");
+  dragging = live;
+  offer(false);
+}
+let dragging = false;  // the last change was live
 
 // What can be done with a form once it has its verdict.
 function offer(ready) {
@@ -76,6 +85,11 @@ function showTools() {
   press("refine", get(base, "refine.vary")?.length);
   press("loads", Array.isArray(base.loads) ? base.loads.length : base.loads);
   press("erection", get(base, "checks.stages") ?? DEPLOYMENT);
+  const drawn = get(base, "target.boundary");
+  byId("outline").hidden = !takesOutline();
+  byId("no-outline").hidden = !drawn;
+  byId("no-outline").textContent = drawn ? `${words(drawn).replace("upload:", "")} \u00d7` : "";
+  byId("no-outline").ariaLabel = `Remove the outline ${byId("no-outline").textContent.slice(0, -2)}`;
 }
 
 // The dialog edits the case's own weight and snow; its other loads and its combinations stay unless they are removed.
@@ -190,6 +204,7 @@ async function open() {
 function hear(news) {
   if (news.kind === "session") return restore(news);
   if (news.kind === "history") return showHistory(news);
+  if (news.kind === "variants") { history.variants = news.variants; return showVariants(); }
   if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
   if (news.kind === "taken" && news.case && news.serial !== serial && !(mine(news.serial) && mine(serial))) follow(news);
   if (news.kind === "taken" && news.serial === serial) taken = serial;
@@ -199,6 +214,7 @@ function hear(news) {
       shown = news.serial;
       facts = news;
       showFacts();
+      byId("figures").classList.toggle("old", shown !== serial);
       if (shown !== serial) byId("verdict").classList.add("old");
     }
   }
@@ -211,12 +227,10 @@ function hear(news) {
 function follow(news) {
   const changed = !same(news.case, base);
   pending = pending || !same(news.case.target, base.target);
+  outdate(changed, news.live);
   base = news.case;
   serial = news.serial;
   notice("");
-  byId("verdict").classList.add("old");
-  offer(false);
-  if (changed) document.body.classList.add("old");
   showHistory(news);
   if (!news.live) remember();
   showTools();
@@ -269,7 +283,7 @@ function failed(sentence) {
   box.className = "failed";
   box.replaceChildren(make("strong", { textContent: sentence }));
   if (place) box.append(make("button", { type: "button", textContent: `Go to ${place.name}`, onclick: place.show }));
-  document.body.classList.add("old");  // the shapes are those of a case before
+  document.body.classList.toggle("old", shown !== serial);  // the shapes are those of a case before
 }
 
 // Where on the page the value stands that a sentence is about: a load ('load 2 ("snow")'), or the field of the key that
@@ -321,6 +335,7 @@ function keysOfCase() {
 
 function buildControls() {
   const focused = document.activeElement?.dataset.path;
+  typing = stale = false;  // before the focused field goes, whose loss of focus would ask for controls again
   const open = gui ? gui.foldersRecursive().filter(folder => !folder._closed).map(folder => folder._title) : ["Design"];
   gui?.destroy();
   gui = new GUI({ container: byId("controls"), injectStyles: false, title: "Case" });
@@ -338,7 +353,6 @@ function buildControls() {
     folder.close();
   }
   for (const folder of gui.foldersRecursive()) if (open.includes(folder._title)) folder.open();
-  typing = stale = false;
   if (focused) byId("controls").querySelector(`[data-path="${focused}"]`)?.focus();
 }
 
@@ -614,8 +628,9 @@ function endSeam() {
 // Variants
 
 function showVariants() {
+  const checked = chosen().map(({ name }) => name);
   byId("variants").querySelector("ul").replaceChildren(...history.variants.map(({ name, verdict, case: kept }) => make("li", {},
-    make("input", { type: "checkbox", name: "variant", value: name, ariaLabel: `Compare ${name}`, onchange: compared }),
+    make("input", { type: "checkbox", name: "variant", value: name, checked: checked.includes(name), ariaLabel: `Compare ${name}`, onchange: compared }),
     make("span", { textContent: name, className: verdict.level, title: verdict.headline }),
     make("button", { type: "button", textContent: "Open", ariaLabel: `Open ${name}`, onclick: () => { pending = true; submit(clone(kept), false); buildControls(); } }),
     make("button", { type: "button", textContent: "\u00d7", ariaLabel: `Forget ${name}`, onclick: () => order({ kind: "drop", name }) }))));
@@ -703,14 +718,21 @@ function script() {
   return `import rodshell as rs\n\njob = rs.Job.load("""\n${text}""")\nform = job.run(progress=rs.bar)\nprint(form.verdict.headline)\nform.save("out")\n`;
 }
 
-async function upload(file) {
+// Whether curves can end the target: only one from a file.
+const takesOutline = () => start.keys.find(({ path }) => path === "target.boundary").kinds.includes(base.target?.kind);
+
+// Send a file that holds a surface, which becomes the target, or an outline, which ends the target that there is.
+async function upload(file, asOutline = false) {
+  const suffix = `.${file.name.toLowerCase().split(".").at(-1)}`, outline = asOutline || (start.outlines.includes(suffix) && !start.surfaces[suffix]);
+  if (outline && !takesOutline()) return say(`${file.name} holds curves, which end a surface from a file: upload the surface first`, true);
   say(`Sending ${file.name}`);
   const answer = await fetch(`/api/sessions/${session}/uploads?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
   const said = await answer.json();
   if (!answer.ok) return say(said.sentence, true);
-  const suffix = file.name.toLowerCase().replace(/^.*\./, ""), kind = start.kinds[`.${suffix}`];
   pending = true;
-  submit({ target: { kind, file: said.file } }, false);
+  if (outline) change(next => set(next, "target.boundary", said.file));
+  else if (get(base, "target.file") === said.file) { submit(clone(base), false); outdate(true, false); }  // a new state of the same file
+  else submit({ target: { kind: start.surfaces[suffix], file: said.file } }, false);
   buildControls();
 }
 
@@ -726,8 +748,13 @@ function wire() {
     buildControls();
   };
   byId("upload").onclick = () => byId("file").click();
-  byId("file").accept = Object.keys(start.kinds).join(",");
-  byId("file").onchange = ({ target }) => { if (target.files[0]) upload(target.files[0]); target.value = ""; };
+  byId("file").accept = Object.keys(start.surfaces).join(",");
+  byId("outline").onclick = () => byId("outline-file").click();
+  byId("outline-file").accept = start.outlines.join(",");
+  for (const [name, asOutline] of [["file", false], ["outline-file", true]]) {
+    byId(name).onchange = ({ target }) => { if (target.files[0]) upload(target.files[0], asOutline); target.value = ""; };
+  }
+  byId("no-outline").onclick = () => change(next => set(next, "target.boundary", undefined));
   addEventListener("dragover", event => event.preventDefault());
   addEventListener("drop", event => { event.preventDefault(); if (event.dataTransfer.files[0]) upload(event.dataTransfer.files[0]); });
   byId("undo").onclick = () => order({ kind: "step", by: -1 });
