@@ -75,6 +75,50 @@ def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent
     assert len(set(lengths)) > 2
 
 
+BROKEN = """() => [...document.querySelectorAll("th, td, h1, h2, h3, strong")].flatMap(cell => {
+  const walker = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT), broken = [], range = document.createRange();
+  let node;
+  while ((node = walker.nextNode())) for (const word of node.data.matchAll(/[\\w.%/]+/g)) {
+    range.setStart(node, word.index);
+    range.setEnd(node, word.index + word[0].length);
+    if (new Set([...range.getClientRects()].map(({ top }) => top)).size > 1) broken.push(word[0]);
+  }
+  return broken;
+})"""
+"""Words of headings and tables that stand on two lines."""
+UNIT_ALONE = """() => [...document.querySelectorAll("td")].filter(cell => {
+  const range = document.createRange();
+  range.selectNodeContents(cell);
+  const lines = new Set([...range.getClientRects()].map(({ top }) => top)).size;
+  return lines > 1 && /^[\\d.e\u2212+-]+ \\S{1,4}$/.test(cell.innerText.trim());
+}).map(cell => cell.innerText)"""
+"""Figures whose unit stands on the next line."""
+
+
+@pytest.mark.slow
+@needs_browser
+def test_on_a_phone_words_are_whole_units_are_beside_their_numbers_and_loads_need_no_scrolling(tmp_path: Path) -> None:
+    from tests.acceptance.studio_browser import browser_page, errors
+    from tests.output.test_loads_page import archive as loaded
+
+    said: list[str] = []
+    made = {"dome": archive("dome"), "breaking": breaking(), "loaded": loaded()}
+    with browser_page(said) as page:
+        for name, found in made.items():
+            address = page_of(found, tmp_path / name).as_uri()
+            for width in (360, 420, 1300):
+                page.set_viewport_size({"width": width, "height": 800})
+                page.goto(address)
+                assert page.evaluate(BROKEN) == []
+                assert page.evaluate(UNIT_ALONE) == []
+                assert page.evaluate("document.documentElement.scrollWidth") <= width
+                tables = page.locator(".loads .wide")
+                assert tables.count() == (5 if name == "loaded" else 0)
+                for table in tables.all():
+                    assert table.evaluate("part => part.scrollWidth - part.clientWidth") <= 0
+    assert errors(said) == []
+
+
 def test_colours_of_the_view_mean_what_stands_at_their_own_bar() -> None:
     made = breaking()
     header, array = read(scene_of(made))
