@@ -481,3 +481,68 @@ def test_controls_are_made_once_for_a_change_and_then_left_alone(tmp_path: Path)
         made = page.get_attribute(SPACING, "aria-labelledby")  # counts up with each control that is made
         page.wait_for_timeout(500)
         assert page.get_attribute(SPACING, "aria-labelledby") == made
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_mesh_without_a_unit_closed_or_with_y_upwards_becomes_a_target_by_buttons(tmp_path: Path) -> None:
+    import numpy as np
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page, errors
+    from tests.acceptance.targets_broken import as_obj, dome
+
+    points, faces = dome()
+    polar, azimuth = np.pi * np.sqrt(1.0 - points[:, 2] / 4.0), np.arctan2(points[:, 1], points[:, 0])
+    ball = np.column_stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    (tmp_path / "case.toml").write_text(CASE)
+    (tmp_path / "ball.obj").write_bytes(as_obj(1000.0 * (5.0 * ball + [0.0, 0.0, 1.0]), faces))
+    (tmp_path / "upwards.obj").write_bytes(as_obj(points[:, [0, 2, 1]] * [1.0, 1.0, -1.0], faces))
+    (tmp_path / "roof.obj").write_bytes(as_obj(points, faces))
+    said: list[str] = []
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
+        page.set_default_timeout(60_000)
+        robot = Robot(page, tmp_path, "studio")
+        page.goto(address)
+        robot.checked()
+        page.set_input_files("#file", tmp_path / "ball.obj")
+        page.get_by_role("button", name="mm: 9.93 \u00d7 9.93 \u00d7 10 m", exact=True).click()
+        page.get_by_role("button", name="End it at half its height, z = 1 m").click()
+        robot.checked()
+        assert linked(page)["target"] == {"kind": "mesh", "file": "upload:ball.obj", "unit": "mm", "base": 1}
+        assert page.locator("#verdict.failed").count() == 0
+        totals = []
+        for name in ("roof", "upwards"):
+            page.set_input_files("#file", tmp_path / f"{name}.obj")
+            page.get_by_role("button", name="m: 10 \u00d7", exact=False).last.click()
+            if name == "upwards":
+                page.click("#upright")
+                page.wait_for_selector("#upright[aria-pressed=true]")
+            robot.checked()
+            assert page.inner_text("#controls .lil-title >> nth=0").endswith(f"Case of {name}.obj")
+            totals.append(float(page.inner_text("#figures td >> nth=1").split()[0]))
+        assert totals[1] == pytest.approx(totals[0], rel=0.01)  # the same surface, its net from another heading
+    assert errors(said) == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_verdict_is_on_the_first_screen_of_a_tablet_and_before_the_case_on_a_phone(tmp_path: Path) -> None:
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page
+
+    (tmp_path / "case.toml").write_text(CASE)
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page([]) as page:
+        page.goto(address)
+        Robot(page, tmp_path, "studio").checked()
+        for width, height in ((1024, 768), (420, 800), (360, 740)):
+            page.set_viewport_size({"width": width, "height": height})
+            assert page.evaluate("document.documentElement.scrollWidth") == width
+            boxes = [page.locator(part).bounding_box() for part in ("#verdict strong", "#controls", "#view canvas")]
+            verdict, controls, view = [box for box in boxes if box]
+            if width == 1024:
+                assert verdict["y"] + verdict["height"] < height
+                assert controls["x"] < view["x"] < verdict["x"]
+            else:
+                assert view["y"] < verdict["y"] < controls["y"]
+                assert view["height"] < 0.5 * height  # a finger beside it scrolls the page

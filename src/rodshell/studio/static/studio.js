@@ -79,12 +79,15 @@ function offer(ready) {
 // Buttons for what takes longer; each is a part of the case
 
 const DEPLOYMENT = 8;  // equilibria from flat
+const UPRIGHT = ["90 deg", "0 deg", "0 deg"];  // turns a surface whose y points upwards
 
 function showTools() {
   const press = (name, on) => byId(name).setAttribute("aria-pressed", String(Boolean(on)));
   press("refine", get(base, "refine.vary")?.length);
   press("loads", Array.isArray(base.loads) ? base.loads.length : base.loads);
   press("erection", get(base, "checks.stages") ?? DEPLOYMENT);
+  byId("upright").hidden = !takesOutline() || base.target.kind === "heights";
+  press("upright", same(get(base, "target.turn"), UPRIGHT));
   const drawn = get(base, "target.boundary");
   byId("outline").hidden = !takesOutline();
   byId("no-outline").hidden = !drawn;
@@ -156,6 +159,11 @@ function checkLoads(elements) {
 
 function wireTools() {
   byId("refine").onclick = () => change(next => set(next, "refine.vary", get(next, "refine.vary")?.length ? undefined : ["taper"]));
+  byId("upright").onclick = () => {
+    pending = true;
+    change(next => set(next, "target.turn", same(get(next, "target.turn"), UPRIGHT) ? undefined : UPRIGHT));
+    buildControls();
+  };
   byId("erection").onclick = () => change(next => set(next, "checks.stages", (get(next, "checks.stages") ?? DEPLOYMENT) ? 0 : DEPLOYMENT));
   const dialog = byId("load-values"), form = dialog.querySelector("form");
   byId("loads").onclick = () => showLoads();
@@ -281,9 +289,20 @@ function failed(sentence) {
   say("");
   const box = byId("verdict"), place = named(sentence);
   box.className = "failed";
-  box.replaceChildren(make("strong", { textContent: sentence }));
+  box.replaceChildren(make("strong", { textContent: sentence }), ...remedies(sentence).map(([textContent, path, value]) => make("button", { type: "button", textContent, onclick: () => { pending = true; change(next => set(next, path, value)); buildControls(); } })));
   if (place) box.append(make("button", { type: "button", textContent: `Go to ${place.name}`, onclick: place.show }));
   document.body.classList.toggle("old", shown !== serial);  // the shapes are those of a case before
+}
+
+const UNITS = { mm: 0.001, cm: 0.01, m: 1, in: 0.0254, ft: 0.3048 };
+const short = number => String(Number(number.toPrecision(3)));
+
+// What a surface from a file often lacks, with the values that it may have: text of a button, key, value.
+function remedies(sentence) {
+  const wide = /does not state its unit \(it is ([\d.e+-]+) x ([\d.e+-]+) x ([\d.e+-]+) units wide\)/.exec(sentence);
+  if (wide) return Object.entries(UNITS).map(([unit, metres]) => [`${unit}: ${wide.slice(1).map(size => short(size * metres)).join(" \u00d7 ")} m`, "target.unit", unit]);
+  const plane = /by a base plane between z = (\S+) and (\S+) m/.exec(sentence), middle = plane && short((Number(plane[1]) + Number(plane[2])) / 2);
+  return plane ? [[`End it at half its height, z = ${middle} m`, "target.base", Number(middle)]] : [];
 }
 
 // Where on the page the value stands that a sentence is about: a load ('load 2 ("snow")'), or the field of the key that
@@ -295,7 +314,7 @@ function named(sentence) {
   const at = ({ path }, text) => sentence.search(new RegExp(`(?<![\\w.])${text.replaceAll(".", "\\.")}(?![\\w-]|\\.\\w)`));
   const found = keysOfCase().filter(({ path }) => path.includes("."));
   const first = text => found.map(key => [at(key, text(key)), key]).filter(([place]) => place >= 0).sort(([a], [b]) => a - b)[0]?.[1];
-  const key = first(({ path }) => path) || first(({ path }) => `--${path.split(".").pop()}`);
+  const key = (sentence.includes("by a base plane") && found.find(({ path }) => path === "target.base")) || first(({ path }) => path) || first(({ path }) => `--${path.split(".").pop()}`);
   return key && { name: key.path, show: () => goTo(key) };
 }
 
@@ -338,7 +357,8 @@ function buildControls() {
   typing = stale = false;  // before the focused field goes, whose loss of focus would ask for controls again
   const open = gui ? gui.foldersRecursive().filter(folder => !folder._closed).map(folder => folder._title) : ["Design"];
   gui?.destroy();
-  gui = new GUI({ container: byId("controls"), injectStyles: false, title: "Case" });
+  const file = get(base, "target.file");
+  gui = new GUI({ container: byId("controls"), injectStyles: false, title: file ? `Case of ${words(file).replace("upload:", "")}` : "Case" });
   const known = keysOfCase();
   const design = gui.addFolder("Design");
   for (const [path, name, kind] of SLIDERS) {
@@ -372,7 +392,8 @@ function addSlider(folder, path, name, kind) {
   const unit = turned ? 180 / Math.PI : kind === "factor" ? 1 : small ? 1000 : 1;
   const size = (facts?.handles?.size || 1) * unit;
   const [low, high] = range(path, now * unit, kind === "angle" ? [-90, 90] : kind === "crossing" ? [30, 150] : kind === "place" ? [now * unit - 0.5 * size, now * unit + 0.5 * size] : [now * unit / 2, now * unit * 2]);
-  const holder = { value: now * unit };
+  const given = typeof get(base, path) === "number" ? now * unit : Number((now * unit).toPrecision(4));
+  const holder = { value: given };
   const symbol = turned ? "\u00b0" : kind === "factor" ? "" : small ? "mm" : "m";
   const step = turned ? 0.5 : 10 ** Math.floor(Math.log10((high - low) / 400));
   const put = (live) => change(next => {
