@@ -546,3 +546,38 @@ def test_the_verdict_is_on_the_first_screen_of_a_tablet_and_before_the_case_on_a
             else:
                 assert view["y"] < verdict["y"] < controls["y"]
                 assert view["height"] < 0.5 * height  # a finger beside it scrolls the page
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_load_needs_its_unit_and_what_failed_is_not_said_while_its_remedy_is_tried(tmp_path: Path) -> None:
+    import signal
+
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import Robot, browser_page
+    from tests.acceptance.targets_broken import as_obj, dome
+
+    (tmp_path / "case.toml").write_text(CASE)
+    (tmp_path / "roof.obj").write_bytes(as_obj(*dome()))
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, process), browser_page([]) as page:
+        page.set_default_timeout(20_000)
+        page.goto(address)
+        Robot(page, tmp_path, "studio").checked()
+        page.click("#loads")
+        page.fill("input[name=snow]", "0.7")  # of what?
+        page.click("#load-values button[value=check]")
+        expect(page.locator("#load-values[open] input[name=snow]:invalid")).to_be_focused()
+        page.click("#load-values button[value=close]")
+        expect(page.locator("#load-values")).to_be_hidden()
+        assert "loads" not in linked(page)
+        page.set_input_files("#file", tmp_path / "roof.obj")
+        page.wait_for_selector("#verdict.failed:not(.old)")
+        process.send_signal(signal.SIGSTOP)
+        try:
+            page.get_by_role("button", name="mm: 0.01").click()
+            expect(page.locator("#verdict")).to_have_text("Looking for the form")
+        finally:
+            process.send_signal(signal.SIGCONT)
+        page.wait_for_selector("#verdict.failed:not(.old), #verdict.good, #verdict.check, #verdict.unbuildable")

@@ -1,6 +1,7 @@
 """What is shown while a form is being found is what is shown of it afterwards."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from rodshell.output.grid import rods_of
 from rodshell.output.viewer import scene_of
 from rodshell.studio.preview import Preview
 from rodshell.studio.showing import checked
+from tests.acceptance.targets_broken import as_obj, dome
 
 DOME: dict[str, Any] = {
     "target": {"kind": "hemisphere"},
@@ -68,6 +70,24 @@ def test_a_preview_shows_what_the_archive_shows(case: dict[str, Any], until: Any
     )
     assert met == known
     assert len(met) > 10
+
+
+@pytest.mark.slow
+def test_a_target_far_from_the_origin_is_shown_as_large_as_one_at_it(tmp_path: Path) -> None:
+    (tmp_path / "roof.obj").write_bytes(as_obj(*dome()))
+    target = {"kind": "mesh", "file": str(tmp_path / "roof.obj"), "unit": "m"}
+    sizes = []
+    for move in ([0.0, 0.0, 0.0], [50.0, 20.0, 3.0]):
+        form = rs.Job.load({"target": {**target, "move": move}, "layout": {"spacing": 2.0}}).run(until="drape")
+        kept = scene_of(form.unchecked(), schedules=False)
+        assert kept is not None
+        for content in (Preview().of(form)[1], kept.content()):
+            header, array = read(content)
+            sizes.append(header["size"])
+            (flat,) = (stage for stage in header["stages"] if stage["name"] == "flat")
+            lying = array(flat["points"]).reshape(-1, 3) / 65535 * header["size"] + header["low"]
+            np.testing.assert_allclose(lying[:, :2].mean(axis=0), move[:2], atol=0.1)  # as even as the grid is
+    assert sizes == pytest.approx([sizes[0]] * 4, rel=1e-3)  # the smooth function of a mesh depends on where it lies
 
 
 @pytest.mark.slow

@@ -18,7 +18,8 @@ from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.curves import on_curve
-from rodshell.geometry.frames import cross, dot, unit
+from rodshell.geometry.frames import dot, unit
+from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
@@ -384,8 +385,7 @@ def turned(now: Floats, goal: Floats, t: float) -> Floats:
 
 
 def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
-    """The flat grid turned and moved in its plane so that its rods' ends have the shortest paths, in the
-    least-squares sense: Procrustes' problem in the plane [Schönemann 1966].
+    """The flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
 
     Parameters
     ----------
@@ -397,15 +397,7 @@ def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
     -------
     (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
     """
-    flat, ends = mesh.flat, mesh.flat[mesh.ends.ravel()]
-    centre, there = ends.mean(axis=0), points.mean(axis=0)
-    a, b = (ends - centre) * (1.0, 1.0, 0.0), (points - there) * (1.0, 1.0, 0.0)
-    angle = np.arctan2(cross(a, b)[:, 2].sum(), np.sum(a * b))
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    result = np.empty_like(flat)
-    result[:, :2] = (flat - centre)[:, :2] @ turn + there[:2]
-    result[:, 2] = height + flat[:, 2]
-    return result
+    return PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], points).moved(mesh.flat, height)
 
 
 def flat_below(mesh: GridMesh, points: Floats) -> Floats:

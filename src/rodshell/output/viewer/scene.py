@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
+from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
 from rodshell.output.grid import GridJoint, GridRod, Shape, joints_of, rods_of, shape_names, shape_of
 from rodshell.output.models import section_outline, widths_along
@@ -70,7 +71,7 @@ class Drawn:
     rods : id and family of each rod.
     nodes : (k,) nodes of all rods, one rod after the other; counts : (m,) how many each rod has.
     joints : ids; meeting : (c, 2) entry in `nodes` of each joint on either rod.
-    shapes : in their order, with what colours them.
+    shapes : in their order, with what colours them; a flat one is shown below the last, where the deployment begins.
     outline : size of everything [m] -> (s, 2) corners of the rods' section, across and up [m].
     target : points (p, 3) and triangles (t, 3) of the target, if there is one.
     reactions : by shape, the forces (2 m, 3) at the start and end of each rod over the largest, and that one in words.
@@ -96,7 +97,8 @@ class Drawn:
         data, entries = _Data(), _entries(self.counts, self.meeting)
         nodes, counts = self.nodes[entries], np.diff(np.searchsorted(entries, np.cumsum([0, *self.counts])))
         meeting = np.searchsorted(entries, self.meeting).astype(np.uint32)
-        clouds = [shape.positions[nodes] for shape, _ in self.shapes]
+        lying = self._lying()
+        clouds = [(lying if shape.flat else shape.positions)[nodes] for shape, _ in self.shapes]
         low, size = _box([*clouds, *([] if self.target is None else [self.target[0]])])
         outline = self.outline(float(size.max()))
         frame = _Frame(low, float(size.max()), entries, data)
@@ -138,11 +140,20 @@ class Drawn:
         }
         return Scene(header, data.content())
 
+    def _lying(self) -> Floats:
+        """The flat grid (n, 3), moved in its plane to below the last shape: a target may be far from the origin."""
+        last = np.cumsum(self.counts)
+        ends = self.nodes[np.column_stack([last - self.counts, last - 1]).ravel()]
+        flat = next((shape.positions for shape, _ in self.shapes if shape.flat), np.zeros((0, 3)))
+        final = next((shape.positions for shape, _ in reversed(self.shapes) if not shape.flat), flat)
+        if not len(flat):
+            return flat
+        goals = final[ends]
+        return PlanarMotion.onto(flat[ends], goals).moved(flat, float(goals[:, 2].min()))
+
 
 def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
-    """All shapes of an archive; None where it has no shape in space.
-
-    The draped shape is shown too; the flat one is placed where the deployment begins, if that is known.
+    """All shapes of an archive, the draped one among them; None where it has no shape in space.
 
     Parameters
     ----------
@@ -152,7 +163,7 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     names = [name for name in _in_order(shape_names(archive)) if rods]
     if len(names) < 2:
         return None
-    joints, shapes = _drawn_joints(archive, rods), [_placed(archive, name) for name in names]
+    joints, shapes = _drawn_joints(archive, rods), [shape_of(archive, name) for name in names]
     tables = {"rod": rods_table(archive, brief=True), "joint": joints_table(archive, brief=True)} if schedules else {}
     target = archive.states.get("target_points")
     return Drawn(
@@ -223,14 +234,6 @@ class _Data:
 def _in_order(names: list[str]) -> list[str]:
     """Draped, flat, the deployment, popped up: as they are found."""
     return [name for name in names if name == "draped"] + [name for name in names if name != "draped"]
-
-
-def _placed(archive: Archive, name: str) -> Shape:
-    """The flat grid is shown where the deployment begins."""
-    shape = shape_of(archive, name)
-    if shape.flat and "history" in archive.states:
-        return Shape("flat", shape.caption, np.asarray(archive.states["history"][0], dtype=float))
-    return shape
 
 
 def _drawn_joints(archive: Archive, rods: list[GridRod]) -> list[tuple[GridJoint, tuple[int, int]]]:

@@ -60,7 +60,12 @@ function submit(next, live) {
 
 // What is shown is of a case before, at once. While somebody drags, the shapes follow the hand: they are not marked.
 function outdate(changed, live) {
-  byId("verdict").classList.add("old");
+  const box = byId("verdict");
+  if (changed && !live && box.classList.contains("failed")) {  // its sentence and buttons are about values that are changed
+    box.className = "waiting";
+    box.replaceChildren(make("strong", { textContent: "Looking for the form" }));
+  }
+  box.classList.add("old");
   if (changed) byId("figures").classList.add("old");
   if (changed && !dragging) document.body.classList.add("old");
   dragging = live;
