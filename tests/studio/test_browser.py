@@ -506,6 +506,7 @@ def test_a_mesh_without_a_unit_closed_or_with_y_upwards_becomes_a_target_by_butt
         page.goto(address)
         robot.checked()
         page.set_input_files("#file", tmp_path / "ball.obj")
+        assert page.get_by_role("button", name="m: 9930 \u00d7", exact=False).count() == 0  # larger than any shell
         page.get_by_role("button", name="mm: 9.93 \u00d7 9.93 \u00d7 10 m", exact=True).click()
         page.get_by_role("button", name="End it at half its height, z = 1 m").click()
         robot.checked()
@@ -546,6 +547,14 @@ def test_the_verdict_is_on_the_first_screen_of_a_tablet_and_before_the_case_on_a
             else:
                 assert view["y"] < verdict["y"] < controls["y"]
                 assert view["height"] < 0.5 * height  # a finger beside it scrolls the page
+        robot = Robot(page, tmp_path, "studio")
+        for name in ("one", "two"):
+            robot.keep(name)
+            page.check(f"#variants input[value={name}]")
+        page.click("#compare")
+        page.wait_for_selector("#side .both section:nth-child(2) canvas")
+        page.wait_for_selector("#side tbody tr")
+        assert page.evaluate("(part => part.scrollWidth - part.clientWidth)(document.getElementById('side'))") <= 0
 
 
 @pytest.mark.slow

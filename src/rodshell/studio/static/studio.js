@@ -295,17 +295,19 @@ function failed(sentence) {
   const box = byId("verdict"), place = named(sentence);
   box.className = "failed";
   box.replaceChildren(make("strong", { textContent: sentence }), ...remedies(sentence).map(([textContent, path, value]) => make("button", { type: "button", textContent, onclick: () => { pending = true; change(next => set(next, path, value)); buildControls(); } })));
+  byId("result").scrollTop = 0;
   if (place) box.append(make("button", { type: "button", textContent: `Go to ${place.name}`, onclick: place.show }));
   document.body.classList.toggle("old", shown !== serial);  // the shapes are those of a case before
 }
 
 const UNITS = { mm: 0.001, cm: 0.01, m: 1, in: 0.0254, ft: 0.3048 };
+const LARGEST = 1000;  // m, of a target
 const short = number => String(Number(number.toPrecision(3)));
 
 // What a surface from a file often lacks, with the values that it may have: text of a button, key, value.
 function remedies(sentence) {
   const wide = /does not state its unit \(it is ([\d.e+-]+) x ([\d.e+-]+) x ([\d.e+-]+) units wide\)/.exec(sentence);
-  if (wide) return Object.entries(UNITS).map(([unit, metres]) => [`${unit}: ${wide.slice(1).map(size => short(size * metres)).join(" \u00d7 ")} m`, "target.unit", unit]);
+  if (wide) return Object.entries(UNITS).filter(([, metres]) => Math.max(...wide.slice(1)) * metres < LARGEST).map(([unit, metres]) => [`${unit}: ${wide.slice(1).map(size => short(size * metres)).join(" \u00d7 ")} m`, "target.unit", unit]);
   const plane = /by a base plane between z = (\S+) and (\S+) m/.exec(sentence), middle = plane && short((Number(plane[1]) + Number(plane[2])) / 2);
   return plane ? [[`End it at half its height, z = ${middle} m`, "target.base", Number(middle)]] : [];
 }
