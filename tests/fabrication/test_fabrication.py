@@ -218,7 +218,7 @@ def test_one_rod_that_cannot_be_spliced_is_named_alone() -> None:
     ("options", "reason"),
     [({"end_allowance": -0.01}, "end allowance"), ({"kerf": float("nan")}, "kerf"),
      ({"kerf": 0.003}, "kerf of 0.003 m is lost where stock is cut: give its stock_length"),
-     ({"stock_length": 0.0}, "stock of 0.0 m"), ({"stock_length": 0.002, "kerf": 0.003}, "longer bars")],
+     ({"stock_length": 0.0}, "stock length must be positive"), ({"stock_length": 0.002, "kerf": 0.003}, "longer bars")],
 )  # fmt: skip
 def test_lengths_that_cannot_be_are_refused(options: dict[str, float], reason: str) -> None:
     with pytest.raises(rs.InputError, match=reason):

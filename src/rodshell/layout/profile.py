@@ -42,10 +42,9 @@ class Profile:
 
     def __post_init__(self) -> None:
         choice("varies", self.varies, get_args(Varies))
-        for name in ("stations", "factors"):
-            values = getattr(self, name)
-            given = listed(f"the {name} of a profile", values, "a sequence of numbers")
-            object.__setattr__(self, name, tuple(number(f"each of the {name} of a profile", value) for value in given))
+        for name, checked in (("stations", number), ("factors", positive)):
+            given = listed(f"the {name} of a profile", getattr(self, name), "a sequence of numbers")
+            object.__setattr__(self, name, tuple(checked(f"each of the {name} of a profile", value) for value in given))
         if len(self.stations) != len(self.factors) or len(self.stations) < 2:
             raise InputError(
                 f"a profile needs a factor at each of two stations or more, not {len(self.factors)} factors at "
@@ -58,8 +57,6 @@ class Profile:
                 "the stations of a profile are shares of the rod's length that ascend from 0 to 1, none more than "
                 f"twice, not {self.stations}"
             )
-        for factor in self.factors:
-            positive("a profile's factor", factor, "")
 
     @staticmethod
     def symmetric(factors: Sequence[float], *, varies: Varies = "size") -> "Profile":
