@@ -209,6 +209,8 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.mesh_grid(CROSS, 0.0), "edge must be positive, not 0 m"),
         (lambda: rs.mesh_grid(CROSS, 0.1, marks=[[0.5]]), "2 rods need as many lists of marks, not 1"),
         (lambda: rs.mesh_grid(CROSS, 0.1, marks=[["x"], []]), "marks must be numbers"),
+        (lambda: rs.mesh_grid(CROSS, 0.1, marks=[0.5, 0.5]), "the marks of each rod must be a list, not 0.5"),
+        (lambda: rs.mesh_grid(CROSS, 0.1, marks=[[float("nan")], []]), "marks must be finite"),
         (lambda: rs.straight_rods(np.zeros((1, 2, 2)), names="R"), 'names must be a list of different names, not "R"'),
         (lambda: rs.pop_up_table(CROSS, "x", ROD), "finals must be numbers of the shape"),
         (lambda: rs.pop_up_table(CROSS, np.zeros((2, 2, 3)), ROD, edge="1"), 'edge must be a number in m, not "1"'),

@@ -130,6 +130,8 @@ def listed(name: str, value: object, wanted: str) -> tuple[Any, ...]:
     wanted : what it must be, in words, such as "a list of rods".
     """
     given: Any = value
+    if type(value) in (list, tuple):  # as nearly always, and quicker than what follows
+        return tuple(given)
     if isinstance(value, str | bytes | Mapping) or not (isinstance(value, Sequence) or getattr(value, "ndim", None)):
         raise InputError(f"{name} must be {wanted}, not {described(value)}")
     return tuple(given)
@@ -204,7 +206,9 @@ def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
     import numpy as np  # here, so that the command line's help need not wait for it
 
     try:
-        array = np.broadcast_to(np.asarray(given, dtype=float), shape)
+        array = np.asarray(given, dtype=float)
+        if array.shape != shape:
+            array = np.broadcast_to(array, shape)
     except (TypeError, ValueError):
         wanted = "one number" if not shape else f"numbers of the shape {shape}"
         raise InputError(f"{name} must be {wanted}, not {short(given)}") from None

@@ -188,10 +188,10 @@ class Fit:
         if fitting:
             return fitting[-1]
         like = shape or (stock[0] if stock else Circle(self.slender))
-        strain = self._strain(
-            scaled(like, self.thickest / like.depth), material
-        )  # of thinner ones at most in proportion
-        most = self.thickest if strain <= allowed else self.thickest * allowed / strain
+        strain = self._strain(scaled(like, self.thickest / like.depth), material)
+        most = self.thickest * min(
+            1.0, allowed / strain if strain else 1.0
+        )  # thinner ones strain in proportion or less
         return _of_depth(like, rounded_down(most), wall_stays=shape is not None)
 
     def reason(

@@ -4,6 +4,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.kernels import njit
 
 _ALONG = 1e-6  # [rad]: a director closer to its tangent does not define a frame
 
@@ -19,15 +20,23 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Inner products (...) of arrays (..., 3); several times faster than by numpy's einsum on long arrays."""
+    if a.ndim == 2 and a.shape == b.shape and a.dtype == b.dtype == np.float64:
+        return np.asarray(_dots(a, b))
     return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
 
 
 def unit(a: Floats) -> Floats:
     """Vectors (..., d) scaled to length 1; several times faster than by numpy's norm on long arrays."""
-    square = a[..., 0] * a[..., 0]
-    for k in range(1, a.shape[-1]):
-        square = square + a[..., k] * a[..., k]
+    square = dot(a, a) if a.shape[-1] == 3 else np.sum(a * a, axis=-1)
     return np.asarray(a / np.sqrt(square)[..., None])
+
+
+@njit()
+def _dots(a, b):  # type: ignore[no-untyped-def]
+    result = np.empty(len(a))
+    for n in range(len(a)):
+        result[n] = a[n, 0] * b[n, 0] + a[n, 1] * b[n, 1] + a[n, 2] * b[n, 2]
+    return result
 
 
 def parallel_transport(vectors: Floats, start: Floats, end: Floats) -> Floats:

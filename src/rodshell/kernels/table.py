@@ -29,6 +29,9 @@ KERNELS: dict[str, dict[str, str]] = {
         "lagrange": "f2 f3 f1",
         "resampled": "f1 f3 i f1 f",
     },
+    "geometry.frames": {
+        "_dots": "f2 f2",
+    },
     "joints.relative_rotation": {
         "_relative_rotation": "f2 i2 i2 f2 f3 c2 f1 f3 f3 f2 f3",
         "_respond": "f1 f f2 c1 f1 f2",

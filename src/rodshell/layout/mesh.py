@@ -271,7 +271,9 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
     if not_negative("edge", edge, "m", infinite=True) == 0:
         raise InputError("edge must be positive, not 0 m")
     if marks is not None:
-        marks = [finite("marks", row, np.size(row)).tolist() for row in listed("marks", marks, "a list for each rod")]
+        marks = [
+            listed("the marks of each rod", row, "a list") for row in listed("marks", marks, "a list for each rod")
+        ]
         if len(marks) != len(grid.rods):
             raise InputError(f"{len(grid.rods)} rods need as many lists of marks, not {len(marks)}")
     first, s, nodes, count, joint_nodes = _fixed_points(grid, [()] * len(grid.rods) if marks is None else marks)
@@ -292,7 +294,7 @@ def _fixed_points(grid: FlatGrid, marks: Sequence[Sequence[float]]) -> tuple[Int
         given += (rod.start, *more, rod.end)
         begin.append(len(given))
     found: tuple[Ints, Floats, Ints, int, Ints] = _fixed(
-        grid.crossings.rods, grid.crossings.at, np.array(given, dtype=float), np.array(begin)
+        grid.crossings.rods, grid.crossings.at, finite("marks", given, len(given)), np.array(begin)
     )
     return found
 
