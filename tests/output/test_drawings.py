@@ -181,9 +181,9 @@ def test_a_name_of_a_match_line_without_a_free_place_is_led_aside() -> None:
 def test_a_name_of_a_match_line_without_any_place_is_counted() -> None:
     for sheet in tiled(texts_about_the_edge(1e3), PAPER):
         assert not any(text.text.startswith("match line") for text in sheet.content.texts)
-        assert sheet.content.left_out == ("all of 1 names of match lines",)
+        assert sheet.content.left_out == ("1 of 1 names of match lines",)
         (bound_sheet,) = bound([sheet], title_block(sample_archive(3, 2), ""), PAPER)
-        assert "Left out for lack of room: all of 1 names of match lines." in [text.text for text in bound_sheet.texts]
+        assert "Left out for lack of room: 1 of 1 names of match lines." in [text.text for text in bound_sheet.texts]
 
 
 def test_length_beneath_is_that_within_the_box() -> None:

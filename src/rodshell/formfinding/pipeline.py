@@ -413,9 +413,9 @@ def _in_pieces(trimmed: Trimmed) -> tuple[str, ...]:
         return ()
     are = "rods are" if len(names) > 1 else "rod is"
     return (
-        f"{len(names)} {are} on the target in several pieces, each with its own ends: {', '.join(names)}; an opening "
-        "where they end needs a ring that carries their reactions; where they only cross the edge twice, another "
-        "offset of the layout may help",
+        f"{len(names)} {are} on the target in several pieces, each with its own ends: {', '.join(names)}; where they "
+        "end at an opening, it needs a ring that carries their reactions; where they only cross the edge twice, "
+        "another offset of the layout may help",
     )
 
 

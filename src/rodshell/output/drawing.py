@@ -335,7 +335,7 @@ class Pencil:
         what : what the texts are, in words.
         """
         if count:
-            self.left_out.append(f"{count if count < of else 'all'} of {of} {what}")
+            self.left_out.append(f"{'all' if count == of > 1 else count} of {of} {what}")
 
     def done(self, name: str, title: str, text: float) -> Drawing:
         """The drawing of all that was added.
