@@ -274,6 +274,11 @@ def test_a_bad_case_is_refused_in_one_clear_sentence(load: Any, text: str, messa
     assert "pydantic" not in said
 
 
+def test_loads_from_a_generator_are_named_by_their_numbers() -> None:
+    with pytest.raises(InputError, match='value of load 2 = "x": not a finite number'):
+        load_case("hemisphere", {"loads": ({"name": "ice", "kind": "snow", "value": value} for value in (1.0, "x"))})
+
+
 def test_an_unknown_override_names_the_nearest_key() -> None:
     with pytest.raises(InputError, match=r"unknown key layout.spaceing: did you mean layout.spacing\?"):
         load_case("hemisphere", {"layout.spaceing": "30 mm"})

@@ -1,7 +1,7 @@
 """The keys of the case file in a row, read off its tables, for command-line options; and what is wrong with a key, in
 one sentence: the key, its value, and what is accepted."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
@@ -181,7 +181,8 @@ def _fault_in_a_row(row: ErrorDetails, path: str, within: str, raw: Mapping[str,
 def _table_in_a_row(raw: Mapping[str, Any], within: str, index: str, noun: str) -> str:
     """A table in a row, counted from one, with its name where it has one: load 2 ("snow")."""
     outer, _, last = within.rpartition(".")
-    table = (_table_of(raw, outer) if outer else raw)[last][int(index)]
+    rows = (_table_of(raw, outer) if outer else raw)[last]
+    table = rows[int(index)] if isinstance(rows, Sequence) else None  # a generator has been read
     name = table.get("name") if isinstance(table, Mapping) else None
     return f"{noun} {int(index) + 1}" + (f" ({shown(name)})" if isinstance(name, str) and name else "")
 
