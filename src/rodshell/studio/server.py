@@ -225,22 +225,27 @@ async def _live(socket: WebSocket) -> None:
     session.listeners.add(news.put_nowait)
     sender = None
     try:
-        await socket.send_json({"kind": "session", "after": "connect", **vars(session.state)})
+        await _send(socket, {"kind": "session", "after": "connect", **vars(session.state)})
         sender = asyncio.create_task(_send_news(socket, news))
         while True:
             message = json.loads(await socket.receive_text())
             if error := _obey(session, message):
-                await socket.send_json({"kind": "failed", "serial": message.get("serial", 0), "sentence": error})
+                await _send(socket, {"kind": "failed", "serial": message.get("serial", 0), "sentence": error})
             if message.get("kind") == "step":
-                await socket.send_json({"kind": "session", "after": "step", **vars(session.state)})
+                await _send(socket, {"kind": "session", "after": "step", **vars(session.state)})
             elif message.get("kind") == "case" and not message.get("live"):
-                await socket.send_json({"kind": "history", "at": session.state.at, "count": len(session.state.cases)})
+                await _send(socket, {"kind": "history", "at": session.state.at, "count": len(session.state.cases)})
     except (WebSocketDisconnect, json.JSONDecodeError, RecursionError):
         pass
     finally:
         session.listeners.discard(news.put_nowait)
         if sender:
             sender.cancel()
+
+
+async def _send(socket: WebSocket, message: dict[str, Any]) -> None:
+    """As ASCII: a case that an earlier version kept may hold half of a surrogate pair, which UTF-8 does not have."""
+    await socket.send_text(json.dumps(message, allow_nan=False))
 
 
 async def _send_news(socket: WebSocket, news: asyncio.Queue[News]) -> None:
@@ -250,7 +255,7 @@ async def _send_news(socket: WebSocket, news: asyncio.Queue[News]) -> None:
             if item.kind == "files":
                 continue
             scene = item.kind == "stage" and bool(item.content)
-            await socket.send_json({"kind": item.kind, "serial": item.serial, **item.facts, "scene": scene})
+            await _send(socket, {"kind": item.kind, "serial": item.serial, **item.facts, "scene": scene})
             if scene:
                 await socket.send_bytes(item.content)
 
