@@ -202,14 +202,15 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.pop_up(FOOTPRINT, BOUNDARY, ROD, most_factorizations="9"), "most_factorizations must be a whole"),
         (lambda: rs.Boundary("x", np.zeros((4, 3))), "the boundary's points must be numbers of the shape"),
         (lambda: rs.Boundary(np.zeros((4, 3)), np.zeros((2, 3))), "the boundary's tangents must have the shape"),
+        (lambda: rs.Boundary(None, np.zeros((4, 3))), "the boundary's points must be numbers of the shape"),
         (lambda: rs.Footprint(CROSS), "mesh must be a rodshell GridMesh, not a FlatGrid"),
         (lambda: rs.mesh_grid(None, 0.1), "grid must be a rodshell FlatGrid, not None"),
         (lambda: rs.mesh_grid(CROSS, "0.1"), 'edge must be a number in m, not "0.1"'),
-        (lambda: rs.mesh_grid(CROSS, -0.1), "edge must be 0 or more, not -0.1 m"),
-        (lambda: rs.mesh_grid(CROSS, 0.0), "edge must be positive, not 0 m"),
+        (lambda: rs.mesh_grid(CROSS, -0.1), "edge must be positive, not -0.1 m"),
+        (lambda: rs.mesh_grid(CROSS, 0.0), "edge must be positive, not 0.0 m"),
         (lambda: rs.mesh_grid(CROSS, 0.1, marks=[[0.5]]), "2 rods need as many lists of marks, not 1"),
         (lambda: rs.mesh_grid(CROSS, 0.1, marks=[["x"], []]), "marks must be numbers"),
-        (lambda: rs.mesh_grid(CROSS, 0.1, marks=[0.5, 0.5]), "the marks of each rod must be a list, not 0.5"),
+        (lambda: rs.mesh_grid(CROSS, 0.1, marks=[0.5, 0.5]), "marks must be a list for each rod, not 0.5"),
         (lambda: rs.mesh_grid(CROSS, 0.1, marks=[[float("nan")], []]), "marks must be finite"),
         (lambda: rs.straight_rods(np.zeros((1, 2, 2)), names="R"), 'names must be a list of different names, not "R"'),
         (lambda: rs.pop_up_table(CROSS, "x", ROD), "finals must be numbers of the shape"),
@@ -227,6 +228,11 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.solve_rod(FOUND), "rod must be a rodshell ElasticRod, not a Form"),
         (lambda: rs.solve_rod(LINE, rs.RodLoads()), "supports must be a rodshell RodSupports, not a RodLoads"),
         (lambda: rs.solve_rod(LINE, steps="3"), 'steps must be a whole number of 1 or more, not "3"'),
+        (lambda: rs.solve_rod(LINE, stable="yes"), 'stable must be True or False, not "yes"'),
+        (lambda: rs.GridLayout.orthogonal(spacing=0.1, left_out={"U03": 1}), "must be names of rods, not a dict"),
+        (lambda: rs.GridLayout.orthogonal(spacing=0.1, left_out=np.array("U03")), "must be names of rods, not an? nd"),
+        (lambda: rs.Job(TARGET, LAYOUT, ROD, rotate=np.array([0.1])), "rotate must be a number in rad, not a"),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, time_limit=np.True_), "time_limit must be a number in s, not"),
         (lambda: rs.solve_rod(LINE, start="x"), "start must be numbers of the shape"),
         (lambda: rs.RodSupports(positions=[0]), "positions must be a mapping from nodes, .*, not a list"),
         (lambda: rs.RodSupports(spinning="start"), 'spinning must be a list of ends .*, not "start"'),
@@ -250,6 +256,40 @@ def test_lists_and_arrays_do_in_place_of_tuples():
     line = np.array([[(-1.0, 0.3), (1.0, 0.3)]])
     assert rs.Job(TARGET, rs.GridLayout.orthogonal(spacing=0.06), ROD, seams=line).case.seams.lines
     assert len(rs.trim(FOUND.draped, fewest=np.int64(3)).mesh.grid.rods) == len(RODS)
+    loads = rs.PointLoads([1], [[0.0, 0.0, 2.0]])
+    np.testing.assert_array_equal(loads.held(0.0, None, None, np.ones((2, 3))), [[0, 0, 0], [0, 0, 2]])
+    assert not rs.PointLoads([], np.zeros((0, 3))).held(0.0, None, None, np.ones((2, 3))).any()
+    weight = rs.GravityForce(np.array([True, False]), (0.0, 0.0, -1.0)).held(0.0, None, None, np.ones((2, 3)))
+    np.testing.assert_array_equal(weight, [[0, 0, -1], [0, 0, 0]])
+
+
+def test_sets_and_generators_do_in_place_of_lists():
+    assert rs.FlatGrid.of(rod for rod in CROSS.rods).rods == CROSS.rods
+    assert rs.GridLayout.orthogonal(spacing=0.1, left_out={"U03"}).left_out == ("U03",)
+    assert rs.Profile.symmetric(factor for factor in (1.0, 2.0)) == rs.Profile.symmetric((1.0, 2.0))
+    assert rs.RodSupports(spinning={"start"}).spinning == ("start",)
+    assert rs.Settlement((name for name in ["U03.1"]), (0.0, 0.0, -0.1)).supports == ("U03.1",)
+    assert rs.LineLoad(iter([(0.0, 0.0), (1.0, 0.0)]), (0.0, 0.0, -1.0)).line == ((0.0, 0.0), (1.0, 0.0))
+    marked = rs.mesh_grid(CROSS, 0.5, marks=((mark for mark in [0.3]) for _ in CROSS.rods))
+    assert marked.node_count == rs.mesh_grid(CROSS, 0.5, marks=[[0.3], [0.3]]).node_count
+
+
+def test_points_and_angles_may_be_arrays():
+    tried = rs.search(TARGET, LAYOUT, ROD, anchors=np.array([[0.0, 0.01]]), headings=np.array([0.0, 0.5]))
+    assert tried == rs.search(TARGET, LAYOUT, ROD, anchors=[(0.0, 0.01)], headings=[0.0, 0.5])
+    given = rs.Job(TARGET, LAYOUT, ROD, anchor=np.array([0.0, 0.01]), rotate=np.array(0.1))
+    assert given == rs.Job(TARGET, LAYOUT, ROD, anchor=(0.0, 0.01), rotate=0.1)
+
+
+def test_an_infinite_time_limit_is_none():
+    job = rs.Job(TARGET, LAYOUT, ROD)
+    assert job.run(time_limit=np.inf, until="drape").status == job.run(until="drape").status == "converged"
+
+
+def test_numpy_s_truths_are_truths(tmp_path):
+    rs.save(FOUND.unchecked(), tmp_path, [], force=np.True_)
+    assert rs.solve_rod(LINE, stable=np.bool_(True)).report.converged
+    assert rs.fabricate(MESH, ROD, rs.Fabrication(), to_supports=np.False_).cut_length.all()
 
 
 def test_numpy_s_numbers_are_numbers():

@@ -33,7 +33,19 @@ from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run, inputs_of
 from rodshell.targets import Target
 from rodshell.units import length_text, shown
-from rodshell.validation import array, choice, choices_of, file_path, instance, listed, mapping, number, point, positive
+from rodshell.validation import (
+    array,
+    choice,
+    choices_of,
+    file_path,
+    instance,
+    is_auto,
+    listed,
+    mapping,
+    number,
+    point,
+    positive,
+)
 
 Auto = Literal["auto"]
 AskedEnds = Literal["pinned", "clamped", "both"]
@@ -97,10 +109,10 @@ class Job:
             instance(name, value, kind)
         require_method(method)
         require_joint(joint)
-        if anchor is not None and anchor != "auto":
-            point("anchor", anchor)
-        if rotate is not None and rotate != "auto":
-            number("rotate", rotate, "rad")
+        if anchor is not None and not is_auto(anchor):
+            anchor = point("anchor", anchor)
+        if rotate is not None and not is_auto(rotate):
+            rotate = number("rotate", rotate, "rad")
         if options is not None:
             instance("options", options, OutputOptions)
         for name, patch in mapping("patches", patches or {}, 'settings by the names of patches, such as "A"').items():
@@ -254,7 +266,7 @@ class Job:
             instance("warm_start", warm_start, Form, FOUND)
         choice("until", until, ("drape", "pop-up", "fabrication"))
         if time_limit is not None:
-            positive("time_limit", time_limit, "s")
+            time_limit = positive("time_limit", time_limit, "s", infinite=True)
         limit = limited(progress, time_limit)
         run = Run(
             self._case,

@@ -3,7 +3,7 @@
 Every check raises InputError with one sentence, which calls the argument by its `name`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
 from math import inf, isfinite
@@ -86,10 +86,10 @@ def number(name: str, value: object, unit: str = "") -> float:
     return real
 
 
-def positive(name: str, value: object, unit: str = "") -> float:
-    """Return `value`, a finite number above 0, as a float; see `number`."""
+def positive(name: str, value: object, unit: str = "", *, infinite: bool = False) -> float:
+    """Return `value`, a number above 0, as a float; infinity only where it is allowed; see `number`."""
     real = _real(name, value, unit)
-    if not 0 < real < inf:
+    if not 0 < real <= inf or (real == inf and not infinite):
         raise InputError(f"{name} must be positive, not {described(value)}{unit and ' ' + unit}")
     return real
 
@@ -114,14 +114,15 @@ def whole(name: str, value: object, least: int, most: int | None = None) -> int:
 
 
 def flag(name: str, value: object) -> bool:
-    """Return `value` if it is True or False."""
-    if not isinstance(value, bool):
+    """Return `value`, True or False or NumPy's scalar of them, as a bool."""
+    given = _plain(value)
+    if not isinstance(given, bool):
         raise InputError(f"{name} must be True or False, not {described(value)}")
-    return value
+    return given
 
 
 def listed(name: str, value: object, wanted: str) -> tuple[Any, ...]:
-    """Return a list, a tuple or an array as a tuple.
+    """Return the items of a list, an array, a set, a generator or the like as a tuple.
 
     Parameters
     ----------
@@ -130,10 +131,10 @@ def listed(name: str, value: object, wanted: str) -> tuple[Any, ...]:
     wanted : what it must be, in words, such as "a list of rods".
     """
     given: Any = value
-    if type(value) in (list, tuple):  # as nearly always, and quicker than what follows
-        return tuple(given)
-    if isinstance(value, str | bytes | Mapping) or not (isinstance(value, Sequence) or getattr(value, "ndim", None)):
-        raise InputError(f"{name} must be {wanted}, not {described(value)}")
+    if not isinstance(value, list | tuple):  # most are, and the rest takes longer
+        single = isinstance(value, str | bytes | Mapping) or getattr(value, "ndim", None) == 0
+        if single or not isinstance(value, Iterable):
+            raise InputError(f"{name} must be {wanted}, not {described(value)}")
     return tuple(given)
 
 
@@ -177,14 +178,26 @@ def numbers(name: str, value: object, wanted: str, count: int) -> tuple[float, .
 
 
 def _real(name: str, value: object, unit: str) -> float:
+    value = _plain(value)
     if isinstance(value, bool) or not isinstance(value, NUMBER):
         raise InputError(f"{name} must be a number{unit and ' in ' + unit}, not {described(value)}")
     return as_float(value)
 
 
-def point(name: str, value: object) -> None:
-    """Refuse what is not a pair of finite numbers [m]."""
-    numbers(name, value, "two finite numbers x, y in m", 2)
+def _plain(value: Any) -> Any:
+    """What an array without axes, such as np.array(0.5) or np.True_, holds; anything else as it is."""
+    return value.item() if getattr(value, "ndim", None) == 0 else value
+
+
+def point(name: str, value: object) -> tuple[float, float]:
+    """Return a pair of finite numbers [m] as floats."""
+    x, y = numbers(name, value, "two finite numbers x, y in m", 2)
+    return x, y
+
+
+def is_auto(value: object) -> bool:
+    """Whether a value is left to rodshell; arrays are not compared with a word."""
+    return isinstance(value, str) and value == "auto"
 
 
 def file_path(name: str, value: object) -> Path:
@@ -232,7 +245,8 @@ def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None
     wanted = ", ".join("n" if count is None else str(count) for count in shape)
     try:
         result = np.asarray(given)
-        if result.dtype.kind not in "fiu" or (np.issubdtype(kind, np.integer) and result.dtype.kind == "f"):
+        allowed = "iu" if np.issubdtype(kind, np.integer) else "fiu"
+        if result.size and result.dtype.kind not in allowed:  # np.asarray([]) is an array of floats
             raise TypeError
         result = result.astype(kind, copy=False)
     except (TypeError, ValueError):

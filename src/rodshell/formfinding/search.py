@@ -15,7 +15,7 @@ from rodshell.nets.net_ends import inside_nodes
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
-from rodshell.validation import choice, instance, number, point, some
+from rodshell.validation import choice, instance, is_auto, number, point, some
 
 Objective = Literal["shear", "curvature", "gap"]
 Auto = Literal["auto"]
@@ -98,16 +98,15 @@ def search(
     instance("layout", layout, GridLayout)
     instance("rod", rod, Rod)
     choice("objective", objective, get_args(Objective))
-    if anchors != "auto":
-        for given in some("anchors", anchors, 'points x, y in m, or "auto"'):
-            point("each of the anchors", given)
-    if headings != "auto":
-        for angle in some("headings", headings, 'angles in rad, or "auto"'):
-            number("each of the headings", angle, "rad")
+    points, turns = _spread_anchors(target), HEADINGS
+    if not is_auto(anchors):
+        given = some("anchors", anchors, 'points x, y in m, or "auto"')
+        points = [point("each of the anchors", anchor) for anchor in given]
+    if not is_auto(headings):
+        angles = some("headings", headings, 'angles in rad, or "auto"')
+        turns = tuple(number("each of the headings", angle, "rad") for angle in angles)
     coarse = target.size / COARSE
     tried = GridLayout.orthogonal(spacing=coarse, edge=coarse / 3, rotate=layout.rotate)
-    points = _spread_anchors(target) if anchors == "auto" else list(anchors)
-    turns = HEADINGS if headings == "auto" else headings
     measure: Callable[[GridLayout, Point], float] = {
         "shear": lambda grid, anchor: 90.0 - degrees(chebyshev_net(target, grid, anchor=anchor).min_angle),
         "curvature": lambda grid, anchor: largest_curvature(chebyshev_net(target, grid, anchor=anchor)),

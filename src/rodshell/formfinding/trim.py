@@ -35,11 +35,11 @@ class Boundary:
     normals: Floats | None = None
 
     def __post_init__(self) -> None:
-        points = array("the boundary's points", self.points, np.float64, None, 3)
-        array("the boundary's tangents", self.tangents, np.float64, len(points), 3)
-        for name in ("draped", "normals"):
-            if (given := getattr(self, name)) is not None:
-                array(f"the boundary's {name}", given, np.float64, None, 3)
+        for name in ("points", "tangents", "draped", "normals"):
+            given = getattr(self, name)
+            if given is not None or name in ("points", "tangents"):
+                rows = len(self.points) if name == "tangents" else None
+                object.__setattr__(self, name, array(f"the boundary's {name}", given, np.float64, rows, 3))
 
     def __repr__(self) -> str:
         return f"<Boundary: ends of {len(self.points) // 2} rods>"

@@ -12,7 +12,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod
 from rodshell.units import NUMBER
-from rodshell.validation import instance, number, numbers, positive, texts
+from rodshell.validation import instance, is_auto, number, numbers, positive, texts
 
 Auto = Literal["auto"]
 
@@ -65,9 +65,9 @@ class GridLayout:
             "lines": _offsets(self.lines),
             "crossing": number("layout crossing", self.crossing, "rad"),
         }
-        if not _is_auto(self.length):
+        if not is_auto(self.length):
             values["length"] = positive("layout length", self.length, "m")
-        if not _is_auto(self.rods):
+        if not is_auto(self.rods):
             values["rods"] = _counts(self.rods)
         values["left_out"] = texts("layout left_out", self.left_out, "names of rods")
         for name, value in values.items():
@@ -201,10 +201,6 @@ class GridLayout:
 def auto_edge(spacing: tuple[float, float]) -> float:
     """The default edge of the mesh [m] for the spacings of both families [m]."""
     return min(spacing) / EDGES_A_SPAN
-
-
-def _is_auto(value: object) -> bool:
-    return isinstance(value, str) and value == "auto"
 
 
 def _require_two(name: str, pair: object) -> None:

@@ -16,7 +16,7 @@ from rodshell.geometry.curves import on_curve
 from rodshell.kernels import njit
 from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, sides, whole_rods
 from rodshell.layout.profile import Profile
-from rodshell.validation import finite, instance, listed, not_negative
+from rodshell.validation import finite, instance, listed, positive
 
 CROWDED = 0.01  # of the usual edge: nodes closer to an end are left out: round-off in forces grows as the inverse cube
 
@@ -268,12 +268,9 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
     InputError : a value is of the wrong kind; the edge is not positive; not as many marks as rods.
     """
     instance("grid", grid, FlatGrid)
-    if not_negative("edge", edge, "m", infinite=True) == 0:
-        raise InputError("edge must be positive, not 0 m")
+    positive("edge", edge, "m", infinite=True)
     if marks is not None:
-        marks = [
-            listed("the marks of each rod", row, "a list") for row in listed("marks", marks, "a list for each rod")
-        ]
+        marks = [listed("marks", row, "a list for each rod") for row in listed("marks", marks, "a list for each rod")]
         if len(marks) != len(grid.rods):
             raise InputError(f"{len(grid.rods)} rods need as many lists of marks, not {len(marks)}")
     first, s, nodes, count, joint_nodes = _fixed_points(grid, [()] * len(grid.rods) if marks is None else marks)

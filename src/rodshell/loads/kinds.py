@@ -223,7 +223,8 @@ class LineLoad:
     force: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        if len(listed("the line of a load", self.line, "points x, y in m")) < 2:
+        object.__setattr__(self, "line", listed("the line of a load", self.line, "points x, y in m"))
+        if len(self.line) < 2:
             raise InputError("a line load needs two points or more")
         for point in self.line:
             numbers("a point of a line load", point, "two finite numbers x, y in m", 2)
@@ -261,7 +262,8 @@ class Settlement:
 
     def __post_init__(self) -> None:
         wanted = 'a list of rod ends such as ["U03.1"]'
-        if not texts("the supports of a settlement", self.supports, wanted):
+        object.__setattr__(self, "supports", texts("the supports of a settlement", self.supports, wanted))
+        if not self.supports:
             raise InputError('a settlement needs supports: give rod ends such as "U03.1"')
         numbers("the movement of supports", self.move, "three finite numbers in m", 3)
 

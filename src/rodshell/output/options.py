@@ -113,9 +113,10 @@ class OutputOptions:
         object.__setattr__(self, "stages", whole("stages", self.stages, 0, MOST_STAGES))
         instance("fabrication", self.fabrication, Fabrication)
         instance("drawings", self.drawings, DrawingStyle)
-        for part in listed("rod_chosen", self.rod_chosen, 'parts of a rod such as ("section",)'):
+        chosen = listed("rod_chosen", self.rod_chosen, 'parts of a rod such as ("section",)')
+        for part in chosen:
             choice("each of rod_chosen", part, ("material", "section"))
-        object.__setattr__(self, "rod_chosen", tuple(self.rod_chosen))
+        object.__setattr__(self, "rod_chosen", chosen)
         if self.strength_of is not None:
             instance("strength_of", self.strength_of, str, "the name of a material")
 

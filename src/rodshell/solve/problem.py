@@ -287,7 +287,7 @@ class GravityForce:
     acceleration: tuple[float, float, float] = (0.0, 0.0, -9.81)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.nodes, slice):
+        if not isinstance(self.nodes, slice) and getattr(self.nodes, "dtype", None) != np.bool_:  # nor a mask
             array("the nodes that gravity acts on", self.nodes, np.int64, None)
         vector("the acceleration of gravity", self.acceleration)
 
@@ -312,8 +312,8 @@ class PointLoads:
     forces: Floats
 
     def __post_init__(self) -> None:
-        blocks = array("the blocks of point loads", self.blocks, np.int64, None)
-        finite("the forces of point loads", self.forces, len(blocks), 3)
+        object.__setattr__(self, "blocks", array("the blocks of point loads", self.blocks, np.int64, None))
+        finite("the forces of point loads", self.forces, len(self.blocks), 3)
 
     @classmethod
     def on(cls, block: int, *force: float) -> "PointLoads":

@@ -52,7 +52,8 @@ class RodSupports:
     def __post_init__(self) -> None:
         for name in ("positions", "along", "tangents", "directors", "turns", "angles"):
             mapping(name, getattr(self, name), "a mapping from nodes, edges or ends")
-        texts("spinning", self.spinning, 'a list of ends such as ("start",)')
+        spinning = texts("spinning", self.spinning, 'a list of ends such as ("start",)')
+        object.__setattr__(self, "spinning", spinning)
 
     def require(self, rod: ElasticRod) -> None:
         """Raise InputError where this rod cannot be held so."""
