@@ -47,6 +47,7 @@ function change(edit, live = false) {
 
 function submit(next, live) {
   outdate(!same(next, base), live);
+  if (["kind", "file"].some(key => next.target?.[key] !== base.target?.[key])) resolved = null;  // values of another surface
   base = next;
   notice("");
   const soon = waiting;
@@ -58,7 +59,8 @@ function submit(next, live) {
   showTools();
 }
 
-// What is shown is of a case before, at once. While somebody drags, the shapes follow the hand: they are not marked.
+// What is shown is of a case before, at once. While somebody drags, the shapes follow the hand: they are marked only if
+// they are behind it when it lets go, as where a text is typed, which is also sent live.
 function outdate(changed, live) {
   const box = byId("verdict");
   if (changed && !live && box.classList.contains("failed")) {  // its sentence and buttons are about values that are changed
@@ -67,7 +69,7 @@ function outdate(changed, live) {
   }
   box.classList.add("old");
   if (changed) byId("figures").classList.add("old");
-  if (changed && !dragging) document.body.classList.add("old");
+  if (!live && (shown !== serial || (changed && !dragging))) document.body.classList.add("old");
   dragging = live;
   offer(false);
 }
@@ -108,7 +110,7 @@ const words = value => (typeof value === "string" ? value : JSON.stringify(value
 // `wrong`: the load or combination that a message is about, such as { noun: "load", number: 2 }.
 function showLoads(wrong = null) {
   const loads = tablesIn(base.loads), { elements } = byId("load-values").querySelector("form");
-  const isWrong = (noun, table) => wrong?.noun === noun && base[`${noun}s`][wrong.number - 1] === table;
+  const isWrong = (noun, table) => wrong?.noun === noun && base[`${noun}s`]?.[wrong.number - 1] === table;
   let first = null;  // field or row that is wrong
   for (const [kind, , key] of EDITED) {
     const found = loads.find(load => load.kind === kind), given = found?.[key] ?? (kind === "snow" && loads.length ? "" : elements[kind].defaultValue);
@@ -301,13 +303,14 @@ function failed(sentence) {
 }
 
 const UNITS = { mm: 0.001, cm: 0.01, m: 1, in: 0.0254, ft: 0.3048 };
-const LARGEST = 1000;  // m, of a target
+const SMALLEST = 0.001, LARGEST = 1000;  // m, of a surface from a file
 const short = number => String(Number(number.toPrecision(3)));
 
 // What a surface from a file often lacks, with the values that it may have: text of a button, key, value.
 function remedies(sentence) {
   const wide = /does not state its unit \(it is ([\d.e+-]+) x ([\d.e+-]+) x ([\d.e+-]+) units wide\)/.exec(sentence);
-  if (wide) return Object.entries(UNITS).filter(([, metres]) => Math.max(...wide.slice(1)) * metres < LARGEST).map(([unit, metres]) => [`${unit}: ${wide.slice(1).map(size => short(size * metres)).join(" \u00d7 ")} m`, "target.unit", unit]);
+  const size = wide && Math.max(...wide.slice(1));
+  if (wide) return Object.entries(UNITS).filter(([, metres]) => SMALLEST <= size * metres && size * metres <= LARGEST).map(([unit, metres]) => [`${unit}: ${wide.slice(1).map(side => short(side * metres)).join(" \u00d7 ")} m`, "target.unit", unit]);
   const plane = /by a base plane between z = (\S+) and (\S+) m/.exec(sentence), middle = plane && short((Number(plane[1]) + Number(plane[2])) / 2);
   return plane ? [[`End it at half its height, z = ${middle} m`, "target.base", Number(middle)]] : [];
 }
@@ -315,12 +318,12 @@ function remedies(sentence) {
 // Where on the page the value stands that a sentence is about: a load ('load 2 ("snow")'), or the field of the key that
 // it names first, as in a case file (target.unit) or as an option (--unit).
 function named(sentence) {
-  const load = /\b(load|combination) (\d+)\b/.exec(sentence), whole = /^(loads|combinations) =/.exec(sentence);
-  if (load) return { name: load[0], show: () => showLoads({ noun: load[1], number: Number(load[2]) }) };
+  const load = /(?:^|\bof )(load|combination) (\d+)\b/.exec(sentence), whole = /^(loads|combinations) =/.exec(sentence);
+  if (load) return { name: `${load[1]} ${load[2]}`, show: () => showLoads({ noun: load[1], number: Number(load[2]) }) };
   if (whole) return { name: "loads", show: () => showLoads() };
-  const at = ({ path }, text) => sentence.search(new RegExp(`(?<![\\w.])${text.replaceAll(".", "\\.")}(?![\\w-]|\\.\\w)`));
+  const at = text => sentence.search(new RegExp(`(?<![\\w.])${text.replaceAll(".", "\\.")}(?![\\w-]|\\.\\w)`));
   const found = keysOfCase().filter(({ path }) => path.includes("."));
-  const first = text => found.map(key => [at(key, text(key)), key]).filter(([place]) => place >= 0).sort(([a], [b]) => a - b)[0]?.[1];
+  const first = text => found.map(key => [at(text(key)), key]).filter(([place]) => place >= 0).sort(([a], [b]) => a - b)[0]?.[1];
   const key = (sentence.includes("by a base plane") && found.find(({ path }) => path === "target.base")) || first(({ path }) => path) || first(({ path }) => `--${path.split(".").pop()}`);
   return key && { name: key.path, show: () => goTo(key) };
 }
@@ -758,8 +761,8 @@ async function upload(file, asOutline = false) {
   const said = await answer.json();
   if (!answer.ok) return say(said.sentence, true);
   pending = true;
-  if (outline) change(next => set(next, "target.boundary", said.file));
-  else if (get(base, "target.file") === said.file) { submit(clone(base), false); outdate(true, false); }  // a new state of the same file
+  if (get(base, outline ? "target.boundary" : "target.file") === said.file) { submit(clone(base), false); outdate(true, false); }  // a new state of the same file
+  else if (outline) change(next => set(next, "target.boundary", said.file));
   else submit({ target: { kind: start.surfaces[suffix], file: said.file } }, false);
   buildControls();
 }
