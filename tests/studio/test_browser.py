@@ -1,17 +1,24 @@
 """The studio as somebody uses it who has a keyboard and a mouse, in Chromium."""
 
 import json
+import tomllib
 import zlib
 from base64 import urlsafe_b64decode, urlsafe_b64encode
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
 from tests.output.browser import needs_browser
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    import subprocess
+
+    from playwright.sync_api import BrowserContext, Page
+
+    from tests.acceptance.studio_browser import Robot
 
 CASE = """
 target = { kind = "hemisphere" }
@@ -26,6 +33,77 @@ loads = [{ name = "gale", kind = "wind", value = "0.4 kN/m2", coefficient = -0.5
 combinations = [{ name = "storm", factors = { gale = 1.5, weight = 1.0 } }]
 """
 SPACING = "input[data-path='layout.spacing']"
+CURRENT = "#figures:not(.old)"  # the figures of a net, of the present case, before it has its verdict
+
+
+class Server(NamedTuple):
+    """A studio's address and process, and a browser in which its pages are opened, all in one session."""
+
+    address: str
+    process: "subprocess.Popen[str]"
+    context: "BrowserContext"
+
+
+class Studio(NamedTuple):
+    """A page that has found `CASE`, and what its console has said."""
+
+    page: "Page"
+    robot: "Robot"
+    server: Server
+    said: list[str]
+
+    def open(self, case: Any) -> None:
+        """Follow a link to a case."""
+        self.page.goto(f"{self.server.address}#case={code(json.dumps(case))}")
+
+    def errors(self) -> list[str]:
+        from tests.acceptance.studio_browser import errors
+
+        return errors(self.said)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One for all tests: a server, a browser and the process of a session take longer to start than most tests."""
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import browser_page
+
+    with server(tmp_path_factory.mktemp("sessions")) as (address, process), browser_page([]) as page:
+        yield Server(address, process, page.context)
+
+
+@contextmanager
+def opened(server: Server, context: "BrowserContext", folder: Path) -> Iterator[Studio]:
+    from tests.acceptance.studio_browser import Robot
+
+    page, said = context.new_page(), list[str]()
+    page.set_default_timeout(60_000)
+    page.on("console", lambda message: said.append(message.text) if message.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: said.append(str(error)))
+    studio = Studio(page, Robot(page, folder, "studio"), server, said)
+    studio.open(tomllib.loads(CASE))
+    studio.robot.checked()
+    yield studio
+    for page in context.pages[1:]:
+        page.close()
+
+
+@pytest.fixture
+def studio(server: Server, tmp_path: Path) -> Iterator[Studio]:
+    """A page in the session of all tests: with the history and the variants of those before it."""
+    with opened(server, server.context, tmp_path) as studio:
+        yield studio
+
+
+@pytest.fixture
+def new_studio(server: Server, tmp_path: Path) -> Iterator[Studio]:
+    """A page in a session of its own."""
+    browser = server.context.browser
+    assert browser is not None
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    with opened(server, context, tmp_path) as studio:
+        yield studio
+    context.close()
 
 
 def put(page: "Page", selector: str, text: str) -> None:
@@ -49,544 +127,464 @@ def linked(page: "Page") -> Any:
 
 @pytest.mark.slow
 @needs_browser
-def test_two_tabs_of_one_session_show_the_same_case_with_its_figures(tmp_path: Path) -> None:
+def test_two_tabs_of_one_session_show_the_same_case_with_its_figures(tmp_path: Path, studio: Studio) -> None:
     from playwright.sync_api import expect
 
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page, errors
+    from tests.acceptance.studio_browser import Robot
 
-    (tmp_path / "case.toml").write_text(CASE)
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as first:
-        second = first.context.new_page()
-        tabs = [Robot(page, tmp_path, "studio") for page in (first, second)]
-        for tab in tabs:
-            tab.page.set_default_timeout(20_000)
-            tab.page.goto(address)
-            tab.checked()
-        for tab, width in zip(tabs, ("70", "90"), strict=True):
-            put(tab.page, SPACING, width)
-            for page in (first, second):
-                expect(page.locator(SPACING).first).to_have_value(width)
-            tab.checked()
-            for other in tabs:
-                other.checked()
-                assert linked(other.page)["layout"]["spacing"] == float(width) / 1000
-            assert first.inner_text("#figures") == second.inner_text("#figures")
-        first.click("#undo")
-        expect(second.locator(SPACING).first).to_have_value("70")
-        second.wait_for_selector("#redo:not(:disabled)")
-    assert errors(said) == []
+    first, second = studio.page, studio.page.context.new_page()
+    tabs = [studio.robot, Robot(second, tmp_path, "studio")]
+    second.goto(studio.server.address)
+    tabs[1].checked()
+    for tab, width in zip(tabs, ("70", "90"), strict=True):
+        put(tab.page, SPACING, width)
+        for page in (first, second):
+            expect(page.locator(SPACING).first).to_have_value(width)
+        tab.checked()
+        for other in tabs:
+            other.checked()
+            assert linked(other.page)["layout"]["spacing"] == float(width) / 1000
+        assert first.inner_text("#figures") == second.inner_text("#figures")
+    first.click("#undo")
+    expect(second.locator(SPACING).first).to_have_value("70")
+    second.wait_for_selector("#redo:not(:disabled)")
+    assert studio.errors() == []
 
 
 @pytest.mark.slow
 @needs_browser
-def test_a_case_is_changed_undone_kept_refined_and_found_again_after_a_reload(tmp_path: Path) -> None:
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page, errors
+def test_a_case_is_changed_undone_kept_refined_and_found_again_after_a_reload(new_studio: Studio) -> None:
+    page, robot = new_studio.page, new_studio.robot
 
-    (tmp_path / "case.toml").write_text(CASE)
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
-        page.set_default_timeout(20_000)
-        robot = Robot(page, tmp_path, "studio")
+    def figures() -> dict[str, str]:
+        robot.checked()
+        rows = page.locator("#figures tr").all_inner_texts()
+        return dict(row.split("\t", 1) for row in rows)
 
-        def figures() -> dict[str, str]:
-            robot.checked()
-            rows = page.locator("#figures tr").all_inner_texts()
-            return dict(row.split("\t", 1) for row in rows)
+    first = figures()
+    assert int(first["rods"]) > 10
+    assert page.inner_text("#verdict strong")
 
-        page.goto(address)
-        first = figures()
-        assert int(first["rods"]) > 10
-        assert page.inner_text("#verdict strong")
+    page.focus(SPACING)  # a number in mm, by the keyboard alone
+    for _ in range(10):
+        page.keyboard.press("ArrowUp")
+    wider = float(page.input_value(SPACING))
+    assert 60 < wider < 120
+    page.keyboard.press("Enter")
+    second = figures()
+    assert second["all rods together"] != first["all rods together"]
+    page.wait_for_selector(f"{SPACING}:focus")
 
-        page.focus(SPACING)  # a number in mm, by the keyboard alone
-        for _ in range(10):
-            page.keyboard.press("ArrowUp")
-        wider = float(page.input_value(SPACING))
-        assert 60 < wider < 120
-        page.keyboard.press("Enter")
-        second = figures()
-        assert second["all rods together"] != first["all rods together"]
-        page.wait_for_selector(f"{SPACING}:focus")
+    assert not page.is_disabled("#undo")
+    page.keyboard.press("Control+z")
+    page.wait_for_selector("#undo:disabled")
+    assert figures() == first
+    assert float(page.input_value(SPACING)) == 60
+    page.click("#redo")
+    page.wait_for_selector("#redo:disabled")
+    assert figures() == second
+    robot.keep("wider")
 
-        assert not page.is_disabled("#undo")
-        page.keyboard.press("Control+z")
-        page.wait_for_selector("#undo:disabled")
-        assert figures() == first
-        assert float(page.input_value(SPACING)) == 60
-        page.click("#redo")
-        page.wait_for_selector("#redo:disabled")
-        assert figures() == second
-        robot.keep("wider")
+    page.focus("#refine")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#refine[aria-pressed=true]")
+    refined = figures()
+    (gain,) = (value for name, value in refined.items() if name.startswith("refined (taper)"))
+    assert gain.endswith("after") or "refused" in refined
+    robot.keep("refined")
 
-        page.focus("#refine")
-        page.keyboard.press("Enter")
-        page.wait_for_selector("#refine[aria-pressed=true]")
-        refined = figures()
-        (gain,) = (value for name, value in refined.items() if name.startswith("refined (taper)"))
-        assert gain.endswith("after") or "refused" in refined
-        robot.keep("refined")
-
-        page.reload()
-        page.wait_for_selector("#refine[aria-pressed=true]")
-        assert figures() == refined
-        assert page.locator("#variants li span").all_inner_texts() == ["wider", "refined"]
-        assert not page.is_disabled("#undo")
-    assert errors(said) == []
+    page.reload()
+    page.wait_for_selector("#refine[aria-pressed=true]")
+    assert figures() == refined
+    assert page.locator("#variants li span").all_inner_texts() == ["wider", "refined"]
+    assert not page.is_disabled("#undo")
+    assert new_studio.errors() == []
 
 
 @pytest.mark.slow
 @needs_browser
-def test_a_change_made_while_the_server_is_away_is_kept(tmp_path: Path) -> None:
+def test_a_change_made_while_the_server_is_away_is_kept(tmp_path: Path, new_studio: Studio) -> None:
     from playwright.sync_api import expect
 
     from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page
 
     (tmp_path / "case.toml").write_text(CASE)
     options = (tmp_path / "sessions", str(tmp_path / "case.toml"))
-    with browser_page([]) as page:
-        page.set_default_timeout(20_000)
-        robot = Robot(page, tmp_path, "studio")
-        with server(*options) as (address, _):
-            page.goto(address)
-            robot.checked()
-        page.wait_for_selector("#state.wrong")
-        put(page, SPACING, "80")
-        with server(*options, "--port", address.rstrip("/").rpartition(":")[2]):
-            robot.checked()
-            expect(page.locator(SPACING).first).to_have_value("80")
-            assert linked(page)["layout"]["spacing"] == 0.08
-            assert not page.is_disabled("#undo")
-
-
-@pytest.mark.slow
-@needs_browser
-def test_a_case_that_failed_offers_no_files_and_no_script_of_the_case_before(tmp_path: Path) -> None:
-    from playwright.sync_api import expect
-
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page
-
-    (tmp_path / "case.toml").write_text(CASE)
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page([]) as page:
-        page.set_default_timeout(20_000)
-        robot = Robot(page, tmp_path, "studio")
+    page, robot = new_studio.page, new_studio.robot
+    with server(*options) as (address, _):
         page.goto(address)
         robot.checked()
-        offered = [page.locator(part) for part in ("#download[href]", "#python:enabled", "#keep button:enabled")]
-        for part in offered:
-            expect(part).to_have_count(1)
-        page.locator(".lil-title", has_text="[layout]").click()
-        put(page, "[data-path='layout.spacing'] >> nth=-1", "banana")
-        page.wait_for_selector("#verdict.failed")
-        for part in offered:
-            expect(part).to_have_count(0)
-        page.click("#undo")
+    page.wait_for_selector("#state.wrong")
+    put(page, SPACING, "80")
+    with server(*options, "--port", address.rstrip("/").rpartition(":")[2]):
         robot.checked()
-        for part in offered:
-            expect(part).to_have_count(1)
-        page.fill("#name", "   ")
-        page.click("#keep button")
-        expect(page.locator("#state.wrong")).to_have_text("a variant needs a name")
-        assert page.locator("#verdict.failed, #verdict.old, body.old").count() == 0
-
-
-@pytest.mark.slow
-@needs_browser
-def test_a_link_opens_its_case_in_an_open_tab_and_one_without_a_case_says_so(tmp_path: Path) -> None:
-    from playwright.sync_api import expect
-
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page, errors
-
-    (tmp_path / "case.toml").write_text(CASE)
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
-        page.set_default_timeout(20_000)
-        robot = Robot(page, tmp_path, "studio")
-        page.goto(address)
-        robot.checked()
-        case = linked(page)
-        case["layout"]["spacing"] = 0.08
-        whole = code(json.dumps(case))
-        page.goto(f"{address}#case={whole}")  # the page stays: only what follows the # differs
         expect(page.locator(SPACING).first).to_have_value("80")
-        robot.checked()
-        for wrong in (whole[:-9], whole[:20] + "!" + whole[21:], "", *map(code, ("5", '"x"', "null", "[]", "{"))):
-            for open_tab in (True, False):
-                if not open_tab:
-                    page.goto("about:blank")
-                page.goto(f"{address}#case={wrong}")
-                expect(page.locator("#notice")).to_contain_text("holds no case, or is damaged or cut off")
-                expect(page.locator(SPACING).first).to_have_value("80")
-                robot.checked()
-        put(page, SPACING, "90")
-        expect(page.locator("#notice")).to_be_hidden()
-    assert errors(said) == []
+        assert linked(page)["layout"]["spacing"] == 0.08
+        assert not page.is_disabled("#undo")
 
 
 @pytest.mark.slow
 @needs_browser
-def test_the_dialog_of_loads_keeps_those_that_the_case_has(tmp_path: Path) -> None:
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import browser_page, errors
-
-    (tmp_path / "case.toml").write_text(CASE + LOADED)
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
-        page.set_default_timeout(20_000)
-
-        page.goto(address)
-        page.wait_for_selector("#loads[aria-pressed=true]")
-        page.click("#loads")
-        assert page.input_value("input[name=snow]") == ""
-        assert "gale (wind)" in page.inner_text("#other-loads")
-        assert "1.5 \u00d7 gale" in page.inner_text("#combined")
-        page.fill("input[name=snow]", "0.3 kN/m2")
-        page.fill("input[name=self_weight]", "2 kg/m2")
-        page.click("#load-values button[value=check]")
-        page.click("#loads")
-        case = linked(page)
-        assert [load["name"] for load in case["loads"]] == ["gale", "weight", "snow"]
-        assert case["loads"][0]["kind"] == "wind"
-        assert case["loads"][1]["cladding"] == "2 kg/m2"
-        assert case["loads"][2] == {"name": "snow", "kind": "snow", "value": "0.3 kN/m2"}
-        assert case["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0, "snow": 1}}]
-        page.fill("input[name=snow]", "")
-        page.click("#load-values button[value=check]")
-        page.click("#loads")
-        assert linked(page)["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0}}]
-    assert errors(said) == []
-
-
-@pytest.mark.slow
-@needs_browser
-def test_a_wrong_load_is_named_as_it_is_counted_and_its_button_leads_to_it(tmp_path: Path) -> None:
+def test_a_case_that_failed_offers_no_files_and_no_script_of_the_case_before(studio: Studio) -> None:
     from playwright.sync_api import expect
 
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import browser_page, errors
+    page, robot = studio.page, studio.robot
+    offered = [page.locator(part) for part in ("#download[href]", "#python:enabled", "#keep button:enabled")]
+    for part in offered:
+        expect(part).to_have_count(1)
+    page.locator(".lil-title", has_text="[layout]").click()
+    put(page, "[data-path='layout.spacing'] >> nth=-1", "banana")
+    page.wait_for_selector("#verdict.failed")
+    for part in offered:
+        expect(part).to_have_count(0)
+    page.click("#undo")
+    robot.checked()
+    for part in offered:
+        expect(part).to_have_count(1)
+    page.fill("#name", "   ")
+    page.click("#keep button")
+    expect(page.locator("#state.wrong")).to_have_text("a variant needs a name")
+    assert page.locator("#verdict.failed, #verdict.old, body.old").count() == 0
 
-    (tmp_path / "case.toml").write_text(CASE + LOADED)
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
-        page.set_default_timeout(20_000)
-        page.goto(address)
-        page.wait_for_selector("#loads[aria-pressed=true]")
-        case = linked(page)
-        weight = {"name": "own", "kind": "self_weight"}
-        for loads, sentence, focused in (
-            (
-                [weight, {"name": "ice", "kind": "snow", "value": "thick"}],
-                'value of load 2 ("ice")',
-                "input[name=snow]",
-            ),
-            ([weight, {"name": "gale", "kind": "wind", "value": "much"}], 'of load 2 ("gale")', "#other-loads button"),
-        ):
-            link = {
-                **case,
-                "loads": loads,
-                "combinations": [{"name": "all", "factors": {"own": 1, loads[1]["name"]: 1}}],
-            }
-            page.goto(f"{address}#case={code(json.dumps(link))}")
-            expect(page.locator("#verdict.failed strong")).to_contain_text(sentence)
-            page.get_by_role("button", name="Go to load 2").click()
-            expect(page.locator(f"#load-values[open] {focused}")).to_be_focused()
-            if focused.startswith("input"):
-                page.keyboard.press("Escape")
-        page.keyboard.press("Enter")  # on the button that removes the gale
-        page.fill("input[name=snow]", "")
+
+@pytest.mark.slow
+@needs_browser
+def test_a_link_opens_its_case_in_an_open_tab_and_one_without_a_case_says_so(studio: Studio) -> None:
+    from playwright.sync_api import expect
+
+    page, robot = studio.page, studio.robot
+    case = linked(page)
+    case["layout"]["spacing"] = 0.08
+    whole = code(json.dumps(case))
+    page.goto(f"{studio.server.address}#case={whole}")  # the page stays: only what follows the # differs
+    expect(page.locator(SPACING).first).to_have_value("80")
+    robot.checked()
+    for wrong in (whole[:-9], whole[:20] + "!" + whole[21:], "", *map(code, ("5", '"x"', "null", "[]", "{"))):
+        for open_tab in (True, False):
+            if not open_tab:
+                page.goto("about:blank")
+            page.goto(f"{studio.server.address}#case={wrong}")
+            expect(page.locator("#notice")).to_contain_text("holds no case, or is damaged or cut off")
+            expect(page.locator(SPACING).first).to_have_value("80")
+            robot.checked()
+    put(page, SPACING, "90")
+    expect(page.locator("#notice")).to_be_hidden()
+    assert studio.errors() == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_dialog_of_loads_keeps_those_that_the_case_has(studio: Studio) -> None:
+    page = studio.page
+    studio.open(tomllib.loads(CASE + LOADED))
+    page.wait_for_selector("#loads[aria-pressed=true]")
+    page.click("#loads")
+    assert page.input_value("input[name=snow]") == ""
+    assert "gale (wind)" in page.inner_text("#other-loads")
+    assert "1.5 \u00d7 gale" in page.inner_text("#combined")
+    page.fill("input[name=snow]", "0.3 kN/m2")
+    page.fill("input[name=self_weight]", "2 kg/m2")
+    page.click("#load-values button[value=check]")
+    page.click("#loads")
+    case = linked(page)
+    assert [load["name"] for load in case["loads"]] == ["gale", "weight", "snow"]
+    assert case["loads"][0]["kind"] == "wind"
+    assert case["loads"][1]["cladding"] == "2 kg/m2"
+    assert case["loads"][2] == {"name": "snow", "kind": "snow", "value": "0.3 kN/m2"}
+    assert case["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0, "snow": 1}}]
+    page.fill("input[name=snow]", "")
+    page.click("#load-values button[value=check]")
+    page.click("#loads")
+    assert linked(page)["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0}}]
+    assert studio.errors() == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_wrong_load_is_named_as_it_is_counted_and_its_button_leads_to_it(studio: Studio) -> None:
+    from playwright.sync_api import expect
+
+    page = studio.page
+    case = linked(page)
+    weight = {"name": "own", "kind": "self_weight"}
+    for loads, sentence, focused in (
+        (
+            [weight, {"name": "ice", "kind": "snow", "value": "thick"}],
+            'value of load 2 ("ice")',
+            "input[name=snow]",
+        ),
+        ([weight, {"name": "gale", "kind": "wind", "value": "much"}], 'of load 2 ("gale")', "#other-loads button"),
+    ):
+        link = {
+            **case,
+            "loads": loads,
+            "combinations": [{"name": "all", "factors": {"own": 1, loads[1]["name"]: 1}}],
+        }
+        studio.open(link)
+        expect(page.locator("#verdict.failed strong")).to_contain_text(sentence)
+        page.get_by_role("button", name="Go to load 2").click()
+        expect(page.locator(f"#load-values[open] {focused}")).to_be_focused()
+        if focused.startswith("input"):
+            page.keyboard.press("Escape")
+    page.keyboard.press("Enter")  # on the button that removes the gale
+    page.fill("input[name=snow]", "")
+    page.click("#load-values button[value=check]")
+    page.wait_for_selector("#verdict:not(.failed):not(.old)")
+    assert [load["name"] for load in linked(page)["loads"]] == ["own"]
+    assert linked(page)["combinations"] == [{"name": "all", "factors": {"own": 1}}]
+    link = {**case, "layout": {"spacing": "wide"}, "loads": [], "combinations": []}
+    studio.open(link)
+    page.get_by_role("button", name="Go to layout.spacing").click()
+    expect(page.locator("[data-path='layout.spacing']").last).to_be_focused()
+    assert studio.errors() == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_dialog_of_loads_opens_whatever_a_case_has_in_their_place(studio: Studio) -> None:
+    from playwright.sync_api import expect
+
+    page = studio.page
+    case = linked(page)
+    for loads in (5, "gale", {"gale": 1}, [5, {"kind": 3}], [None]):
+        studio.open({**case, "loads": loads, "combinations": loads})
+        expect(page.locator("#loads")).to_have_attribute("aria-pressed", "true")
+        page.wait_for_selector("#verdict.failed:not(.old)")
+        page.click("#loads")
+        page.wait_for_selector("#load-values[open]")
+        expect(page.locator("#unread-loads")).to_contain_text("cannot be read")
+        for button in page.locator("#kept-loads button").all()[::-1]:
+            button.click()
+        page.fill("input[name=snow]", "0.3 kN/m2")
         page.click("#load-values button[value=check]")
         page.wait_for_selector("#verdict:not(.failed):not(.old)")
-        assert [load["name"] for load in linked(page)["loads"]] == ["own"]
-        assert linked(page)["combinations"] == [{"name": "all", "factors": {"own": 1}}]
-        link = {**case, "layout": {"spacing": "wide"}, "loads": [], "combinations": []}
-        page.goto(f"{address}#case={code(json.dumps(link))}")
-        page.get_by_role("button", name="Go to layout.spacing").click()
-        expect(page.locator("[data-path='layout.spacing']").last).to_be_focused()
-    assert errors(said) == []
+        assert {load["kind"] for load in linked(page)["loads"]} == {"snow", "self_weight"}
+        assert [row["name"] for row in linked(page)["combinations"]] == ["service"]
+    assert studio.errors() == []
 
 
 @pytest.mark.slow
 @needs_browser
-def test_the_dialog_of_loads_opens_whatever_a_case_has_in_their_place(tmp_path: Path) -> None:
-    from playwright.sync_api import expect
-
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import browser_page, errors
-
-    (tmp_path / "case.toml").write_text(CASE)
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
-        page.set_default_timeout(20_000)
-        page.goto(address)
-        page.wait_for_selector("#verdict:not(.waiting):not(.old)")
-        case = linked(page)
-        for loads in (5, "gale", {"gale": 1}, [5, {"kind": 3}], [None]):
-            page.goto(f"{address}#case={code(json.dumps({**case, 'loads': loads, 'combinations': loads}))}")
-            expect(page.locator("#loads")).to_have_attribute("aria-pressed", "true")
-            page.wait_for_selector("#verdict.failed:not(.old)")
-            page.click("#loads")
-            page.wait_for_selector("#load-values[open]")
-            expect(page.locator("#unread-loads")).to_contain_text("cannot be read")
-            for button in page.locator("#kept-loads button").all()[::-1]:
-                button.click()
-            page.fill("input[name=snow]", "0.3 kN/m2")
-            page.click("#load-values button[value=check]")
-            page.wait_for_selector("#verdict:not(.failed):not(.old)")
-            assert {load["kind"] for load in linked(page)["loads"]} == {"snow", "self_weight"}
-            assert [row["name"] for row in linked(page)["combinations"]] == ["service"]
-    assert errors(said) == []
-
-
-@pytest.mark.slow
-@needs_browser
-def test_an_outline_ends_the_target_that_there_is_and_a_new_state_of_a_mesh_keeps_the_case(tmp_path: Path) -> None:
+def test_an_outline_ends_the_target_that_there_is_and_a_new_state_of_a_mesh_keeps_the_case(
+    tmp_path: Path, studio: Studio
+) -> None:
     import ezdxf
     import numpy as np
     from playwright.sync_api import expect
 
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page, errors
     from tests.acceptance.targets_broken import as_obj, dome
 
-    (tmp_path / "case.toml").write_text(CASE)
-    drawing, angle = ezdxf.new(), np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)  # type: ignore[attr-defined]
-    drawing.modelspace().add_polyline3d(
-        np.column_stack([3.0 * np.cos(angle), 3.0 * np.sin(angle), np.full(60, 2.56)]).tolist(), close=True
-    )
-    drawing.saveas(tmp_path / "edge.dxf")
+    def outline(radius: float) -> Any:
+        drawing, angle = ezdxf.new(), np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)  # type: ignore[attr-defined]
+        points = [radius * np.cos(angle), radius * np.sin(angle), np.full(60, 4.0 - 0.16 * radius**2)]
+        drawing.modelspace().add_polyline3d(np.column_stack(points).tolist(), close=True)
+        return drawing
+
+    outline(3.0).saveas(tmp_path / "edge.dxf")
     (tmp_path / "roof.obj").write_bytes(as_obj(*dome()))
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
-        page.set_default_timeout(30_000)
-        robot = Robot(page, tmp_path, "studio")
-        page.goto(address)
-        robot.checked()
-        before = linked(page)
-        expect(page.locator("#outline")).to_be_hidden()
-        page.set_input_files("#file", tmp_path / "edge.dxf")  # as if it was dropped: a dome has its own edge
-        expect(page.locator("#state.wrong")).to_contain_text("upload the surface first")
-        assert linked(page) == before
-        page.set_input_files("#file", tmp_path / "roof.obj")
-        page.get_by_role("button", name="Go to target.unit").click()
-        page.keyboard.type("m")
-        page.keyboard.press("Enter")
-        robot.checked()
-        put(page, SPACING, "1")
-        robot.checked()
-        rods = page.inner_text("#figures td >> nth=1")
-        page.set_input_files("#file", tmp_path / "edge.dxf")
-        page.wait_for_selector("#no-outline:not([hidden])")
-        robot.checked()
-        assert page.inner_text("#no-outline").startswith("edge.dxf")
-        assert linked(page)["target"] == {
-            "kind": "mesh", "file": "upload:roof.obj", "unit": "m", "boundary": "upload:edge.dxf"
-        }  # fmt: skip
-        assert linked(page)["layout"] == {"spacing": 1}
-        assert float(page.inner_text("#figures td >> nth=1").split()[0]) < 0.6 * float(rods.split()[0])
-        page.click("#no-outline")
-        page.wait_for_selector("#no-outline", state="hidden")
-        robot.checked()
-        assert page.inner_text("#figures td >> nth=1") == rods
-        points, faces = dome()
-        (tmp_path / "roof.obj").write_bytes(as_obj(0.8 * points, faces))
-        page.set_input_files("#file", tmp_path / "roof.obj")
-        page.wait_for_selector("#verdict.old")
-        robot.checked()
-        assert linked(page)["layout"] == {"spacing": 1}
-        assert float(page.inner_text("#figures td >> nth=1").split()[0]) < 0.8 * float(rods.split()[0])
-    assert errors(said) == []
+    page, robot = studio.page, studio.robot
+    before = linked(page)
+    expect(page.locator("#outline")).to_be_hidden()
+    page.set_input_files("#file", tmp_path / "edge.dxf")  # as if it was dropped: a dome has its own edge
+    expect(page.locator("#state.wrong")).to_contain_text("upload the surface first")
+    assert linked(page) == before
+    page.set_input_files("#file", tmp_path / "roof.obj")
+    page.get_by_role("button", name="Go to target.unit").click()
+    page.keyboard.type("m")
+    page.keyboard.press("Enter")
+    expect(page.locator(SPACING)).to_have_count(1)  # in the folder of the layout: no slider with the dome's spacing
+    put(page, f".lil-slider + {SPACING}", "1")
+    page.wait_for_selector(CURRENT)
+    rods = page.inner_text("#figures td >> nth=1")
+    page.set_input_files("#file", tmp_path / "edge.dxf")
+    page.wait_for_selector("#no-outline:not([hidden])")
+    page.wait_for_selector(CURRENT)
+    assert page.inner_text("#no-outline").startswith("edge.dxf")
+    assert linked(page)["target"] == {
+        "kind": "mesh", "file": "upload:roof.obj", "unit": "m", "boundary": "upload:edge.dxf"
+    }  # fmt: skip
+    assert linked(page)["layout"] == {"spacing": 1}
+    smaller = page.inner_text("#figures td >> nth=1")
+    assert float(smaller.split()[0]) < 0.6 * float(rods.split()[0])
+    outline(2.0).saveas(tmp_path / "edge.dxf")
+    page.set_input_files("#outline-file", tmp_path / "edge.dxf")  # a new state of the same file
+    page.wait_for_selector("#figures.old")
+    page.wait_for_selector(CURRENT)
+    assert float(page.inner_text("#figures td >> nth=1").split()[0]) < 0.6 * float(smaller.split()[0])
+    page.click("#no-outline")
+    page.wait_for_selector("#no-outline", state="hidden")
+    page.wait_for_selector(CURRENT)
+    assert page.inner_text("#figures td >> nth=1") == rods
+    points, faces = dome()
+    (tmp_path / "roof.obj").write_bytes(as_obj(0.8 * points, faces))
+    page.set_input_files("#file", tmp_path / "roof.obj")
+    page.wait_for_selector("#figures.old")
+    robot.checked()
+    assert linked(page)["layout"] == {"spacing": 1}
+    assert float(page.inner_text("#figures td >> nth=1").split()[0]) < 0.8 * float(rods.split()[0])
+    assert studio.errors() == []
 
 
 @pytest.mark.slow
 @needs_browser
-def test_what_is_shown_is_marked_as_out_of_date_before_the_server_answers(tmp_path: Path) -> None:
+def test_what_is_shown_is_marked_as_out_of_date_before_the_server_answers(studio: Studio) -> None:
     import signal
 
     from playwright.sync_api import expect
 
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page
-
-    (tmp_path / "case.toml").write_text(CASE)
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, process), browser_page([]) as page:
-        page.set_default_timeout(20_000)
-        robot = Robot(page, tmp_path, "studio")
-        page.goto(address)
-        robot.checked()
-        parts = [page.locator(part) for part in ("#figures", "#view", "#plan", "#verdict")]
-        for part in parts:
-            expect(part).to_have_css("opacity", "1")
-        process.send_signal(signal.SIGSTOP)
-        try:
-            put(page, SPACING, "80")
-            for part in parts:
-                expect(part).not_to_have_css("opacity", "1")
-        finally:
-            process.send_signal(signal.SIGCONT)
-        robot.checked()
-        for part in parts:
-            expect(part).to_have_css("opacity", "1")
+    page = studio.page
+    parts = {name: page.locator(name) for name in ("#figures", "#view", "#plan", "#verdict")}
+    for part in parts.values():
+        expect(part).to_have_css("opacity", "1")
+    slider = page.locator(".lil-controller", has_text="Spacing").locator(".lil-slider").bounding_box()
+    assert slider is not None
+    studio.server.process.send_signal(signal.SIGSTOP)
+    try:
+        page.mouse.move(slider["x"] + 0.6 * slider["width"], slider["y"] + 0.5 * slider["height"])
+        page.mouse.down()  # shapes follow the hand: they are not marked
+        expect(parts["#verdict"]).not_to_have_css("opacity", "1")
+        for name in ("#view", "#plan"):
+            expect(parts[name]).to_have_css("opacity", "1")
+        page.mouse.up()
+        put(page, SPACING, "80")
+        for part in parts.values():
+            expect(part).not_to_have_css("opacity", "1")
+    finally:
+        studio.server.process.send_signal(signal.SIGCONT)
+    studio.robot.checked()
+    for part in parts.values():
+        expect(part).to_have_css("opacity", "1")
 
 
 @pytest.mark.slow
 @needs_browser
-def test_a_variant_is_listed_in_every_tab_at_once_and_those_that_are_ticked_stay_so(tmp_path: Path) -> None:
+def test_a_variant_is_listed_in_every_tab_at_once_and_those_that_are_ticked_stay_so(
+    tmp_path: Path, new_studio: Studio
+) -> None:
     from playwright.sync_api import expect
 
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page, errors
+    from tests.acceptance.studio_browser import Robot
 
-    (tmp_path / "case.toml").write_text(CASE)
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as first:
-        second = first.context.new_page()
-        tabs = [Robot(page, tmp_path, "studio") for page in (first, second)]
-        for tab in tabs:
-            tab.page.goto(address)
-            tab.checked()
-        tabs[0].checked()
-        names = second.locator("#variants li span")
-        tabs[0].keep("one")
-        expect(names).to_have_text(["one"])
-        second.check("#variants input[value=one]")
-        tabs[0].keep("two")
-        expect(names).to_have_text(["one", "two"])
-        expect(second.locator("#variants input[value=one]")).to_be_checked()
-        second.get_by_role("button", name="Forget two").click()
-        expect(first.locator("#variants li span")).to_have_text(["one"])
-    assert errors(said) == []
+    first, second = new_studio.page, new_studio.page.context.new_page()
+    second.goto(new_studio.server.address)
+    Robot(second, tmp_path, "studio").checked()
+    new_studio.robot.checked()
+    names = second.locator("#variants li span")
+    new_studio.robot.keep("one")
+    expect(names).to_have_text(["one"])
+    second.check("#variants input[value=one]")
+    new_studio.robot.keep("two")
+    expect(names).to_have_text(["one", "two"])
+    expect(second.locator("#variants input[value=one]")).to_be_checked()
+    second.get_by_role("button", name="Forget two").click()
+    expect(first.locator("#variants li span")).to_have_text(["one"])
+    assert new_studio.errors() == []
 
 
 @pytest.mark.slow
 @needs_browser
-def test_controls_are_made_once_for_a_change_and_then_left_alone(tmp_path: Path) -> None:
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page
-
-    (tmp_path / "case.toml").write_text(CASE)
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page([]) as page:
-        page.set_default_timeout(20_000)
-        robot = Robot(page, tmp_path, "studio")
-        page.goto(address)
-        robot.checked()
-        put(page, SPACING, "80")
-        robot.checked()
-        page.wait_for_selector(f"{SPACING}:focus")
-        page.wait_for_timeout(300)  # ms, in which they may be made for the verdict
-        made = page.get_attribute(SPACING, "aria-labelledby")  # counts up with each control that is made
-        page.wait_for_timeout(500)
-        assert page.get_attribute(SPACING, "aria-labelledby") == made
+def test_controls_are_made_once_for_a_change_and_then_left_alone(studio: Studio) -> None:
+    page, robot = studio.page, studio.robot
+    put(page, SPACING, "80")
+    robot.checked()
+    page.wait_for_selector(f"{SPACING}:focus")
+    page.wait_for_timeout(300)  # ms, in which they may be made for the verdict
+    made = page.get_attribute(SPACING, "aria-labelledby")  # counts up with each control that is made
+    page.wait_for_timeout(500)
+    assert page.get_attribute(SPACING, "aria-labelledby") == made
 
 
 @pytest.mark.slow
 @needs_browser
-def test_a_mesh_without_a_unit_closed_or_with_y_upwards_becomes_a_target_by_buttons(tmp_path: Path) -> None:
+def test_a_mesh_without_a_unit_closed_or_with_y_upwards_becomes_a_target_by_buttons(
+    tmp_path: Path, studio: Studio
+) -> None:
     import numpy as np
 
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page, errors
     from tests.acceptance.targets_broken import as_obj, dome
 
     points, faces = dome()
     polar, azimuth = np.pi * np.sqrt(1.0 - points[:, 2] / 4.0), np.arctan2(points[:, 1], points[:, 0])
     ball = np.column_stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
-    (tmp_path / "case.toml").write_text(CASE)
     (tmp_path / "ball.obj").write_bytes(as_obj(1000.0 * (5.0 * ball + [0.0, 0.0, 1.0]), faces))
     (tmp_path / "upwards.obj").write_bytes(as_obj(points[:, [0, 2, 1]] * [1.0, 1.0, -1.0], faces))
     (tmp_path / "roof.obj").write_bytes(as_obj(points, faces))
-    said: list[str] = []
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
-        page.set_default_timeout(60_000)
-        robot = Robot(page, tmp_path, "studio")
-        page.goto(address)
-        robot.checked()
-        page.set_input_files("#file", tmp_path / "ball.obj")
-        assert page.get_by_role("button", name="m: 9930 \u00d7", exact=False).count() == 0  # larger than any shell
-        page.get_by_role("button", name="mm: 9.93 \u00d7 9.93 \u00d7 10 m", exact=True).click()
-        page.get_by_role("button", name="End it at half its height, z = 1 m").click()
-        robot.checked()
-        assert linked(page)["target"] == {"kind": "mesh", "file": "upload:ball.obj", "unit": "mm", "base": 1}
-        assert page.locator("#verdict.failed").count() == 0
-        totals = []
-        for name in ("roof", "upwards"):
-            page.set_input_files("#file", tmp_path / f"{name}.obj")
-            page.get_by_role("button", name="m: 10 \u00d7", exact=False).last.click()
-            if name == "upwards":
-                page.click("#upright")
-                page.wait_for_selector("#upright[aria-pressed=true]")
-            robot.checked()
-            assert page.inner_text("#controls .lil-title >> nth=0").endswith(f"Case of {name}.obj")
-            totals.append(float(page.inner_text("#figures td >> nth=1").split()[0]))
-        assert totals[1] == pytest.approx(totals[0], rel=0.01)  # the same surface, its net from another heading
-    assert errors(said) == []
+    page, robot = studio.page, studio.robot
+    (tmp_path / "small.obj").write_bytes(as_obj(0.05 * points, faces))
+    for name, units in (("small", "cm m in ft"), ("ball", "mm cm in")):  # a shell is 1 mm to 1 km wide
+        page.set_input_files("#file", tmp_path / f"{name}.obj")
+        page.wait_for_selector(f"#verdict.failed:has-text('{name}.obj')")
+        offered = page.locator("#verdict button", has_text="\u00d7").all_inner_texts()
+        assert [text.partition(":")[0] for text in offered] == units.split()
+    page.get_by_role("button", name="mm: 9.93 \u00d7 9.93 \u00d7 10 m", exact=True).click()
+    page.get_by_role("button", name="End it at half its height, z = 1 m").click()
+    robot.checked()
+    assert linked(page)["target"] == {"kind": "mesh", "file": "upload:ball.obj", "unit": "mm", "base": 1}
+    assert page.locator("#verdict.failed").count() == 0
+    totals = []
+    for name in ("roof", "upwards"):
+        page.set_input_files("#file", tmp_path / f"{name}.obj")
+        page.get_by_role("button", name="m: 10 \u00d7", exact=False).last.click()
+        if name == "upwards":
+            page.click("#upright")
+            page.wait_for_selector("#upright[aria-pressed=true]")
+        page.wait_for_selector(CURRENT)
+        assert page.inner_text("#controls .lil-title >> nth=0").endswith(f"Case of {name}.obj")
+        totals.append(float(page.inner_text("#figures td >> nth=1").split()[0]))
+    assert totals[1] == pytest.approx(totals[0], rel=0.01)  # the same surface, its net from another heading
+    assert studio.errors() == []
 
 
 @pytest.mark.slow
 @needs_browser
-def test_the_verdict_is_on_the_first_screen_of_a_tablet_and_before_the_case_on_a_phone(tmp_path: Path) -> None:
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page
-
-    (tmp_path / "case.toml").write_text(CASE)
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page([]) as page:
-        page.goto(address)
-        Robot(page, tmp_path, "studio").checked()
-        for width, height in ((1024, 768), (420, 800), (360, 740)):
-            page.set_viewport_size({"width": width, "height": height})
-            assert page.evaluate("document.documentElement.scrollWidth") == width
-            boxes = [page.locator(part).bounding_box() for part in ("#verdict strong", "#controls", "#view canvas")]
-            verdict, controls, view = [box for box in boxes if box]
-            if width == 1024:
-                assert verdict["y"] + verdict["height"] < height
-                assert controls["x"] < view["x"] < verdict["x"]
-            else:
-                assert view["y"] < verdict["y"] < controls["y"]
-                assert view["height"] < 0.5 * height  # a finger beside it scrolls the page
-        robot = Robot(page, tmp_path, "studio")
-        for name in ("one", "two"):
-            robot.keep(name)
-            page.check(f"#variants input[value={name}]")
-        page.click("#compare")
-        page.wait_for_selector("#side .both section:nth-child(2) canvas")
-        page.wait_for_selector("#side tbody tr")
-        assert page.evaluate("(part => part.scrollWidth - part.clientWidth)(document.getElementById('side'))") <= 0
+def test_the_verdict_is_on_the_first_screen_of_a_tablet_and_before_the_case_on_a_phone(studio: Studio) -> None:
+    page, robot = studio.page, studio.robot
+    for width, height in ((1024, 768), (420, 800), (360, 740)):
+        page.set_viewport_size({"width": width, "height": height})
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+        boxes = [page.locator(part).bounding_box() for part in ("#verdict strong", "#controls", "#view canvas")]
+        verdict, controls, view = [box for box in boxes if box]
+        if width == 1024:
+            assert verdict["y"] + verdict["height"] < height
+            assert controls["x"] < view["x"] < verdict["x"]
+        else:
+            assert view["y"] < verdict["y"] < controls["y"]
+            assert view["height"] < 0.5 * height  # a finger beside it scrolls the page
+    for name in ("one", "two"):
+        robot.keep(name)
+        page.check(f"#variants input[value={name}]")
+    page.click("#compare")
+    page.wait_for_selector("#side .both section:nth-child(2) canvas")
+    page.wait_for_selector("#side tbody tr")
+    assert page.evaluate("(part => part.scrollWidth - part.clientWidth)(document.getElementById('side'))") <= 0
 
 
 @pytest.mark.slow
 @needs_browser
-def test_a_load_needs_its_unit_and_what_failed_is_not_said_while_its_remedy_is_tried(tmp_path: Path) -> None:
+def test_a_load_needs_its_unit_and_what_failed_is_not_said_while_its_remedy_is_tried(
+    tmp_path: Path, studio: Studio
+) -> None:
     import signal
 
     from playwright.sync_api import expect
 
-    from tests.acceptance.studio import server
-    from tests.acceptance.studio_browser import Robot, browser_page
     from tests.acceptance.targets_broken import as_obj, dome
 
-    (tmp_path / "case.toml").write_text(CASE)
     (tmp_path / "roof.obj").write_bytes(as_obj(*dome()))
-    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, process), browser_page([]) as page:
-        page.set_default_timeout(20_000)
-        page.goto(address)
-        Robot(page, tmp_path, "studio").checked()
-        page.click("#loads")
-        page.fill("input[name=snow]", "0.7")  # of what?
-        page.click("#load-values button[value=check]")
-        expect(page.locator("#load-values[open] input[name=snow]:invalid")).to_be_focused()
-        page.click("#load-values button[value=close]")
-        expect(page.locator("#load-values")).to_be_hidden()
-        assert "loads" not in linked(page)
-        page.set_input_files("#file", tmp_path / "roof.obj")
-        page.wait_for_selector("#verdict.failed:not(.old)")
-        process.send_signal(signal.SIGSTOP)
-        try:
-            page.get_by_role("button", name="mm: 0.01").click()
-            expect(page.locator("#verdict")).to_have_text("Looking for the form")
-        finally:
-            process.send_signal(signal.SIGCONT)
-        page.wait_for_selector("#verdict.failed:not(.old), #verdict.good, #verdict.check, #verdict.unbuildable")
+    page = studio.page
+    page.click("#loads")
+    page.fill("input[name=snow]", "0.7")  # of what?
+    page.click("#load-values button[value=check]")
+    expect(page.locator("#load-values[open] input[name=snow]:invalid")).to_be_focused()
+    page.click("#load-values button[value=close]")
+    expect(page.locator("#load-values")).to_be_hidden()
+    assert "loads" not in linked(page)
+    page.set_input_files("#file", tmp_path / "roof.obj")
+    page.wait_for_selector("#verdict.failed:not(.old)")
+    studio.server.process.send_signal(signal.SIGSTOP)
+    try:
+        page.get_by_role("button", name="mm: 0.01").click()
+        expect(page.locator("#verdict")).to_have_text("Looking for the form")
+    finally:
+        studio.server.process.send_signal(signal.SIGCONT)
+    studio.robot.checked()
