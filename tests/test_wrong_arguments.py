@@ -1,5 +1,7 @@
 """Arguments of the wrong kind are refused in one sentence each; and what was saved is read again."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ BOUNDARY = rs.Boundary(np.zeros((4, 3)), np.zeros((4, 3)))
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
 
 
+@cache
 def form():
     return rs.find_form(TARGET, LAYOUT, ROD, ends="pinned")
 
@@ -132,9 +135,6 @@ def test_a_wrong_argument_is_refused_in_one_sentence(call, sentence):
 
 SNOW = {"snow": rs.Snow(500.0)}
 WINTER = {"winter": {"snow": 1.5}}
-FOUND = form()
-MESH, POPPED = FOUND.footprint.mesh, FOUND.popped["pinned"]
-RODS = [rod.name for rod in FOUND.footprint.rods]
 LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("start",))
 
 
@@ -150,14 +150,20 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.Fabrication(kerf="3"), 'the kerf must be a number in m, not "3"'),
         (lambda: rs.Fabrication(end_allowance=-0.1), "the end allowance must be 0 or more, not -0.1 m"),
         (lambda: rs.Fabrication(stock_length=np.nan), "the stock length must be positive, not nan m"),
-        (lambda: rs.trim(FOUND.draped, fewest="3"), 'fewest must be a whole number of 0 or more, not "3"'),
-        (lambda: rs.trim(FOUND.draped, fewest=-1), "fewest must be a whole number of 0 or more, not -1"),
+        (lambda: rs.trim(form().draped, fewest="3"), 'fewest must be a whole number of 0 or more, not "3"'),
+        (lambda: rs.trim(form().draped, fewest=-1), "fewest must be a whole number of 0 or more, not -1"),
         (lambda: rs.fabricate(None, ROD, rs.Fabrication()), "mesh must be a rodshell GridMesh, not None"),
-        (lambda: rs.fabricate(MESH, ROD, None), "options must be a rodshell Fabrication, not None"),
-        (lambda: rs.fabricate(MESH, TARGET, rs.Fabrication()), "rod must be a rodshell Rod, not a Hemisphere"),
-        (lambda: rs.fabricate(MESH, ROD, rs.Fabrication(), final="x"), "final must be numbers of the shape"),
-        (lambda: rs.fabricate(MESH, ROD, rs.Fabrication(), curvature=[1.0]), "curvature must have the shape"),
-        (lambda: rs.fabricate(MESH, ROD, rs.Fabrication(), to_supports="no"), "to_supports must be True or False"),
+        (lambda: rs.fabricate(FOOTPRINT.mesh, ROD, None), "options must be a rodshell Fabrication, not None"),
+        (
+            lambda: rs.fabricate(FOOTPRINT.mesh, TARGET, rs.Fabrication()),
+            "rod must be a rodshell Rod, not a Hemisphere",
+        ),
+        (lambda: rs.fabricate(FOOTPRINT.mesh, ROD, rs.Fabrication(), final="x"), "final must be numbers of the shape"),
+        (lambda: rs.fabricate(FOOTPRINT.mesh, ROD, rs.Fabrication(), curvature=[1.0]), "curvature must have the shape"),
+        (
+            lambda: rs.fabricate(FOOTPRINT.mesh, ROD, rs.Fabrication(), to_supports="no"),
+            "to_supports must be True or False",
+        ),
         (lambda: rs.Cables(rod=ROD, pattern=None), "the pattern of diagonals must be text .*, not None"),
         (lambda: rs.Damping(rate="1"), 'the damping rate must be a number in 1/s, not "1"'),
         (lambda: rs.Damping(coefficients="1 2"), "the damping coefficients must be"),
@@ -187,11 +193,23 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.chebyshev_net(LAYOUT, TARGET), "target must be a rodshell Target, not a GridLayout"),
         (lambda: rs.chebyshev_net(TARGET, None), "layout must be a rodshell GridLayout, not None"),
         (lambda: rs.chebyshev_net(TARGET, LAYOUT, warm_start="x"), 'warm_start must be a net .*, not "x"'),
-        (lambda: rs.check(POPPED, ROD), 'popped must be shells by their ends, such as {"pinned": .*, not a PopUp'),
+        (
+            lambda: rs.check(form().popped["pinned"], ROD),
+            'popped must be shells by their ends, such as {"pinned": .*, not a PopUp',
+        ),
         (lambda: rs.check({"pinned": None}, ROD), "the shell with pinned ends must be what .*, not None"),
-        (lambda: rs.check({"x": POPPED}, ROD), 'the ends of popped must be "pinned" or "clamped", not "x"'),
-        (lambda: rs.check({"pinned": POPPED}, ROD, stages=-1), "stages must be a whole number, 0 to 1000, not -1"),
-        (lambda: rs.check({"pinned": POPPED}, ROD, shear_weight=np.nan), "shear_weight must be positive, not nan"),
+        (
+            lambda: rs.check({"x": form().popped["pinned"]}, ROD),
+            'the ends of popped must be "pinned" or "clamped", not "x"',
+        ),
+        (
+            lambda: rs.check({"pinned": form().popped["pinned"]}, ROD, stages=-1),
+            "stages must be a whole number, 0 to 1000, not -1",
+        ),
+        (
+            lambda: rs.check({"pinned": form().popped["pinned"]}, ROD, shear_weight=np.nan),
+            "shear_weight must be positive, not nan",
+        ),
         (lambda: rs.OutputOptions(stages=1001), "stages must be a whole number, 0 to 1000, not 1001"),
         (lambda: rs.OutputOptions(rod_chosen="section"), 'rod_chosen must be parts of a rod .*, not "section"'),
         (lambda: rs.dynamic_pop_up(None, BOUNDARY, ROD), "footprint must be a rodshell Footprint, not None"),
@@ -217,15 +235,15 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.pop_up_table(CROSS, np.zeros((2, 2, 3)), ROD, edge="1"), 'edge must be a number in m, not "1"'),
         (lambda: rs.pop_up_table(CROSS, np.zeros((2, 2, 3)), ROD, edge=np.nan), "edge must be positive, not nan m"),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, time_limit="60"), 'time_limit must be a number in s, not "60"'),
-        (lambda: rs.save(FOUND.unchecked(), "x", [], more="x"), 'more must be texts by the names .*, not "x"'),
-        (lambda: rs.save(FOUND.unchecked(), "x", [], force="no"), 'force must be True or False, not "no"'),
+        (lambda: rs.save(form().unchecked(), "x", [], more="x"), 'more must be texts by the names .*, not "x"'),
+        (lambda: rs.save(form().unchecked(), "x", [], force="no"), 'force must be True or False, not "no"'),
         (lambda: rs.search(LAYOUT, TARGET, ROD), "target must be a rodshell Target, not a GridLayout"),
         (lambda: rs.search(TARGET, LAYOUT, "rod"), 'rod must be a rodshell Rod, not "rod"'),
         (lambda: rs.search(TARGET, LAYOUT, ROD, anchors=(0.0, 0.0)), "each of the anchors must be two finite numbers"),
         (lambda: rs.search(TARGET, LAYOUT, ROD, anchors=[]), "anchors must be points .*, not an empty list"),
         (lambda: rs.search(TARGET, LAYOUT, ROD, headings=0.3), "headings must be angles in rad, .*, not 0.3"),
         (lambda: rs.Job.load("hemisphere", "layout"), 'overrides must be values by key, .*, not "layout"'),
-        (lambda: rs.solve_rod(FOUND), "rod must be a rodshell ElasticRod, not a Form"),
+        (lambda: rs.solve_rod(form()), "rod must be a rodshell ElasticRod, not a Form"),
         (lambda: rs.solve_rod(LINE, rs.RodLoads()), "supports must be a rodshell RodSupports, not a RodLoads"),
         (lambda: rs.solve_rod(LINE, steps="3"), 'steps must be a whole number of 1 or more, not "3"'),
         (lambda: rs.solve_rod(LINE, stable="yes"), 'stable must be True or False, not "yes"'),
@@ -255,7 +273,7 @@ def test_lists_and_arrays_do_in_place_of_tuples():
     assert rs.OutputOptions(rod_chosen=["section"]) == rs.OutputOptions(rod_chosen=("section",))
     line = np.array([[(-1.0, 0.3), (1.0, 0.3)]])
     assert rs.Job(TARGET, rs.GridLayout.orthogonal(spacing=0.06), ROD, seams=line).case.seams.lines
-    assert len(rs.trim(FOUND.draped, fewest=np.int64(3)).mesh.grid.rods) == len(RODS)
+    assert len(rs.trim(form().draped, fewest=np.int64(3)).mesh.grid.rods) == len(form().footprint.rods)
     loads = rs.PointLoads([1], [[0.0, 0.0, 2.0]])
     np.testing.assert_array_equal(loads.held(0.0, None, None, np.ones((2, 3))), [[0, 0, 0], [0, 0, 2]])
     assert not rs.PointLoads([], np.zeros((0, 3))).held(0.0, None, None, np.ones((2, 3))).any()
@@ -287,9 +305,9 @@ def test_an_infinite_time_limit_is_none():
 
 
 def test_numpy_s_truths_are_truths(tmp_path):
-    rs.save(FOUND.unchecked(), tmp_path, [], force=np.True_)
+    rs.save(form().unchecked(), tmp_path, [], force=np.True_)
     assert rs.solve_rod(LINE, stable=np.bool_(True)).report.converged
-    assert rs.fabricate(MESH, ROD, rs.Fabrication(), to_supports=np.False_).cut_length.all()
+    assert rs.fabricate(FOOTPRINT.mesh, ROD, rs.Fabrication(), to_supports=np.False_).cut_length.all()
 
 
 def test_numpy_s_numbers_are_numbers():
