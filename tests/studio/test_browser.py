@@ -33,6 +33,7 @@ loads = [{ name = "gale", kind = "wind", value = "0.4 kN/m2", coefficient = -0.5
 combinations = [{ name = "storm", factors = { gale = 1.5, weight = 1.0 } }]
 """
 SPACING = "input[data-path='layout.spacing']"
+SCROLLED = "document.getElementById('result').scrollTop"
 CURRENT = "#figures:not(.old)"  # the figures of a net, of the present case, before it has its verdict
 
 
@@ -233,8 +234,12 @@ def test_a_case_that_failed_offers_no_files_and_no_script_of_the_case_before(stu
     for part in offered:
         expect(part).to_have_count(1)
     page.locator(".lil-title", has_text="[layout]").click()
+    page.set_viewport_size({"width": 1440, "height": 400})
+    page.locator("#compare").scroll_into_view_if_needed()
+    assert page.evaluate(SCROLLED) > 0
     put(page, "[data-path='layout.spacing'] >> nth=-1", "banana")
     page.wait_for_selector("#verdict.failed")
+    assert page.evaluate(SCROLLED) == 0  # the sentence is in sight
     for part in offered:
         expect(part).to_have_count(0)
     page.click("#undo")
@@ -393,7 +398,10 @@ def test_an_outline_ends_the_target_that_there_is_and_a_new_state_of_a_mesh_keep
     page.keyboard.type("m")
     page.keyboard.press("Enter")
     expect(page.locator(SPACING)).to_have_count(1)  # in the folder of the layout: no slider with the dome's spacing
-    put(page, f".lil-slider + {SPACING}", "1")
+    slider = f".lil-slider + {SPACING}"
+    page.wait_for_selector(slider)
+    assert len(page.input_value(slider)) <= 5  # m, of a chosen spacing: four digits say enough
+    put(page, slider, "1")
     page.wait_for_selector(CURRENT)
     rods = page.inner_text("#figures td >> nth=1")
     page.set_input_files("#file", tmp_path / "edge.dxf")
@@ -510,6 +518,10 @@ def test_a_mesh_without_a_unit_closed_or_with_y_upwards_becomes_a_target_by_butt
     (tmp_path / "upwards.obj").write_bytes(as_obj(points[:, [0, 2, 1]] * [1.0, 1.0, -1.0], faces))
     (tmp_path / "roof.obj").write_bytes(as_obj(points, faces))
     page, robot = studio.page, studio.robot
+    (tmp_path / "hill.csv").write_text("x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n")
+    page.set_input_files("#file", tmp_path / "hill.csv")
+    page.wait_for_selector("#outline:not([hidden])")
+    assert page.is_hidden("#upright")  # heights are above a plan
     (tmp_path / "small.obj").write_bytes(as_obj(0.05 * points, faces))
     for name, units in (("small", "cm m in ft"), ("ball", "mm cm in")):  # a shell is 1 mm to 1 km wide
         page.set_input_files("#file", tmp_path / f"{name}.obj")
@@ -538,6 +550,8 @@ def test_a_mesh_without_a_unit_closed_or_with_y_upwards_becomes_a_target_by_butt
 @pytest.mark.slow
 @needs_browser
 def test_the_verdict_is_on_the_first_screen_of_a_tablet_and_before_the_case_on_a_phone(studio: Studio) -> None:
+    from playwright.sync_api import expect
+
     page, robot = studio.page, studio.robot
     for width, height in ((1024, 768), (420, 800), (360, 740)):
         page.set_viewport_size({"width": width, "height": height})
@@ -556,6 +570,7 @@ def test_the_verdict_is_on_the_first_screen_of_a_tablet_and_before_the_case_on_a
     page.click("#compare")
     page.wait_for_selector("#side .both section:nth-child(2) canvas")
     page.wait_for_selector("#side tbody tr")
+    expect(page.locator("#side > button")).to_be_in_viewport()  # before its figures are scrolled through
     assert page.evaluate("(part => part.scrollWidth - part.clientWidth)(document.getElementById('side'))") <= 0
 
 
