@@ -341,6 +341,9 @@ def test_a_wrong_load_is_named_as_it_is_counted_and_its_button_leads_to_it(studi
     studio.open(link)
     page.get_by_role("button", name="Go to layout.spacing").click()
     expect(page.locator("[data-path='layout.spacing']").last).to_be_focused()
+    studio.open({**case, "drape": {"gravity": 5}})  # whose sentence names drape.method too
+    page.get_by_role("button", name="Go to drape.gravity").click()
+    expect(page.locator("[data-path='drape.gravity']")).to_be_focused()
     assert studio.errors() == []
 
 
