@@ -166,6 +166,8 @@ def test_a_session_shows_each_stage_and_ends_with_the_command_line_s_form(tmp_pa
                 for name in ("second", "third"):
                     socket.send_json({"kind": "drop", "name": name})
                     assert socket.receive_json()["variants"] == other.receive_json()["variants"]
+            kept = json.loads((tmp_path / "sessions" / session / "session.json").read_text())
+            assert [variant["name"] for variant in kept["variants"]] == ["first"]
             socket.send_json({"kind": "case", "serial": 3, "case": {"target": {"radius": "no"}}})
             assert "target.radius" in until_done(socket, 3)[-1]["sentence"]
         packed = client.get(f"/api/sessions/{session}/files.zip")
