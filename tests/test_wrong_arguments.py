@@ -234,6 +234,7 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.pop_up_table(CROSS, "x", ROD), "finals must be numbers of the shape"),
         (lambda: rs.pop_up_table(CROSS, np.zeros((2, 2, 3)), ROD, edge="1"), 'edge must be a number in m, not "1"'),
         (lambda: rs.pop_up_table(CROSS, np.zeros((2, 2, 3)), ROD, edge=np.nan), "edge must be positive, not nan m"),
+        (lambda: rs.Fabrication(stock_length=np.inf), "the stock length must be positive, not inf m"),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, time_limit="60"), 'time_limit must be a number in s, not "60"'),
         (lambda: rs.save(form().unchecked(), "x", [], more="x"), 'more must be texts by the names .*, not "x"'),
         (lambda: rs.save(form().unchecked(), "x", [], force="no"), 'force must be True or False, not "no"'),
