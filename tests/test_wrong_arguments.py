@@ -177,6 +177,7 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.Job(TARGET, LAYOUT, ROD, rotate=np.nan), "rotate must be finite, not nan rad"),
         (lambda: rs.Job(TARGET, LAYOUT, ROD, seams=3), "seams must be a list of lines, .*, not 3"),
         (lambda: rs.Job(TARGET, LAYOUT, ROD, patches=[3]), "patches must be settings by the names .*, not a list"),
+        (lambda: rs.Job(TARGET, LAYOUT, ROD, patches={3: rs.PatchLayout()}), "name of each patch must be text, not 3"),
         (lambda: rs.PatchLayout(spacing="3"), "a patch's spacing must be two lengths in m, not '3'"),
         (lambda: rs.PatchLayout(anchor=0.0), "a patch's anchor must be two finite numbers x, y in m, not 0.0"),
         (lambda: rs.Loads(loads=None, combinations=WINTER), "loads must be loads by their names, .*, not None"),
