@@ -18,6 +18,7 @@ from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding import popup
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.model import Shell
+from rodshell.results.summary import summary_text
 from rodshell.solve import newton_step
 from rodshell.solve.equilibrium import Status, find_equilibrium, find_stable
 from rodshell.solve.problem import Problem, Supports
@@ -411,6 +412,26 @@ def test_a_wave_of_laths_pops_up_from_flat_stable():
     np.testing.assert_allclose(flat.positions[ends], form.boundary.points.reshape(-1, 2, 3), atol=1e-12)
 
 
+def test_the_work_of_a_path_in_short_steps_is_counted_and_newtons_method_stops_where_all_rods_roll(monkeypatch):
+    """From its first saddle, with a mode for each rod, it goes on to others until its iterations are used up."""
+    form, work = thin_roof(), dict[str, int]()
+    for name, solve in (("follow", popup.follow), ("relax", popup.relax), ("trace", popup.trace)):
+
+        def counted(*given, name=name, solve=solve, **options):
+            found = solve(*given, **options)
+            work[name] = (found if name == "trace" else found.report).factorizations
+            return found
+
+        monkeypatch.setattr(popup, name, counted)
+    stopped = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat")
+    assert stopped.report.factorizations == sum(work.values())
+    spent = work["follow"]
+    monkeypatch.setattr(popup._Stages, "most_rolling", None)
+    whole = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat")
+    assert spent < 0.5 * work["follow"]
+    np.testing.assert_array_equal(stopped.positions, whole.positions)
+
+
 def test_a_time_limit_ends_the_short_steps_too():
     form = thin_roof()
 
@@ -441,7 +462,7 @@ def test_how_far_a_lost_pop_up_from_flat_was_followed_is_known(monkeypatch):
     way = np.linalg.norm(goals - first, axis=1)
     moved = np.linalg.norm(lost.positions[mesh.ends.ravel()] - first, axis=1)
     k = int(way.argmax())
-    assert 0.05 < lost.followed < 0.9
+    assert 0.04 < lost.followed < 0.9
     assert lost.followed == pytest.approx(moved[k] / way[k], rel=1e-9)
     assert form.popped["pinned"].followed == 1.0
 
@@ -452,15 +473,17 @@ def test_a_result_whose_pop_up_from_flat_is_lost_is_a_failure_of_the_computation
     monkeypatch.setattr(popup._Stages, "traced", lambda stages, problem_at, arch, failed: failed)
     assert main(["popup", str(folder), "--only", "csv", "--quiet", "--out", str(out)]) == 3
     said = capsys.readouterr().err
-    assert said.startswith("rodshell: NOT CONVERGED: pop-up (pinned) could be followed from flat only up to 20 % of")
+    assert said.startswith("rodshell: NOT CONVERGED: pop-up (pinned) could be followed from flat only up to 5 % of")
     assert "(rod.section)" in said
     assert "spacing" not in said
     assert "mesh" not in said
-    verdict = rs.read(out).verdict
+    verdict, results = rs.read(out).verdict, rs.read(out).results
     assert verdict.level == "unknown"
     assert verdict.headline.startswith(
         "Not known: the computation did not converge, which says nothing about the shell"
     )
+    assert results.pop_up["pinned"].stable is None
+    assert "NOT STABLE" not in summary_text(results)
 
 
 def test_a_result_is_popped_up_again_by_the_command(tmp_path):

@@ -39,6 +39,7 @@ STARTS: tuple[Start, ...] = get_args(Start)
 
 FIRST_RISE = 0.05  # share of the ends' paths in the step that leaves the plane
 SHORTEST_RISE = 0.001  # share of the ends' paths: where no step of this length succeeds, the shell snaps
+MODES_PER_ROD = 0.5  # negative modes, where each rod may roll by itself: saddles with more lead to others like them
 MOST_TRACED = 8000  # factorisations of a path in short steps
 CLAMP_STEP = 0.25  # share of the clamps' rotation in the first step
 MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70; to descend the energy takes longer
@@ -213,10 +214,20 @@ class _Stages:
         states far from the target. None where rods can roll at their joints: laths on edge have as many modes, and
         lie down.
         """
+        return None if self.rolls else int(MODES_PER_JOINT * len(self.footprint.mesh.grid.crossings))
+
+    @property
+    def most_rolling(self) -> int | None:
+        """Most negative modes from which Newton's method arrives from flat, where what it loses is followed in short
+        steps; None: as many as there are."""
+        short_steps = self.most_factorizations is None
+        return int(MODES_PER_ROD * len(self.footprint.rods)) if self.rolls and short_steps else None
+
+    @property
+    def rolls(self) -> bool:
+        """Whether rods can roll at their joints."""
         joints = self.joint if isinstance(self.joint, Sequence) else (self.joint,)
-        if not all(joint.holds_normals for joint in joints):
-            return None
-        return int(MODES_PER_JOINT * len(self.footprint.mesh.grid.crossings))
+        return not all(joint.holds_normals for joint in joints)
 
     def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
         """The shell with its ends (and ghost nodes) held at the boundary, or at `goals`."""
@@ -308,6 +319,7 @@ class _Stages:
             first_step=FIRST_RISE,
             snap=True,
             most_factorizations=self.most_factorizations,
+            most_modes=self.most_rolling,
             progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
         )
         late = found.report.status is Status.OUT_OF_TIME
@@ -340,11 +352,12 @@ class _Stages:
             )  # fmt: skip
         except OutOfTimeError as late:
             return replace(failed, report=replace(failed.report, status=Status.OUT_OF_TIME, reason=str(late)))
-        work = path.found.report.after(failed.report, here.report)
+        solves = (failed.report, here.report, *path.reports)
+        work = path.found.report.after(*(report for report in solves if report is not path.found.report))
         if path.t == 1:
             return replace(path.found, report=work)
         if failed.report.converged:  # the ends arrived, and the shell there is unstable
-            return replace(failed, report=failed.report.after(here.report))
+            return replace(failed, report=failed.report.after(here.report, *path.reports))
         return replace(path.found, report=replace(work, status=Status.STALLED))
 
     def turn_clamps(self, free: Shell, pinned: Equilibrium) -> tuple[Shell, Equilibrium]:

@@ -15,7 +15,7 @@ the elements where the descent starts, so that metres, radians and soft and stif
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,6 +48,7 @@ def follow(
     first_step: float,
     snap: bool = False,
     most_factorizations: int | None = None,
+    most_modes: int | None = None,
     progress: Callable[[float, int, float], None] | None = None,
 ) -> Equilibrium:
     """Move from t = 0 to t = 1 by steps that shrink on failure and grow back.
@@ -61,6 +62,7 @@ def follow(
     snap : where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
         structure itself would; its constraint must be `Supports`.
     most_factorizations : no step is begun after so many, and no descent takes many more; None: as many as it takes.
+    most_modes : the path ends at an equilibrium with more negative modes; None: at none.
 
     Returns
     -------
@@ -101,6 +103,8 @@ def follow(
             break
         if t < 1.0 and most_factorizations is not None and _made(reports) >= most_factorizations:
             break
+        if found.report.converged and most_modes is not None and found.report.negative_modes > most_modes:
+            break
     ended = last or found
     report = ended.report.after(*(report for report in reports if report is not ended.report))
     if t >= 1.0:
@@ -110,7 +114,7 @@ def follow(
     return replace(ended, report=replace(report, status=status, reason=found.report.reason))
 
 
-def _made(reports: list[SolveReport]) -> int:
+def _made(reports: Sequence[SolveReport]) -> int:
     """Factorisations of several solves."""
     return sum(report.factorizations for report in reports)
 
@@ -132,12 +136,17 @@ class Snap:
 
 @dataclass(frozen=True)
 class Trace:
-    """How far a path was traced: the last t with its stable equilibrium, the snaps on the way, and the work."""
+    """How far a path was traced: the last t with its stable equilibrium, the snaps on the way, and all its solves."""
 
     t: float
     found: Equilibrium
     snaps: tuple[Snap, ...]
-    factorizations: int
+    reports: tuple[SolveReport, ...]
+
+    @property
+    def factorizations(self) -> int:
+        """Of all solves, those of steps that were too long too."""
+        return _made(self.reports)
 
 
 def trace(
@@ -161,35 +170,35 @@ def trace(
     -------
     The path; its t is `stop` where it arrived.
     """
-    t, step, done, snaps = start, abs(stop - start), 0, list[Snap]()
+    t, step, snaps, reports = start, abs(stop - start), list[Snap](), list[SolveReport]()
     while t != stop:
         progress(t)
         step = min(step, abs(stop - t))
         there = stop if step == abs(stop - t) else t + float(np.copysign(step, stop - t))
         problem = going_on(problem_at(there), here)
         found = find_stable(problem, here.state, here.forces, most_iterations=MOST_A_STEP)
-        done += found.report.factorizations
+        reports.append(found.report)
         if not found.report.stable or unaccounted(here, found):
-            if done >= most_factorizations or (step <= shortest and not snap):
+            if _made(reports) >= most_factorizations or (step <= shortest and not snap):
                 break
             if step > shortest:
                 step = max(0.4 * step, shortest)
                 continue
             found = _fallen(problem, here, found)
-            done += found.report.factorizations
+            reports.append(found.report)
             if not found.report.stable:
                 break
             back = trace(
                 problem_at, found, there, t, shortest=shortest / FINER, snap=False, most_factorizations=MOST_BACK
             )
-            done += back.factorizations
+            reports += back.reports
             if back.t != t or farthest(here, back.found) > SAME * problem.length:
                 snaps.append(Snap(t, there, farthest(here, found)))
             step = 4 * shortest
         elif found.report.iterations <= EASY:
             step *= 1.6
         t, here = there, found
-    return Trace(t, here, tuple(snaps), done)
+    return Trace(t, here, tuple(snaps), tuple(reports))
 
 
 def going_on(problem: Problem, last: Equilibrium) -> Problem:
