@@ -387,7 +387,7 @@ def _pop_up(report: SolveReport, start: str) -> PopUp:
         force_residual=report.force_residual,
         max_strain=report.max_strain,
         negative_modes=report.negative_modes,
-        stable=report.stable,
+        stable=report.stable if report.converged else None,
     )
 
 

@@ -321,8 +321,8 @@ class PopUp(Solve):
     start: Text | None = key('state that the solve started from: "draped", "flat" or another shell')
     force_residual: Number = key("largest out-of-balance force on a node", "N")
     max_strain: Number = key("largest axial strain")
-    negative_modes: Whole | None = key("negative eigenvalues of the tangent; 0: stable")
-    stable: Flag | None = key("whether the unloaded shell is a stable equilibrium")
+    negative_modes: Whole | None = key("negative eigenvalues of the tangent; 0: stable, if the solve converged")
+    stable: Flag | None = key("whether the unloaded shell is a stable equilibrium; null where none was found")
 
 
 class Agreement(Record):

@@ -8,7 +8,7 @@ from rodshell.results.loaded import DesignStrength
 from rodshell.results.records import Bent, RodType
 from rodshell.results.results import Bending, Results
 from rodshell.results.strength_used import strength_name
-from rodshell.results.verdict import unknown_below, verdict_of
+from rodshell.results.verdict import CONVERGED, unknown_below, verdict_of
 from rodshell.results.wording import (
     NAMES,
     case_rows,
@@ -169,7 +169,9 @@ def _net_and_drape(results: Results, length: Length) -> Iterator[str]:
 def _pop_up(results: Results, length: Length) -> Iterator[str]:
     """Whether each shell is stable, and how near it comes to the target."""
     for ends, shell in results.pop_up.items():
-        state = "stable, unloaded" if shell.stable else f"{shell.status}, NOT STABLE"
+        state = "stable, unloaded" if shell.stable else shell.status or CONVERGED
+        if state == CONVERGED:
+            state += ", NOT STABLE" if shell.stable is False else ", stability not checked"
         line = f"  pop-up    {ends:<8}{state}, {shell.factorizations} factorisations"
         if gap := results.agreement.get(ends):
             line += f"; gap max {length(gap.max)} ({percent(gap.max_relative)}), "
