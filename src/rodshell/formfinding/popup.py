@@ -351,7 +351,8 @@ class _Stages:
                 progress=lambda t: self.progress("pop-up", f"from flat in short steps, {100 * t:.1f} %", 0.0),
             )  # fmt: skip
         except OutOfTimeError as late:
-            return replace(failed, report=replace(failed.report, status=Status.OUT_OF_TIME, reason=str(late)))
+            work = failed.report.after(here.report)
+            return replace(failed, report=replace(work, status=Status.OUT_OF_TIME, reason=str(late)))
         solves = (failed.report, here.report, *path.reports)
         work = path.found.report.after(*(report for report in solves if report is not path.found.report))
         if path.t == 1:

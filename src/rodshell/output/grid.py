@@ -217,6 +217,19 @@ def shape_names(archive: Archive) -> list[str]:
     return [name for name in ("flat", *stages, *SHELLS) if name.startswith(STAGE) or name in states]
 
 
+def caption_of(archive: Archive, state: str) -> str:
+    """What a state shows, in words.
+
+    Parameters
+    ----------
+    archive : the result.
+    state : a key of `CAPTIONS`.
+    """
+    if archive.is_lost(state):
+        return f"Not popped up, {state.removeprefix('popped_')} ends: where the computation stopped"
+    return CAPTIONS[state]
+
+
 def shape_of(archive: Archive, name: str) -> Shape:
     """A shape by its name.
 
@@ -241,7 +254,7 @@ def shape_of(archive: Archive, name: str) -> Shape:
     curvature, stress = (states.get(f"{what}_{ends}") for what in BENT)
     gap = states.get(GAPS.get(name, ""))
     force = states.get(f"force_{ends}")
-    return Shape(name, CAPTIONS[name], np.asarray(states[name], dtype=float), gap, stress, curvature, force)
+    return Shape(name, caption_of(archive, name), np.asarray(states[name], dtype=float), gap, stress, curvature, force)
 
 
 def outlines(rods: Floats) -> list[Ints]:

@@ -11,7 +11,7 @@ from typing import Any
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
-from rodshell.output.grid import CAPTIONS
+from rodshell.output.grid import CAPTIONS, caption_of
 from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
 from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
@@ -78,7 +78,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         profiles=None if (picture := profiles_svg(results.rods)) is None else Markup(picture),
         supports=supports_table(results),
         checks=checks_table(results),
-        pictures=[(CAPTIONS[state], shown(picture_svg(archive, state))) for state in states],
+        pictures=[(caption_of(archive, state), shown(picture_svg(archive, state))) for state in states],
         one_scale=sum(state in SHELLS for state in states) > 1,
         loads=loads_page(archive),
         figures=key_figures(results, plan),

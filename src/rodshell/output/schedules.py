@@ -214,7 +214,7 @@ def supports_table(archive: Archive, *, brief: bool = False) -> Table:
 
     Parameters
     ----------
-    brief : only the columns that have room on a sheet.
+    brief : only the columns that have room on a sheet, and directions only where they are known.
     """
     results, mm = archive.results, rounding_of(archive.results).mm
     columns = ["id", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"tangent_{a}" for a in "xyz")]
@@ -229,7 +229,8 @@ def supports_table(archive: Archive, *, brief: bool = False) -> Table:
             row += [_six(value) for kind in (held.forces, held.moments) for value in kind[k]]
         rows.append(row)
     if brief:
-        columns, rows = [columns[0], *columns[3:9]], [[row[0], *row[3:9]] for row in rows]
+        stop = 9 if results.end_tangents else 6
+        columns, rows = [columns[0], *columns[3:stop]], [[row[0], *row[3:stop]] for row in rows]
     return columns, rows
 
 

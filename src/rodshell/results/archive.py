@@ -24,7 +24,7 @@ from rodshell.errors import OutputError
 from rodshell.results.folder import ResultFolder, reading
 from rodshell.results.results import Results, Verdict, read_results
 from rodshell.results.summary import summary_text
-from rodshell.results.verdict import verdict_of
+from rodshell.results.verdict import CONVERGED, verdict_of
 from rodshell.validation import instance, mapping
 
 LARGEST = 20_000_000  # bytes of a file that is copied
@@ -212,8 +212,20 @@ class Archive:
 
     @property
     def final(self) -> str | None:
-        """The best state in space that there is: clamped, else pinned, else draped."""
-        return next((state for state in reversed(SHELLS) if state in self.states), None)
+        """The best state in space that there is: clamped, else pinned, else draped; where a solve stopped before it
+        converged only if there is no other."""
+        shells = [state for state in SHELLS if state in self.states]
+        return max(shells, key=lambda state: (not self.is_lost(state), SHELLS.index(state)), default=None)
+
+    def is_lost(self, state: str) -> bool:
+        """Whether a state is where the solve of a shell stopped before it converged.
+
+        Parameters
+        ----------
+        state : of `states`, such as "popped_pinned".
+        """
+        shells = {f"popped_{ends}": shell for ends, shell in self.results.pop_up.items()}
+        return state in shells and shells[state].status not in (None, CONVERGED)
 
 
 def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:

@@ -453,6 +453,8 @@ def _strength(results: Results) -> Iterator[str]:
         where = _known(results.deployment, unknown_below(results))
         design = "design " if by_design_strength(results) else ""
         yield f"Unloaded, the rods use {percent(used)} of their {design}strength at most, {where}"
+    elif results.bending and results.bending.strength is not None:
+        yield "How much of their strength the rods use is not known, since no shell was found."
     elif results.bending:
         yield "No strength was given, so it is not known whether the rods hold (checks.strength)."
 

@@ -41,10 +41,6 @@ from rodshell.results.strength_used import ENDS
 __all__ = ["drawing_set", "sheet_set"]
 
 
-_HELD: dict[str | None, str] = {  # directions in the table are those of the draped shell
-    "popped_pinned": ", pinned ends (free to turn; directions as on the target)",
-    "popped_clamped": ", clamped ends (directions held)",
-}
 FINER = {"bracing": 0.5}  # smallest texts of a drawing at 1:1 over those of the plan, where more of them find room
 
 
@@ -65,7 +61,7 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
     for name, layout in layouts.items():
         sheets += layout.sheets(paper)
         if name == "supports":
-            sheets += table(f"Supports{_HELD.get(archive.final, '')}", supports_table(archive, brief=True), paper)
+            sheets += table(f"Supports{_held(archive)}", supports_table(archive, brief=True), paper)
         elif name == "bracing":
             sheets += table(f"Bracing{checked}", bracing_table(archive, brief=True), paper)
     sheets += table(f"Rods{checked}", rods_table(archive, brief=True), paper)
@@ -77,6 +73,14 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
     if results.fabrication and results.fabrication.stock:
         sheets += table("Stock", stock_table(archive), paper)
     return bound(sheets, title_block(archive, plan.summary), paper), paper
+
+
+def _held(archive: Archive) -> str:
+    """With which ends the final shape is; directions in the table of supports are those of the draped shell."""
+    if archive.final == "popped_clamped":
+        return ", clamped ends (directions held)"
+    directions = "; directions as on the target" if archive.results.end_tangents else ""
+    return f", pinned ends (free to turn{directions})" if archive.final == "popped_pinned" else ""
 
 
 def _checked(results: Results) -> str:

@@ -53,6 +53,12 @@ def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
     return [1e3 * positions[rod.nodes] for rod in rods_of(archive) if len(rod.nodes) > 1]
 
 
+def _stopped(archive: Archive) -> str:
+    """For titles: that the final shape is not one of equilibrium, and that its ends may not be at their supports."""
+    lost = archive.final is not None and archive.is_lost(archive.final)
+    return ", not popped up: where the computation stopped" if lost else ""
+
+
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
     """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions.
 
@@ -76,7 +82,7 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
         _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, rounding)
         pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
         pencil.write(words, (low[0], low[1] - 5 * text), 1.2 * text, "LABEL", bold=True)
-    return pencil.done("elevations", "Elevations", text)
+    return pencil.done("elevations", f"Elevations{_stopped(archive)}", text)
 
 
 def erection_drawing(archive: Archive, text: float) -> Drawing:
@@ -256,7 +262,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     for k, line in enumerate(SUPPORTS_LEGEND, start=1):
         written = line.format(seams="" if alone.all() else ", and seams")
         pencil.write(written, low - (0.0, 1.5 * k * text), text, "DIM")
-    return pencil.done("supports", "Support plan", text)
+    return pencil.done("supports", f"Support plan{_stopped(archive)}", text)
 
 
 def _walks(outlines: list[Ints], ends: Floats, alone: Bools) -> Iterator[Ints]:
