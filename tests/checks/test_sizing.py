@@ -329,6 +329,11 @@ def test_a_summary_claims_no_share_of_the_strength_that_is_not_so(tmp_path: Path
     assert "sized for the permanent strength; reached 98 % in the final" in (
         summary_text(found.model_copy(update={"bending": bent}))
     )
+    assert "thinner than any size" not in summary_text(found)
+    thin = found.rod.model_copy(update={"section": rs.results.records.Section(kind="circle", radius=0.4e-3)})
+    assert "; thinner than any size that is sold, the first of which is a rod of 1 mm\n" in (
+        summary_text(found.model_copy(update={"rod": thin}))
+    )
 
 
 @pytest.mark.slow

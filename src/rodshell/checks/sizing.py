@@ -328,7 +328,7 @@ def _of_depth(section: Section, deep: float, *, wall_stays: bool) -> Section:
         return scaled(section, deep / section.depth)
     if deep < 2 * section.thickness:
         raise InputError(
-            f"a wall of {length_text(section.thickness)}: tubes that withstand the bends of this target are at most "
+            f"a wall of {length_text(section.thickness)}: tubes that withstand the bends of this shell are at most "
             f"{length_text(deep)} thick: give a thinner wall, or the radius too"
         )
     return Tube(deep / 2, section.thickness)

@@ -139,12 +139,12 @@ def _gain(rod: RodType, section: Section) -> float:
 
 def _sharper(rod: RodType, section: Section) -> float:
     """How many times as much the same bends strain this section, at most."""
-    other = _half_sides(RodSection.model_validate(section.parameters()))
-    now = _half_sides(rod.section) if rod.section else ()
+    other = half_sides(RodSection.model_validate(section.parameters()))
+    now = half_sides(rod.section) if rod.section else ()
     return max((new / old for new, old in zip(other, now, strict=False)), default=inf)
 
 
-def _half_sides(section: RodSection) -> tuple[float, ...]:
+def half_sides(section: RodSection) -> tuple[float, ...]:
     """Distances of the outermost fibres along both axes [m]; none of a given section."""
     if section.radius:
         return section.radius, section.radius

@@ -50,7 +50,10 @@ class Swept:
         lines = [f"{self.finished} of {self.designs} designs are finished, {self.computed} computed now: {counts}"]
         if self.not_converged:
             lines.append(f"NOT CONVERGED: {self.not_converged} forms; their column status says at which stage")
-        lines += [f"no form ({count} designs): {sentence}" for sentence, count in self.failures[:MOST_FAILURES]]
+        lines += [
+            f"no form ({count} design{'s' if count != 1 else ''}): {sentence}"
+            for sentence, count in self.failures[:MOST_FAILURES]
+        ]
         return "\n".join(lines)
 
 
