@@ -91,7 +91,7 @@ def test_a_pop_up_that_stops_early_is_named_and_has_no_agreement(monkeypatch):
     assert form.status == f"pop-up (pinned) {Status.STALLED.sentence}"
     assert form.agreement == {}
     assert form.results().plain()["pop_up"]["pinned"]["status"] == "stalled"
-    assert form.results().plain()["pop_up"]["pinned"]["stable"] is False
+    assert form.results().plain()["pop_up"]["pinned"]["stable"] is None
 
 
 def test_a_popped_up_saddle_is_told_by_the_verdict(monkeypatch):
