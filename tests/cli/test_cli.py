@@ -763,6 +763,14 @@ def test_the_blas_has_one_thread_or_as_many_as_are_asked_for(asked: dict[str, st
     assert ended.stdout.split()[-1] == threads
 
 
+def test_the_package_is_run_as_the_command_is() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-m", "rodshell", "form", "nowhere"], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("rodshell: error: ")
+
+
 @pytest.mark.parametrize(
     ("option", "values"),
     [("--rod.section.radius", "VALUE|auto"), ("--spacing", "VALUE|auto"), ("--joint.shear", "VALUE|rigid"),
