@@ -17,7 +17,7 @@ from rodshell.progress import Progress
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
 from rodshell.results.summary import chosen, rod_text
-from rodshell.rods.section import GivenSection, Rod
+from rodshell.rods.section import GivenSection, Rod, size_text
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
 from rodshell.units import length_text
@@ -148,9 +148,15 @@ class Run:
             chosen_so = popped_before > 0 or before is not None
             if section == rod.section or (chosen_so and fit.allows(rod, strength)):
                 break
-            if popped_before + 1 < MOST_SIZES:
-                rod = Rod(section, rod.material)
-                stages = stages_of(rod)
+            if popped_before + 1 == MOST_SIZES:
+                break
+            following = Rod(section, rod.material)
+            found = stages_of(following)
+            if found.status != "converged":  # what was found before is kept
+                if self.announce is not None:
+                    self.announce(f"rods of {size_text(section)} fit better, but were not popped up: {found.status}")
+                break
+            rod, stages = following, found
         return rod, fit, stages
 
     def _sized_before(self) -> Rod | None:

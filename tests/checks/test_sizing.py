@@ -13,10 +13,12 @@ from rodshell.checks.bending import bending_of
 from rodshell.checks.sizing import Bends, Fit, bends_of, bends_of_pop_ups, largest_strain, net_bends
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
+from rodshell.formfinding import pop_up_stages
 from rodshell.layout import straight_rods
+from rodshell.progress import silent
 from rodshell.results.summary import summary_text
 from rodshell.results.wording import percent
-from rodshell.rods.section import TRADE_SIZES
+from rodshell.rods.section import TRADE_SIZES, size_text
 
 
 def roof(**keys: Any) -> Any:
@@ -237,6 +239,29 @@ def test_rods_of_a_table_with_many_joints_are_as_thick_as_those_with_few(spacing
     assert isinstance(section, rs.RectangularSection)
     strain = 30e6 * PERMANENT["larch"] / form.rod.material.youngs_modulus  # type: ignore[union-attr]
     assert section.width / 2 / 12.0 < 0.75 * strain < 2 * 1.25 * section.width / 2 / 12.0
+
+
+def test_shells_that_were_popped_up_are_kept_where_the_size_that_fits_better_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried, said = list[rs.Rod](), list[str]()
+
+    def late(*_: object) -> None:
+        raise rs.OutOfTimeError("the time limit is over")
+
+    def found(grid: Any, final: Any, rod: rs.Rod, **options: Any) -> Any:
+        tried.append(rod)
+        return pop_up_stages(grid, final, rod, **{**options, "progress": late if len(tried) > 1 else silent})
+
+    monkeypatch.setattr("rodshell.run.pop_up_stages", found)
+    table = table_of_rods(tmp_path / "rods.csv", 4, 0.92)
+    job = rs.Job.of_table(table, unit="m", rod__material__preset="larch")
+    form = job.run(until="pop-up", announce=said.append)
+    assert len(tried) == 2
+    assert form.rod == tried[0] != tried[1]
+    assert form.status == "converged"
+    assert f"rods of {size_text(tried[1].section)} fit better, but were not popped up: the time limit is over" in said
+    assert f"coming to {percent(permanent_use(form))}; " in said[-1]
 
 
 @pytest.mark.parametrize("joint", [rs.Ball(), rs.Rigid()])
