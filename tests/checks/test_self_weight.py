@@ -108,7 +108,7 @@ def test_a_rubber_hemisphere_sinks_evenly_under_its_weight():
 def test_a_roof_of_thin_laths_is_said_first_not_to_stand():
     """3 x 10 mm over 12 m: their EA is 6.5e5 times EI over the square of the spacing. Differences of the stiffness on
     one side of a point lose this path after 120 factorisations."""
-    case = {"target.unit": "mm", "rod.material.preset": "larch", "checks.stages": 1}
+    case = {"target.unit": "mm", "rod.material.preset": "larch", "checks.stages": 0}
     results = rs.Job.load("examples/data/freeform.obj", case).run().archive().results
     assert {weighed.limit for weighed in results.self_weight.values()} == {"limit point"}
     assert results.verdict.reasons[0].startswith(
