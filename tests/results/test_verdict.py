@@ -142,12 +142,18 @@ def test_where_no_shell_was_computed_nothing_is_known(changes: list[tuple[str, A
     assert found.headline == f"Not known: {words}"
 
 
-def test_what_cannot_be_built_is_said_of_the_shell_that_was_computed() -> None:
-    """The other one did not converge, which is said after it."""
-    found = verdict(changed(*LOST, ("pop_up.clamped.stable", False), ("pop_up.clamped.negative_modes", 1)))
-    assert found.level == "unbuildable"
-    assert found.headline.startswith("Not buildable: with clamped ends the shell is unstable (1 buckling mode)")
-    assert "the pop-up with pinned ends did not converge: stalled" in found.reasons[1:]
+def test_a_shell_that_was_not_computed_might_be_built_where_the_other_one_cannot_be() -> None:
+    stalled = ("status", "pop-up (pinned) stalled")
+    found = verdict(changed(*LOST, stalled, ("pop_up.clamped.stable", False), ("pop_up.clamped.negative_modes", 1)))
+    assert found.level == "unknown"
+    assert found.headline.endswith("which says nothing about the shell itself: pop-up (pinned) stalled")
+    assert found.reasons[1].startswith("with clamped ends the shell is unstable (1 buckling mode)")
+    assert "the pop-up with pinned ends did not converge: stalled" in found.reasons[2:]
+
+
+def test_a_deployment_that_breaks_the_rods_cannot_be_built_whatever_the_ends_that_were_not_computed() -> None:
+    breaks = ("bending.deployment", {"utilisation": 1.69, "share": 0.25, "rod": "U03", "at": 0.2})
+    assert verdict(changed(*LOST, ("pop_up.clamped.stable", False), breaks)).level == "unbuildable"
 
 
 def test_no_more_is_promised_than_the_shell_carries() -> None:

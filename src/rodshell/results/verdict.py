@@ -51,7 +51,7 @@ def verdict(results: Results) -> Verdict:
 
     An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
     enough for their bends. Without one that can be used, or far off the target, the result is unbuildable; unknown if
-    no shell was computed: a computation that does not converge says nothing about the shell.
+    one that might be was not computed: a computation that does not converge says nothing about the shell.
 
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
@@ -88,7 +88,7 @@ def verdict(results: Results) -> Verdict:
     to_check = [
         *gravest, *weight, *sinks, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings
     ]  # fmt: skip
-    if len(lost) == len(shells):
+    if lost and not usable and not deployment:
         return _verdict("unknown", [*failed, *to_check])
     if not usable or deployment or off > FAR_OFF:
         return _verdict("unbuildable", to_check)
