@@ -20,7 +20,7 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Inner products (...) of arrays (..., 3); several times faster than by numpy's einsum on long arrays."""
-    if a.ndim == 2 and a.shape == b.shape and a.dtype == b.dtype == np.float64:
+    if a.ndim == 2 and a.shape == b.shape and a.dtype == b.dtype == np.float64 and a.flags.carray and b.flags.carray:
         return np.asarray(_dots(a, b))
     return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
 
