@@ -331,9 +331,10 @@ def test_report_puts_failure_and_then_warnings_once_before_all_else(archive: Arc
     result = {**archive.results.plain(), "status": "stalled", "pop_up": shells, **words}
     export(replace(archive, results=Results.of(result)), tmp_path, ["report"])
     page = (tmp_path / "report.html").read_text()
-    first = "Not buildable: with clamped ends the shell is unstable (1 buckling mode) and would snap to another shape"
+    first = "Not known: the computation did not converge, which says nothing about the shell itself: stalled"
     assert page.index(first) < page.index("&lt;script&gt;alert(1)") < page.index("<h2>")
     assert "<script>alert" not in page
+    assert "with clamped ends the shell is unstable (1 buckling mode) and would snap to another shape" in page
     assert "the pop-up with pinned ends did not converge: stalled" in page
     assert "With pinned ends the largest gap" not in page  # a shell that did not converge has no gap
     assert "U99: no two ends" in page
