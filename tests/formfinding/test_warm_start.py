@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.formfinding.popup import corresponding_rods, transferred_edges, transferred_nodes
+from rodshell.layout.transfer import corresponding_rods, transferred_edges, transferred_nodes
 from rodshell.nets import net_refinement
 from rodshell.nets.chebyshev import chebyshev_net
 from rodshell.nets.compass import axes, march

@@ -11,7 +11,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.methods import require_coupling
-from rodshell.formfinding.popup import FIRST_RISE, arched, laid_below
+from rodshell.formfinding.popup import FIRST_RISE, arched, flat_below
 from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.frames import dot
@@ -118,7 +118,7 @@ def dynamic_pop_up(
     mesh = footprint.mesh
     shell = Shell.of(mesh, rod, joint=joint, coupling=settings.coupling)
     ends = mesh.ends.ravel()
-    flat = laid_below(mesh, boundary.points, float(boundary.points.mean(axis=0)[2]))
+    flat = flat_below(mesh, boundary.points)
     state = shell.state(arched(footprint, flat, flat[ends], boundary))
 
     def supports(time: float) -> Supports:

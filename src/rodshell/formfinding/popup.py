@@ -13,15 +13,15 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints, median
+from rodshell.arrays import Floats
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
-from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import dot, unit
 from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
+from rodshell.layout.transfer import transferred_edges, transferred_nodes
 from rodshell.model import Shell
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, silent
@@ -46,7 +46,6 @@ MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70; to descend
 MOST_AGAIN = 8  # iterations from an earlier pop-up, before starting from the draped state
 MODES_PER_JOINT = 0.5  # negative modes: laths end 2 to 17 % off the target from more, other shells have less than 0.2
 NEARBY = 0.1  # of the length: a state further from the guess may be another equilibrium
-SAME_LINE = 0.25  # spacings
 
 
 @dataclass(frozen=True, eq=False)
@@ -444,87 +443,3 @@ def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary
         middle = raised[pairs].mean(axis=1)
         raised[pairs] = middle[:, None] + mesh.heights[pairs][:, :, None] * UP
     return raised
-
-
-def transferred_nodes(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
-    """(n, d) values at the nodes of the mesh `to`; zero on rods that have no counterpart.
-
-    Where two rods meet, the values transferred along them differ slightly: the mean is taken, without a kink in either.
-
-    Parameters
-    ----------
-    values : (m, d) at the m nodes of `mesh`, of any unit.
-    mesh, to : the two meshes.
-    """
-    total, count = np.zeros((to.node_count, values.shape[1])), np.zeros((to.node_count, 1))
-    along_rods = list[tuple[Ints, Floats, Floats]]()
-    for rod, old in corresponding_rods(mesh, to):
-        nodes, shares = to.nodes_of(rod), _shares(to, rod)
-        along_rod = _interpolated(shares, _shares(mesh, old), values[mesh.nodes_of(old)])
-        along_rods.append((nodes, shares, along_rod))
-        total[nodes] += along_rod
-        count[nodes] += 1
-    result = total / np.maximum(count, 1)
-    for nodes, shares, along_rod in along_rods:
-        at = np.flatnonzero((count[nodes, 0] > 1) | (np.arange(len(nodes)) % (len(nodes) - 1) == 0))
-        result[nodes] = along_rod + _interpolated(shares, shares[at], (result[nodes] - along_rod)[at])
-    return result
-
-
-def transferred_edges(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
-    """(e,) values at the edges of the mesh `to`; zero on rods that have no counterpart.
-
-    Parameters
-    ----------
-    values : (f,) at the f edges of `mesh`, of any unit.
-    mesh, to : the two meshes.
-    """
-    result = np.zeros(len(to.edges))
-    for rod, old in corresponding_rods(mesh, to):
-        now, before = _middles(_shares(to, rod)), _middles(_shares(mesh, old))
-        result[to.edge_rods == rod] = np.interp(now, before, values[mesh.edge_rods == old])
-    return result
-
-
-def corresponding_rods(mesh: GridMesh, to: GridMesh) -> list[tuple[int, int]]:
-    """Indices of each rod of `to` that has a counterpart in `mesh`, and of that: the nearest piece of its line.
-
-    Rods correspond by family and by their position in the lattice, points on them by their share of the rod's length.
-    """
-    before, now = _lattice_coordinates(mesh), _lattice_coordinates(to)
-    pairs = list[tuple[int, int]]()
-    for k, rod in enumerate(to.grid.rods):
-        apart = np.abs(before - now[k])
-        same = [j for j, old in enumerate(mesh.grid.rods) if old.family == rod.family and apart[j, 0] < SAME_LINE]
-        if same and rod.family != "free":
-            pairs.append((k, min(same, key=lambda j: apart[j, 1])))
-    return pairs
-
-
-def _lattice_coordinates(mesh: GridMesh) -> Floats:
-    """(m, 2) of each rod its line's offset from the anchor, in spacings, and its middle along the line [m]."""
-    rods = mesh.grid.rods
-    offset = np.array([rod.offset for rod in rods])
-    for family in ("u", "v"):
-        in_family = np.array([rod.family == family for rod in rods])
-        steps = np.diff(np.unique(offset[in_family]))
-        if len(steps):
-            offset[in_family] /= median(steps)
-    return np.column_stack([offset, [0.5 * (rod.start + rod.end) for rod in rods]])
-
-
-def _shares(mesh: GridMesh, rod: int) -> Floats:
-    """(n,) positions of a rod's nodes along it, from 0 to 1."""
-    line = mesh.grid.rods[rod]
-    return np.asarray((mesh.stations[mesh.rod_slice(rod)] - line.start) / line.length)
-
-
-def _middles(shares: Floats) -> Floats:
-    """(n - 1,) middles of the edges between nodes at `shares` (n,)."""
-    return np.asarray(0.5 * (shares[1:] + shares[:-1]))
-
-
-def _interpolated(now: Floats, before: Floats, values: Floats) -> Floats:
-    """(n, d) values at `now` (n,) by local cubics from those (m, d) at `before` (m,): linear interpolation would
-    give rods kinks."""
-    return on_curve(before, values, np.clip(now, before[0], before[-1]))

@@ -251,7 +251,7 @@ class Verdict(Record):
     level: Level = Field(
         description='"good": it pops up, stands under its own weight and can be built; "check": something has to be '
         'checked first; "unbuildable": no end condition gives a shell that can be built; "unknown": no shell was '
-        "computed, as where the computation did not converge"
+        "computed, as where the computation did not converge, or one that might be built was not"
     )
     reasons: tuple[Text, ...] = Field(min_length=1, description="sentences, the gravest first")
 
