@@ -266,16 +266,17 @@ def test_shells_that_were_popped_up_are_kept_where_the_size_that_fits_better_is_
 
 @pytest.mark.parametrize("joint", [rs.Ball(), rs.Rigid()])
 def test_shells_of_any_size_of_rod_bend_alike(joint: rs.Ball | rs.Rigid) -> None:
-    """Moments grow with EI; what is left is stretch, as the square of slenderness."""
+    """Moments grow with EI; what is left is stretch, as the square of slenderness. One shell may be the mirror image of
+    the other."""
     target, layout = half_sphere(5.0)
     shapes = []
     for radius in (1e-3, 4e-3):
         rod = rs.Rod(rs.Circle(radius), rs.Material.preset("gfrp"))
         form = rs.find_form(target, layout, rod, joint=joint, ends=("pinned",))
         shapes.append(bends_of_pop_ups(form.stages.popped.values(), rod))
-    thin, thick = shapes
-    for one, other in zip(thin[:3], thick[:3], strict=True):
-        assert np.abs(one - other).max() <= 0.01 * np.abs(other).max()
+    thin, thick = ([np.sort(np.abs(values)) for values in bends[:3]] for bends in shapes)
+    for one, other in zip(thin, thick, strict=True):
+        assert np.abs(one - other).max() <= 0.01 * other.max()
 
 
 @pytest.mark.parametrize("keys", [{}, {"rod.section.kind": "circle"}])
