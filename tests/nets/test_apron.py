@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.layout.flatgrid import whole_rods
 from rodshell.nets.apron import RINGS, with_apron
 from rodshell.nets.compass import Net
 
@@ -81,7 +82,8 @@ def twin(rods: list[rs.FlatRod], crossings: np.ndarray) -> set[tuple[str, float,
 def test_rods_are_prolonged_as_a_twin_in_plain_loops_prolongs_them(seed: int) -> None:
     random, net, crossings = random_net(seed)
     rods = random_rods(random)
-    grid = with_apron(rods, net, (LINES, LINES), CLEARANCE)
+    grid, whole = with_apron(rods, net, (LINES, LINES), CLEARANCE)
     found = {(rod.family, rod.offset, rod.start, rod.end, "" if rod.virtual else rod.name) for rod in grid.rods}
     assert found == twin(rods, crossings)
     assert any(rod.virtual for rod in grid.rods)
+    np.testing.assert_array_equal(whole, whole_rods(grid.rods, rods))

@@ -12,7 +12,7 @@ from math import degrees
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints, median
+from rodshell.arrays import Floats, Ints
 from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
@@ -20,7 +20,6 @@ from rodshell.geometry.frames import dot, unit
 from rodshell.joints import Joint
 from rodshell.kernels import njit
 from rodshell.layout import GridLayout, GridMesh, mesh_grid
-from rodshell.layout.flatgrid import whole_rods
 from rodshell.layout.mesh import spans_along
 from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -66,8 +65,7 @@ def bound_drape(
     eccentricity = joint.eccentricity if joint else 0.0
     near = warm_start.net if warm_start else None
     net = chebyshev_net(target, layout, anchor=anchor, warm_start=near, eccentricity=eccentricity)
-    grid = with_apron(net.rods, net.net, net.lines, CLEARANCE * layout.edge)
-    whole = whole_rods(grid.rods, net.rods)
+    grid, whole = with_apron(net.rods, net.net, net.lines, CLEARANCE * layout.edge)
     marks: list[list[float]] = [[] for _ in grid.rods]
     for rod_of, piece in zip(whole.tolist(), net.rods, strict=True):
         marks[rod_of] += (piece.start, piece.end)
@@ -91,7 +89,7 @@ def bound_drape(
         progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
     touching = np.zeros(mesh.node_count, dtype=bool)
-    touching[np.concatenate([mesh.rod_nodes[first : last + 1] for first, last in spans.tolist()])] = True
+    _mark(spans, mesh.rod_nodes, touching)
     on_target = np.flatnonzero(touching)
     value, gradient = target.level(found.state)
     steep = np.sqrt(dot(gradient, gradient))
@@ -144,6 +142,14 @@ def bound_drape(
     )
 
 
+@njit()
+def _mark(spans, rod_nodes, marked):  # type: ignore[no-untyped-def]
+    """Mark the nodes of the pieces of rods whose first and last entry of `rod_nodes` are `spans` (m, 2)."""
+    for piece in range(len(spans)):
+        for k in range(spans[piece, 0], spans[piece, 1] + 1):
+            marked[rod_nodes[k]] = True
+
+
 def _within_surface(rod: Rod) -> Rod:
     """The rod with EI2 in all directions.
 
@@ -156,7 +162,7 @@ def _within_surface(rod: Rod) -> Rod:
 
 def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
     """Edges as a penalty: stiff enough to outweigh bending, which grows with the square of the size over the edge."""
-    weight = max(LEAST_PENALTY, PENALTY * (target.size / median(stretch.rest_lengths)) ** 2)
+    weight = max(LEAST_PENALTY, PENALTY * (target.size / float(stretch.rest_lengths.mean())) ** 2)
     stiffness = weight * rod.bend_stiffness / target.size**2
     return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
 

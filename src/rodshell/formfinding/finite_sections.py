@@ -16,6 +16,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, median
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.kernels import njit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.bend_twist import BendTwist
@@ -123,14 +124,10 @@ def thickness_warnings(
     spacing : of the rods [m].
     """
     thick = rod_thickness(rod)
-    a, b = mesh.edges.T
-    edges = touching[a] & touching[b]
-    a, b = a[edges], b[edges]
-    chord, turn = (each.take(b, axis=0) - each.take(a, axis=0) for each in (positions, normal))
-    bent = thick * dot(turn, chord) / dot(chord, chord)
+    bent = thick * _curvatures(normal, positions, mesh.edges, touching)
     if not (np.abs(bent).max(initial=0.0) > THICK or thick > CLOSE * spacing):
         return ()
-    change = 0.5 * np.bincount(mesh.edge_rods[edges], weights=bent * mesh.edge_lengths[edges])
+    change = 0.5 * np.bincount(mesh.edge_rods, weights=bent * mesh.edge_lengths)
     share = 50 * np.abs(bent).max(initial=0.0)
     return (
         f"the rods are {length_text(thick)} thick and their joints hold their centre lines together: laid one above "
@@ -138,6 +135,20 @@ def thickness_warnings(
         f"and longer in the other, and joint distances up to {share:.2g} %; give the distance of their centre lines "
         "(joint.eccentricity), unless they are notched at the joints",
     )
+
+
+@njit(error_model="numpy")
+def _curvatures(normal, positions, edges, touching):  # type: ignore[no-untyped-def]
+    """(e,) the surface's curvature along each edge, by the normals at its ends [1/m]; 0 if one does not touch it."""
+    result = np.zeros(len(edges))
+    for e in range(len(edges)):
+        a, b, turn, square = edges[e, 0], edges[e, 1], 0.0, 0.0
+        if touching[a] and touching[b]:
+            for k in range(3):
+                chord = positions[b, k] - positions[a, k]
+                turn, square = turn + (normal[b, k] - normal[a, k]) * chord, square + chord * chord
+            result[e] = turn / square
+    return result
 
 
 def rise(points: Floats) -> float:

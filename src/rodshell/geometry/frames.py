@@ -20,15 +20,21 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Inner products (...) of arrays (..., 3); several times faster than by numpy's einsum on long arrays."""
-    if a.ndim == 2 and a.shape == b.shape and a.dtype == b.dtype == np.float64 and a.flags.carray and b.flags.carray:
+    if a.shape == b.shape and _is_table(a) and _is_table(b):
         return np.asarray(_dots(a, b))
     return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
 
 
 def unit(a: Floats) -> Floats:
     """Vectors (..., d) scaled to length 1; several times faster than by numpy's norm on long arrays."""
-    square = dot(a, a) if a.shape[-1] == 3 else np.sum(a * a, axis=-1)
-    return np.asarray(a / np.sqrt(square)[..., None])
+    if a.shape[-1] != 3:
+        return np.asarray(a / np.sqrt(np.sum(a * a, axis=-1))[..., None])
+    return np.asarray(_units(a) if _is_table(a) else a / np.sqrt(dot(a, a))[..., None])
+
+
+def _is_table(a: Floats) -> bool:
+    """Whether the kernels below take an array as it is, (n, 3)."""
+    return a.ndim == 2 and a.shape[1] == 3 and a.dtype == np.float64 and a.flags.carray
 
 
 @njit()
@@ -36,6 +42,16 @@ def _dots(a, b):  # type: ignore[no-untyped-def]
     result = np.empty(len(a))
     for n in range(len(a)):
         result[n] = a[n, 0] * b[n, 0] + a[n, 1] * b[n, 1] + a[n, 2] * b[n, 2]
+    return result
+
+
+@njit(error_model="numpy")
+def _units(a):  # type: ignore[no-untyped-def]
+    result = np.empty_like(a)
+    for n in range(len(a)):
+        size = np.sqrt(a[n, 0] * a[n, 0] + a[n, 1] * a[n, 1] + a[n, 2] * a[n, 2])
+        for k in range(3):
+            result[n, k] = a[n, k] / size
     return result
 
 

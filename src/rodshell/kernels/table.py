@@ -20,6 +20,10 @@ KERNELS: dict[str, dict[str, str]] = {
     },
     "formfinding.bound_drape": {
         "_correct": "f2 f2 i1 i1 i1 f1 b1 f2",
+        "_mark": "i2 i1 b1",
+    },
+    "formfinding.finite_sections": {
+        "_curvatures": "f2 f2 i2 b1",
     },
     "formfinding.pipeline": {
         "_edge_middles": "f2 i1 i1 i1 f1",
@@ -31,6 +35,7 @@ KERNELS: dict[str, dict[str, str]] = {
     },
     "geometry.frames": {
         "_dots": "f2 f2",
+        "_units": "f2",
     },
     "joints.relative_rotation": {
         "_relative_rotation": "f2 i2 i2 f2 f3 c2 f1 f3 f3 f2 f3",
@@ -60,7 +65,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_stretches": "f1 f1 b2 f2 f",
     },
     "nets.chebyshev": {
-        "_interpolate": "f1 f1 f3 i1 b1 i1 f1 f2",
+        "_interpolate": "f1 f1 f3 i1 b1 i1 f1 i1 f2",
         "_sharpest": "f3 b2",
     },
     "nets.compass": {
@@ -83,9 +88,11 @@ KERNELS: dict[str, dict[str, str]] = {
         "_squares": "f3 f1 f1",
     },
     "nets.net_extent": {
+        "_divided": "f1 i1",
         "_want": "b2 f1 f1 i f1 f1 f f b2",
     },
     "nets.net_refinement": {
+        "_add_change": "f3 f3 f",
         "_arms": "f3 f1 f1 i i",
         "_chosen": "f3 b2 i i i2",
         "_put_arms": "f2 i1 i i f3",

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets.compass import Net
@@ -18,8 +18,10 @@ from rodshell.nets.compass import Net
 RINGS = 2  # of joints: on a 0.2 m hemisphere at 40 mm spacing the ends are 0.1 mm off the net; 0.5 mm with 1 ring
 
 
-def with_apron(rods: Sequence[FlatRod], net: Net, lines: tuple[Floats, Floats], clearance: float) -> FlatGrid:
-    """The flat grid of rods, each prolonged past both ends.
+def with_apron(
+    rods: Sequence[FlatRod], net: Net, lines: tuple[Floats, Floats], clearance: float
+) -> tuple[FlatGrid, Ints]:
+    """The flat grid of rods, each prolonged past both ends; and the rod of it (m,) that each is a piece of.
 
     Pieces of a line become one rod where the net continues between them. Lines that are crossed only there become
     virtual rods. A rod keeps its end where the net ends.
@@ -39,7 +41,14 @@ def with_apron(rods: Sequence[FlatRod], net: Net, lines: tuple[Floats, Floats], 
         for name, stations, offsets, live in (("u", u, v, alive.T), ("v", v, u, alive))
     ]
     both = families[0].joints.T | families[1].joints
-    return FlatGrid.of([*families[0].prolonged(np.ascontiguousarray(both.T)), *families[1].prolonged(both)])
+    (u_rods, u_whole), (v_rods, v_whole) = (
+        families[0].prolonged(np.ascontiguousarray(both.T)),
+        families[1].prolonged(both),
+    )
+    whole = np.empty(len(rods), dtype=np.intp)
+    along_u = np.array([rod.family == "u" for rod in rods], dtype=bool)
+    whole[along_u], whole[~along_u] = u_whole, len(u_rods) + v_whole
+    return FlatGrid.of([*u_rods, *v_rods]), whole
 
 
 class _Family:
@@ -66,24 +75,26 @@ class _Family:
         self.rods = [rod for rod in rods if rod.family == name]
         laid = np.array([(rod.offset, rod.start, rod.end) for rod in self.rods]).reshape(-1, 3)
         found = _stretches(stations, offsets, live, laid, clearance)
-        self.stretches, self.line_of, self.first_rod, self.ends, self.joints = found
+        self.stretches, self.line_of, self.stretch_of, self.first_rod, self.ends, self.joints = found
 
-    def prolonged(self, joints: Bools) -> list[FlatRod]:
+    def prolonged(self, joints: Bools) -> tuple[list[FlatRod], Ints]:
         """A rod for each stretch with rods on it, or with at least two `joints` (m, n): from the first to the last
-        joint, its own ends included."""
+        joint, its own ends included; and which of them each rod is a piece of."""
         kept, ends = _prolong(self.stations, self.stretches, joints, self.first_rod, self.ends)
         columns = self.first_rod[kept].tolist(), self.offsets[self.line_of[kept]].tolist(), ends.tolist()
         make = FlatRod.u if self.name == "u" else FlatRod.v
-        return [
+        rods = [
             self.rods[rod].cut(a, b) if rod >= 0 else make(f"apron {self.name.upper()} {c:+.4f}", c, a, b, virtual=True)
             for rod, c, (a, b) in zip(*columns, strict=True)
         ]
+        return rods, np.searchsorted(kept, self.stretch_of)
 
 
 @njit()
 def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-untyped-def]
-    """Of each node (m, n) its stretch; of each stretch (k,) its line, its first rod, or -1, and where its rods start
-    and end (k, 2); and the joints (m, n), see `_Family`. Each of `rods` (r, 3) has an offset, a start and an end."""
+    """Of each node (m, n) its stretch; of each stretch (k,) its line; of each rod (r,) its stretch; of each stretch its
+    first rod, or -1, and where its rods start and end (k, 2); and the joints (m, n), see `_Family`. Each of `rods`
+    (r, 3) has an offset, a start and an end."""
     (lines, nodes), count = live.shape, 0
     stretches, joints = np.empty((lines, nodes), dtype=np.int64), np.zeros((lines, nodes), dtype=np.bool_)
     line_of = np.empty(lines * (nodes + 1), dtype=np.int64)
@@ -95,7 +106,7 @@ def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-unt
                 line_of[count] = m
             stretches[m, n] = count
         count += 1
-    first_rod, ends = np.full(count, -1), np.empty((count, 2))
+    stretch_of, first_rod, ends = np.empty(len(rods), dtype=np.int64), np.full(count, -1), np.empty((count, 2))
     for k in range(count):
         ends[k, 0], ends[k, 1] = np.inf, -np.inf
     for rod in range(len(rods)):
@@ -106,7 +117,7 @@ def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-unt
         for n in range(nodes):
             if live[line, n] and abs(stations[n] - middle) < least:
                 node, least = n, abs(stations[n] - middle)
-        k = stretches[line, node]
+        k = stretch_of[rod] = stretches[line, node]
         if first_rod[k] < 0:
             first_rod[k] = rod
         ends[k, 0], ends[k, 1] = min(ends[k, 0], rods[rod, 1]), max(ends[k, 1], rods[rod, 2])
@@ -118,7 +129,7 @@ def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-unt
                 stop += stations[n] < ends[k, 1] + clearance
             for n in range(max(first, 0), min(stop, nodes)):
                 joints[line_of[k], n] |= live[line_of[k], n]
-    return stretches, line_of, first_rod, ends, joints
+    return stretches, line_of, stretch_of, first_rod, ends, joints
 
 
 @njit()

@@ -15,7 +15,6 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, NetLimitError
-from rodshell.geometry.frames import cross
 from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.flatgrid import Family
@@ -77,21 +76,19 @@ class ChebyshevNet:
         -------
         (n, 3) points [m].
         """
-        return self._along((rod,), np.zeros(1, dtype=np.intp), s)
+        return self._along((rod,), np.zeros(1, dtype=np.intp), s, np.arange(len(s)), len(s))
 
     def node_positions(self, mesh: GridMesh) -> Floats:
         """As `positions`, of the nodes (n, 3) of a mesh of such rods [m]; at a joint by the last of its rods."""
-        result = np.empty((mesh.node_count, 3))
-        result[mesh.rod_nodes] = self._along(mesh.grid.rods, mesh.rod_start, mesh.stations)
-        return result
+        return self._along(mesh.grid.rods, mesh.rod_start, mesh.stations, mesh.rod_nodes, mesh.node_count)
 
-    def _along(self, rods: Sequence[FlatRod], start: Ints, s: Floats) -> Floats:
-        """Points (k, 3) [m] at the material coordinates `s` (k,) [m] of rods one after the other, which begin at
-        `start` (m,) in `s`."""
+    def _along(self, rods: Sequence[FlatRod], start: Ints, s: Floats, nodes: Ints, count: int) -> Floats:
+        """Points (count, 3) [m] of the `nodes` (k,) at the material coordinates `s` (k,) [m] of rods one after the
+        other, which begin at `start` (m,) in `s`."""
         offset, across = np.array([rod.offset for rod in rods]), np.array([rod.family == "v" for rod in rods])
         line = np.where(across, _nearest(self.net.u, offset), _nearest(self.net.v, offset))
-        result = np.empty((len(s), 3))
-        _interpolate(self.net.u, self.net.v, self.net.points, line, across, np.append(start, len(s)), s, result)
+        result, start = np.empty((count, 3)), np.append(start, len(s))
+        _interpolate(self.net.u, self.net.v, self.net.points, line, across, start, s, nodes, result)
         return result
 
     def __repr__(self) -> str:
@@ -236,20 +233,18 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
     ------
     NetLimitError : a node next to an inside one is missing.
     """
-    i, j, whole = _sharpest(net.points, net.inside)
+    i, j, angle, whole = _sharpest(net.points, net.inside)
     if not whole:
         raise _hole(net)
-    along, across = net.points[i + 1, j] - net.points[i - 1, j], net.points[i, j + 1] - net.points[i, j - 1]
     x, y, z = net.points[i, j].tolist()
-    normal = cross(along, across)
-    return float(np.arctan2(np.sqrt(normal @ normal), abs(along @ across))), (x, y, z)
+    return angle, (x, y, z)
 
 
 @njit(error_model="numpy")
 def _sharpest(points, inside):  # type: ignore[no-untyped-def]
-    """Indices of the inside node with the smallest angle, which has the largest cosine; and whether the net has all
-    nodes next to the inside ones."""
-    i_found, j_found, largest, whole = 0, 0, -1.0, True
+    """Indices of the inside node with the smallest angle, which has the largest cosine; that angle [rad]; and whether
+    the net has all nodes next to the inside ones."""
+    i_found, j_found, angle, largest, whole = 0, 0, 0.5 * np.pi, -1.0, True
     for i in range(1, len(inside) - 1):
         for j in range(1, inside.shape[1] - 1):
             if inside[i, j]:
@@ -260,7 +255,15 @@ def _sharpest(points, inside):  # type: ignore[no-untyped-def]
                 whole &= not np.isnan(aa + bb)
                 if ab * ab > largest * aa * bb:
                     i_found, j_found, largest = i, j, ab * ab / (aa * bb)
-    return i_found, j_found, whole
+    i, j, square, inner = i_found, j_found, 0.0, 0.0
+    if largest >= 0.0:
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            a, b = points[i + 1, j, m] - points[i - 1, j, m], points[i, j + 1, n] - points[i, j - 1, n]
+            c, d = points[i + 1, j, n] - points[i - 1, j, n], points[i, j + 1, m] - points[i, j - 1, m]
+            square, inner = square + (a * b - c * d) ** 2, inner + a * d
+        angle = np.arctan2(np.sqrt(square), abs(inner))
+    return i, j, angle, whole
 
 
 def _nearest(ascending: Floats, values: Floats) -> Ints:
@@ -269,8 +272,9 @@ def _nearest(ascending: Floats, values: Floats) -> Ints:
 
 
 @njit(error_model="numpy")
-def _interpolate(u, v, points, line, across, start, s, result):  # type: ignore[no-untyped-def]
-    """Points `result` (k, 3) at the places `s` (k,) of lines of a net, by cubics through the four nearest known nodes.
+def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: ignore[no-untyped-def]
+    """Points of the `nodes` (k,), put into `result`, at the places `s` (k,) of lines of a net, by cubics through the
+    four nearest known nodes.
 
     line, across : (m,) index of each line in its family, and whether that is family v.
     start : (m + 1,) where each line begins in `s`.
@@ -303,7 +307,7 @@ def _interpolate(u, v, points, line, across, start, s, result):  # type: ignore[
                 value = 0.0
                 for j in range(near):
                     value += shares[j] * there[first + j, d]
-                result[e, d] = value
+                result[nodes[e], d] = value
 
 
 def _extrapolate(
@@ -314,9 +318,9 @@ def _extrapolate(
     sets = list[Lines]()
     for net in nets:
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
-        along_u = np.ascontiguousarray(net.points[:, column].transpose(1, 0, 2))
-        sets.append(Lines(net.u, along_u, np.ascontiguousarray(net.inside[:, column].T)))
-        sets.append(Lines(net.v, net.points[row], net.inside[row]))
+        along_u = np.ascontiguousarray(net.points.take(column, axis=1).transpose(1, 0, 2))
+        sets.append(Lines(net.u, along_u, np.ascontiguousarray(net.inside.take(column, axis=1).T)))
+        sets.append(Lines(net.v, net.points.take(row, axis=0), net.inside.take(row, axis=0)))
     cuts = cut_lines(target, sets, depth=depth)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
     in_u, errors_u = extrapolated(cuts[0], cuts[2], len(lines.v), step)

@@ -306,12 +306,24 @@ def _coarser(target: Target) -> str:
 def _subdivided(offsets: Floats, edge: float) -> Floats:
     """Material coordinates of nodes: from line to line an even number of at least six steps, as many as edges if
     these are enough."""
-    gaps = np.diff(offsets)
-    edges = edge_counts(gaps, edge)
-    steps = 2 * np.where(edges < FEWEST_STEPS, np.maximum(FEWEST_STEPS // 2, edges), (edges + 1) // 2)
-    span = np.repeat(np.arange(len(edges)), steps)
-    along = np.arange(len(span)) - np.repeat(np.cumsum(steps) - steps, steps)
-    return np.append(offsets[span] + gaps[span] * along / steps[span], offsets[-1])
+    return np.asarray(_divided(offsets, edge_counts(np.diff(offsets), edge)))
+
+
+@njit()
+def _divided(offsets, edges):  # type: ignore[no-untyped-def]
+    """See `_subdivided`; `edges` (n - 1,) from each of the `offsets` (n,) to the next."""
+    steps, count = np.empty_like(edges), 0
+    for k in range(len(edges)):
+        few = edges[k] < FEWEST_STEPS
+        steps[k] = 2 * (max(FEWEST_STEPS // 2, edges[k]) if few else (edges[k] + 1) // 2)
+        count += steps[k]
+    result, filled = np.empty(count + 1), 0
+    for k in range(len(edges)):
+        for n in range(steps[k]):
+            result[filled] = offsets[k] + (offsets[k + 1] - offsets[k]) * n / steps[k]
+            filled += 1
+    result[filled] = offsets[len(edges)]
+    return result
 
 
 SURELY = 0.96  # of the margin: the ends of two nets in different steps differ slightly

@@ -80,9 +80,20 @@ def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
     )
     if coarse <= CLEARLY * fine:
         return near
-    change = near.points - interpolated(coarser, near.u, near.v)
-    np.copyto(change, 0.0, where=np.isnan(change))
-    return Net(near.u, near.v, near.points + (fine - requested) / (coarse - fine) * change)
+    points = interpolated(coarser, near.u, near.v)
+    _add_change(near.points, points, (fine - requested) / (coarse - fine))
+    return Net(near.u, near.v, points)
+
+
+@njit()
+def _add_change(near, coarser, share):  # type: ignore[no-untyped-def]
+    """Put into `coarser` (nu, nv, 3) the points `near` (nu, nv, 3) with a share of their change from there, if both are
+    known."""
+    for i in range(near.shape[0]):
+        for j in range(near.shape[1]):
+            for k in range(3):
+                change = near[i, j, k] - coarser[i, j, k]
+                coarser[i, j, k] = near[i, j, k] + share * (0.0 if np.isnan(change) else change)
 
 
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:

@@ -245,7 +245,9 @@ def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | 
     """
     if flat_coordinates is None:
         return Qdldl(assembly.indptr, assembly.indices)
-    return Multifrontal(assembly.indptr, assembly.indices, flat_coordinates[free.count > 0], blocks=assembly.rows)
+    return Multifrontal(
+        assembly.indptr, assembly.indices, flat_coordinates.compress(free.count > 0, axis=0), blocks=assembly.rows
+    )
 
 
 def half_width(points: Floats) -> float:
