@@ -93,7 +93,7 @@ def bound_drape(
     on_target = np.flatnonzero(touching)
     value, gradient = target.level(found.state)
     steep = np.sqrt(dot(gradient, gradient))
-    normal = gradient / steep[:, None]
+    normal = unit(gradient)
     pull = dot(normal, found.gradient)[on_target]  # force of the target along the outward normal [N]
     warnings = [*target.warnings, *net.warnings]
     strong = None

@@ -9,6 +9,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped
 from rodshell.geometry.frames import unit
+from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
 from rodshell.validation import array, instance, whole
@@ -171,16 +172,32 @@ def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     ----------
     positions : (n, 3) of the mesh's nodes [m].
     """
-    first, last = mesh.rod_start, mesh.rod_stop - 1
-    inwards, rows = np.minimum(np.arange(3)[:, None], last - first), np.empty((3, 2 * len(first)), dtype=np.intp)
-    rows[:, ::2], rows[:, 1::2] = first + inwards, last - inwards  # a rod of one edge counts it twice
-    x, at = positions.take(mesh.rod_nodes[rows], axis=0), mesh.stations[rows]
-    h, h_before = np.abs(at[0] - at[1]), np.abs(at[1] - at[2])
-    tangents = unit(x[0] - x[1])
-    bent = h_before > 0
-    change = tangents[bent] - unit((x[1] - x[2])[bent])
-    tangents[bent] += change * (h / (h + h_before))[bent, None]
-    return unit(tangents)
+    return unit(_end_tangents(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
+
+
+@njit(error_model="numpy")
+def _end_tangents(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
+    """As `end_tangents`, of about length 1."""
+    result = np.empty((2 * len(rod_start), 3))
+    for end in range(len(result)):
+        first, last = rod_start[end // 2], rod_stop[end // 2] - 1
+        a, inwards = (first, 1) if end % 2 == 0 else (last, -1)
+        b, c, turn = a + inwards, a + 2 * inwards, 0.0
+        edge = before = _direction(positions, rod_nodes[b], rod_nodes[a])
+        if first <= c <= last:  # turned further as from the edge before to the last
+            before = _direction(positions, rod_nodes[c], rod_nodes[b])
+            turn = (stations[a] - stations[b]) / (stations[a] - stations[c])
+        for k in range(3):
+            result[end, k] = edge[k] + turn * (edge[k] - before[k])
+    return result
+
+
+@njit()
+def _direction(positions, a, b):  # type: ignore[no-untyped-def]
+    """Unit vector from node a to node b."""
+    x, y, z = positions[b, 0] - positions[a, 0], positions[b, 1] - positions[a, 1], positions[b, 2] - positions[a, 2]
+    length = np.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
 
 
 def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]]]:

@@ -28,6 +28,9 @@ KERNELS: dict[str, dict[str, str]] = {
     "formfinding.pipeline": {
         "_edge_middles": "f2 i1 i1 i1 f1",
     },
+    "formfinding.trim": {
+        "_end_tangents": "f2 i1 i1 i1 f1",
+    },
     "geometry.curves": {
         "_on_curve": "f1 f2 f1",
         "lagrange": "f2 f3 f1",
@@ -65,6 +68,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_stretches": "f1 f1 b2 f2 f",
     },
     "nets.chebyshev": {
+        "_columns": "f3 b2 i1",
         "_interpolate": "f1 f1 f3 i1 b1 i1 f1 i1 f2",
         "_sharpest": "f3 b2",
     },

@@ -215,7 +215,8 @@ def _offsets(lines: object) -> tuple[tuple[float, ...], ...]:
     families = lines if isinstance(lines, tuple | list) else ()
     if len(families) != 2:
         raise InputError(f"layout lines must be {sentence}, not {short(lines)}")
-    return tuple(numbers("layout lines", family, sentence, np.size(family)) for family in families)
+    sizes = (len(family) if isinstance(family, tuple | list) else np.size(family) for family in families)
+    return tuple(numbers("layout lines", family, sentence, size) for family, size in zip(families, sizes, strict=True))
 
 
 def _counts(rods: object) -> tuple[int, int]:
@@ -235,4 +236,4 @@ def rod_names(family: Family, count: int) -> list[str]:
     count : number of rods of the family, which determines the number of digits.
     """
     letter, digits = family.upper(), max(2, len(str(count)))
-    return [f"{letter}{k + 1:0{digits}d}" for k in range(count)]
+    return [letter + str(k + 1).zfill(digits) for k in range(count)]

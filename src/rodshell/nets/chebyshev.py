@@ -318,8 +318,7 @@ def _extrapolate(
     sets = list[Lines]()
     for net in nets:
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
-        along_u = np.ascontiguousarray(net.points.take(column, axis=1).transpose(1, 0, 2))
-        sets.append(Lines(net.u, along_u, np.ascontiguousarray(net.inside.take(column, axis=1).T)))
+        sets.append(Lines(net.u, *_columns(net.points, net.inside, column)))
         sets.append(Lines(net.v, net.points.take(row, axis=0), net.inside.take(row, axis=0)))
     cuts = cut_lines(target, sets, depth=depth)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
@@ -332,6 +331,18 @@ def _extrapolate(
     points = sets[2].points[worst] if worst < len(errors_u) else sets[3].points[worst - len(errors_u)]
     known = points[np.isfinite(points[:, 0])]
     return (in_u, in_v), float(errors[worst]), known[np.argmin(np.abs(target.margin(known)))]
+
+
+@njit()
+def _columns(points, inside, columns):  # type: ignore[no-untyped-def]
+    """The nodes (m, n, 3) in some columns of a net (n, k, 3), and which of them are inside (m, n)."""
+    nodes, within = np.empty((len(columns), len(points), 3)), np.empty((len(columns), len(points)), dtype=np.bool_)
+    for m in range(len(columns)):
+        for n in range(len(points)):
+            within[m, n] = inside[n, columns[m]]
+            for k in range(3):
+                nodes[m, n, k] = points[n, columns[m], k]
+    return nodes, within
 
 
 def _name_rods(
