@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import rodshell as rs
 from rodshell import threads
 from rodshell.model import Assembly, Freedom, Shell, assembly
 from rodshell.rods import elements
-from rodshell.solve import modes
 from rodshell.solve.modes import linear_buckling
 from tests.solve import stability_problems as known
 
@@ -48,13 +48,13 @@ def blas_threads():
 def test_while_modes_are_looked_for_the_blas_has_one_thread(monkeypatch):
     """It would keep ours from the processors: on two, a load check took five times as long."""
     column, asked = known.eulers_column(), list[set[int]]()
-    lanczos = modes.eigsh
+    lanczos = linalg.eigsh
 
     def listen(*given, **options):
         asked.append(blas_threads())
         return lanczos(*given, **options)
 
-    monkeypatch.setattr(modes, "eigsh", listen)
+    monkeypatch.setattr(linalg, "eigsh", listen)
     with threadpool_limits(2, user_api="blas"):
         before = blas_threads()
         linear_buckling(column.unloaded, column.load)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
-from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.layout import GridMesh
@@ -127,6 +126,10 @@ def ties(count: int, images: Sequence[Image]) -> csc_array:
     images : where each symmetry maps them.
     """
     every = np.arange(count)
+    if not images:
+        return csc_array((np.ones(count), (every, every)), shape=(count, count))
+    from scipy.sparse.csgraph import connected_components  # here: it takes a twentieth of a second to import
+
     rows, columns = [every], [every]
     for image in images:
         opposite = image.sign < 0

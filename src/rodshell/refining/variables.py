@@ -208,6 +208,9 @@ def design_of(structure: Structure, families: Sequence[Family]) -> Design:
     """
     mesh, draped = structure.mesh, structure.popped.boundary.draped
     shapes = [structure.popped.positions, *([] if draped is None else [draped])]
-    operations = symmetries(mesh, np.column_stack(shapes))
     parts = [family.on(structure) for family in families]
-    return Design([Tied(part, ties(len(part.box.start), [part.image(by) for by in operations])) for part in parts])
+    counts = [len(part.box.start) for part in parts]
+    shared = max(counts, default=0) > 1  # a single variable is the same for all rods
+    operations = symmetries(mesh, np.column_stack(shapes)) if shared else ()
+    images = [[part.image(by) for by in operations] for part in parts]
+    return Design([Tied(part, ties(count, of)) for part, count, of in zip(parts, counts, images, strict=True)])

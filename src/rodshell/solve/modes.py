@@ -17,9 +17,7 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, diags
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
 from rodshell.arrays import Floats
@@ -211,6 +209,8 @@ def _largest(tangent: Tangent, upper: csc_matrix, count: int, least: float) -> t
     for _ in range(TRIES):
         wanted = min(wanted, available)
         if size <= DENSE or wanted >= size - 1:
+            from scipy.linalg import eigh
+
             values, vectors = eigh(matrix.toarray(), stiffness.toarray())
             order = np.argsort(values)[::-1]
         else:
@@ -250,6 +250,8 @@ def _above(tangent: Tangent, upper: csc_matrix, value: float) -> int:
 
 
 def _lanczos(tangent: Tangent, matrix: csc_matrix, stiffness: csc_matrix, count: int) -> tuple[Floats, Floats]:
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh  # here, as most forms do not need it
+
     size = tangent.freedom.size
     inverse = LinearOperator((size, size), matvec=tangent.factors.solve, dtype=float)
     start = np.sin(1.0 + np.arange(size) ** 2)  # the same at every run, and no symmetry of the structure is one of it
