@@ -17,6 +17,7 @@ from rodshell.formfinding import pop_up_stages
 from rodshell.layout import straight_rods
 from rodshell.progress import silent
 from rodshell.results.summary import summary_text
+from rodshell.results.verdict import verdict
 from rodshell.results.wording import percent
 from rodshell.rods.section import TRADE_SIZES, size_text
 
@@ -357,9 +358,13 @@ def test_a_summary_claims_no_share_of_the_strength_that_is_not_so(tmp_path: Path
     )
     assert "thinner than any size" not in summary_text(found)
     thin = found.rod.model_copy(update={"section": rs.results.records.Section(kind="circle", radius=0.4e-3)})
-    assert "; thinner than any size that is sold, the first of which is a rod of 1 mm\n" in (
-        summary_text(found.model_copy(update={"rod": thin}))
+    unsold = found.model_copy(update={"rod": thin})
+    assert "; thinner than any size that is sold, the first of which is a rod of 1 mm\n" in summary_text(unsold)
+    assert any(
+        reason.startswith("the chosen section is thinner than any size that is sold") and "a rod of 1 mm" in reason
+        for reason in verdict(unsold).reasons
     )
+    assert not any("thinner than any" in reason for reason in verdict(found).reasons)
 
 
 @pytest.mark.slow

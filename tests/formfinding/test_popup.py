@@ -4,6 +4,7 @@ Positions of two runs that should agree differ by what Newton leaves (it stops a
 next of which would be 1e-12) and by round-off.
 """
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -432,16 +433,23 @@ def test_the_work_of_a_path_in_short_steps_is_counted_and_newtons_method_stops_w
     np.testing.assert_array_equal(stopped.positions, whole.positions)
 
 
-def test_a_time_limit_ends_the_short_steps_too():
-    form = thin_roof()
+def test_a_time_limit_ends_the_short_steps_too_where_they_have_got():
+    form, shares = thin_roof(), list[float]()
 
     def progress(stage, detail, residual):
-        if "short steps" in detail:
-            raise OutOfTimeError("out of time after 3 s")
+        if found := re.search(r"short steps, (\S+) %", detail):
+            shares.append(float(found[1]) / 100)
+            if len(shares) > 3:
+                raise OutOfTimeError("out of time after 3 s")
 
-    flat = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat", progress=progress)
-    assert flat.report.status is Status.OUT_OF_TIME
-    assert flat.report.reason == "out of time after 3 s"
+    stopped = rs.pop_up(form.footprint, form.boundary, form.rod, ends="pinned", start="flat", progress=progress)
+    assert stopped.report.status is Status.OUT_OF_TIME
+    assert stopped.report.reason == "out of time after 3 s"
+    assert popup.FIRST_RISE < shares[-1] < 1
+    mesh, goals = form.footprint.mesh, form.boundary.points
+    flat = popup.flat_below(mesh, goals)[mesh.ends.ravel()]
+    ends = stopped.positions[mesh.ends.ravel()]
+    np.testing.assert_allclose(ends, (1 - shares[-1]) * flat + shares[-1] * goals, rtol=0, atol=4e-3)
 
 
 def test_a_limit_of_factorisations_is_kept_from_flat():

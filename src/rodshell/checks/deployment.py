@@ -311,7 +311,7 @@ class _Path:
             shortest=SHORTEST,
             snap=snap,
             most_factorizations=most,
-            progress=self._progress,
+            progress=lambda share, _: self._progress(share),
         )
         self.factorizations += way.factorizations
         return way

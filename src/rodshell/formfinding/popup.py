@@ -343,15 +343,21 @@ class _Stages:
         if not here.report.stable:
             kept, other = (here, failed) if here.report.status is Status.OUT_OF_TIME else (failed, here)
             return replace(kept, report=kept.report.after(other.report))
+        reached = here
+
+        def at_share(t: float, found: Equilibrium) -> None:
+            nonlocal reached
+            reached = found
+            self.progress("pop-up", f"from flat in short steps, {100 * t:.1f} %", 0.0)
+
         try:
             path = trace(
                 problem_at, here, FIRST_RISE, 1.0,
-                shortest=SHORTEST_RISE, snap=True, most_factorizations=MOST_TRACED,
-                progress=lambda t: self.progress("pop-up", f"from flat in short steps, {100 * t:.1f} %", 0.0),
+                shortest=SHORTEST_RISE, snap=True, most_factorizations=MOST_TRACED, progress=at_share,
             )  # fmt: skip
         except OutOfTimeError as late:
-            work = failed.report.after(here.report)
-            return replace(failed, report=replace(work, status=Status.OUT_OF_TIME, reason=str(late)))
+            work = reached.report.after(failed.report, *(() if reached is here else (here.report,)))
+            return replace(reached, report=replace(work, status=Status.OUT_OF_TIME, reason=str(late)))
         solves = (failed.report, here.report, *path.reports)
         work = path.found.report.after(*(report for report in solves if report is not path.found.report))
         if path.t == 1:

@@ -11,9 +11,10 @@ from math import inf, sqrt
 from rodshell.results.records import Ends, RodType
 from rodshell.results.records import Section as RodSection
 from rodshell.results.results import Results, SelfWeight
+from rodshell.results.sizes_sold import half_sides, sizes_sold
 from rodshell.results.strength_used import THIN, bent_of, holds_while_erected, strength_name
 from rodshell.results.wording import part_of_weight, percent, rounded, rounded_down, shown_factor
-from rodshell.rods.section import TRADE_SIZES, Section, size_text
+from rodshell.rods.section import Section, size_text
 
 WITHOUT_STIFFNESS = ("ball", "pin", "rigid")  # joints
 ENOUGH = 1.05  # times its own weight: beyond what similarity is off
@@ -108,9 +109,7 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> str:
     rod, kind = results.rod, (results.joint.kind if results.joint else None) or "ball"
     if factor <= 0 or rod is None or kind not in WITHOUT_STIFFNESS:
         return ""
-    preset = rod.preset.name if rod.preset else None
-    sold = next((sizes for name, sizes in TRADE_SIZES.items() if name == preset), ())
-    for section in () if results.refinement else sold:  # a refined rod's section varies along it
+    for section in () if results.refinement else sizes_sold(rod):  # a refined rod's section varies along it
         gain, sharper = _gain(rod, section), _sharper(rod, section)
         if factor * gain >= ENOUGH and not _too_much(results, ends, sharper):
             return (
@@ -142,15 +141,6 @@ def _sharper(rod: RodType, section: Section) -> float:
     other = half_sides(RodSection.model_validate(section.parameters()))
     now = half_sides(rod.section) if rod.section else ()
     return max((new / old for new, old in zip(other, now, strict=False)), default=inf)
-
-
-def half_sides(section: RodSection) -> tuple[float, ...]:
-    """Distances of the outermost fibres along both axes [m]; none of a given section."""
-    if section.radius:
-        return section.radius, section.radius
-    if section.width and section.height:
-        return section.width / 2, section.height / 2
-    return (section.a, section.b) if section.a and section.b else ()
 
 
 def _too_much(results: Results, ends: Ends, sharper: float) -> str:

@@ -5,9 +5,9 @@ from math import degrees
 
 from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.loaded import DesignStrength
-from rodshell.results.own_weight import half_sides
 from rodshell.results.records import Bent, RodType
 from rodshell.results.results import Bending, Results
+from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import strength_name
 from rodshell.results.verdict import CONVERGED, unknown_below, verdict_of
 from rodshell.results.wording import (
@@ -23,7 +23,6 @@ from rodshell.results.wording import (
     stress,
     whole_percent,
 )
-from rodshell.rods.section import TRADE_SIZES, size_text
 from rodshell.units import places_text
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
@@ -99,7 +98,8 @@ def _rod(rod: RodType, bending: Bending | None, judged_by: DesignStrength | None
     yield f"  rod       {rod_text(rod)}"
     if rod.chosen:
         reached = _reached(bending) if "section" in rod.chosen else ""
-        yield f"            {chosen(rod.chosen)}{reached}{_thinner_than_sold(rod)}"
+        thin = thinner_than_sold(rod)
+        yield f"            {chosen(rod.chosen)}{reached}{thin and '; '}{thin}"
     if rod.preset:
         line = f"            {rod.preset.name}: {rod.preset.grade}"
         if rod.preset.bending_strength is not None:
@@ -108,15 +108,6 @@ def _rod(rod: RodType, bending: Bending | None, judged_by: DesignStrength | None
     if judged_by is not None and judged_by.permanent is not None:
         erection = "" if judged_by.erection is None else f", {stress(judged_by.erection)} during erection"
         yield f"            design strength {stress(judged_by.permanent)} permanently{erection}"
-
-
-def _thinner_than_sold(rod: RodType) -> str:
-    """That a chosen section is thinner than every size in which its material is sold, or ""."""
-    preset, sides = rod.preset.name if rod.preset else None, half_sides(rod.section) if rod.section else ()
-    sold = next((sizes for name, sizes in TRADE_SIZES.items() if name == preset), ())
-    if "section" not in (rod.chosen or {}) or not sold or not sides or 2 * max(sides) >= sold[0].depth:
-        return ""
-    return f"; thinner than any size that is sold, the first of which is {size_text(sold[0])}"
 
 
 def _reached(bending: Bending | None) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from rodshell.results.own_weight import light, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
+from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import (
     ENDS,
     THIN,
@@ -333,6 +334,8 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
             "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
             "rod.section.fibre_distances for that"
         )
+    if results.rod and (thin := thinner_than_sold(results.rod)):
+        yield f"the chosen section is {thin}: have it made, or choose another material or a larger target"
     if results.bending is None or results.bending.strength is None:
         if _width(results) > LARGE:
             yield "no strength was given, so it is not known whether the rods hold (checks.strength)"

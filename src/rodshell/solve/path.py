@@ -151,7 +151,8 @@ class Trace:
 
 def trace(
     problem_at: Callable[[float], Problem], here: Equilibrium, start: float, stop: float, *,
-    shortest: float, snap: bool, most_factorizations: int, progress: Callable[[float], None] = lambda t: None,
+    shortest: float, snap: bool, most_factorizations: int,
+    progress: Callable[[float, Equilibrium], None] = lambda t, here: None,
 ) -> Trace:  # fmt: skip
     """Go from the stable equilibrium `here` at t = `start` towards `stop`, up or down, branch by branch.
 
@@ -164,7 +165,7 @@ def trace(
     shortest : step in t at which a branch that cannot be followed has ended.
     snap : whether to go down the energy there and on from where that leads; else the path ends there.
     most_factorizations : the path ends when they are used up.
-    progress : called with t before each step; it may raise an error to end the path.
+    progress : called with t and the equilibrium there before each step; it may raise an error to end the path.
 
     Returns
     -------
@@ -172,7 +173,7 @@ def trace(
     """
     t, step, snaps, reports = start, abs(stop - start), list[Snap](), list[SolveReport]()
     while t != stop:
-        progress(t)
+        progress(t, here)
         step = min(step, abs(stop - t))
         there = stop if step == abs(stop - t) else t + float(np.copysign(step, stop - t))
         problem = going_on(problem_at(there), here)
