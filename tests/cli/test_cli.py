@@ -471,6 +471,14 @@ def test_a_table_takes_the_rod_that_is_asked_for(finder: FakeFinder) -> None:
     assert tube.thickness == 0.0001
 
 
+def test_popup_takes_the_joints_that_are_asked_for(finder: FakeFinder, dome: Path) -> None:
+    table = write_table(Path("rods.csv"), CROSS)
+    for source in ([table, "--unit", "m"], ["dome"]):
+        for kind, joint in (("ball", rs.Ball(mass=0.02)), ("rigid", rs.Rigid(mass=0.02))):
+            assert main(["popup", *source, "--joint.kind", kind, "--joint.mass", "20 g"]) == 0
+            assert finder.calls[-1][1]["joint"] == joint
+
+
 def test_popup_is_told_what_to_check_to_make_and_to_draw(finder: FakeFinder, dome: Path) -> None:
     wishes = {"checks.stages": "3", "checks.strength": "30 MPa", "fabrication.kerf": "2 mm", "drawings.author": "Ada"}
     wishes |= {"fabrication.stock_length": "6 m", "drawings.date": "2026-11-22", "drawings.tolerance": "2 mm"}

@@ -9,7 +9,7 @@ from rodshell.cli.options import CaseCommand, case_options, output_options, over
 from rodshell.cli.reporting import run_and_deliver
 from rodshell.errors import InputError
 
-TABLES = ("rod", "checks", "fabrication", "drawings")  # of the case that a table of rods has
+TABLES = ("rod", "joint", "checks", "fabrication", "drawings")  # of the case that a table of rods has
 
 
 @click.command(cls=CaseCommand, params=case_options(*TABLES))
@@ -23,8 +23,8 @@ def command(source: str, unit: str | None, **values: Any) -> int:
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
     final_z0, final_x1, final_y1, final_z1 and, optionally, id; or with all coordinates in mm and _mm after each name,
-    as in schedule/rods.csv. A table has ball joints and a rod that is chosen to fit. DIR is an earlier result: its
-    joints and its rod are kept. Each key of [rod], [checks], [fabrication] and [drawings] is an option.
+    as in schedule/rods.csv. A table has ball joints and a rod that is chosen to fit, DIR, an earlier result, its own,
+    unless options say otherwise. Each key of [rod], [joint], [checks], [fabrication] and [drawings] is an option.
     """
     output = read_output_options(values)
     from rodshell.job import Job
