@@ -757,8 +757,10 @@ async function upload(file, asOutline = false) {
   const suffix = `.${file.name.toLowerCase().split(".").at(-1)}`, outline = asOutline || (start.outlines.includes(suffix) && !start.surfaces[suffix]);
   if (outline && !takesOutline()) return say(`${file.name} holds curves, which end a surface from a file: upload the surface first`, true);
   say(`Sending ${file.name}`);
-  const answer = await fetch(`/api/sessions/${session}/uploads?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
-  const said = await answer.json();
+  const address = `/api/sessions/${session}/uploads?name=${encodeURIComponent(file.name)}`;
+  const answer = await fetch(address, { method: "POST", body: file }).catch(() => undefined);
+  const said = await answer?.json().catch(() => undefined);
+  if (!said) return say(`${file.name} was not sent, since the connection to rodshell studio failed: choose it again`, true);
   if (!answer.ok) return say(said.sentence, true);
   pending = true;
   if (get(base, outline ? "target.boundary" : "target.file") === said.file) { submit(clone(base), false); outdate(true, false); }  // a new state of the same file
