@@ -518,3 +518,23 @@ def test_the_whole_grid_of_a_layout_is_a_lattice(rods, offset):
     np.testing.assert_allclose(
         sorted(map(tuple, np.round(points, 9))), sorted(product(np.round(along, 9), np.round(across, 9))), atol=1e-12
     )
+
+
+@pytest.mark.parametrize(
+    ("rod", "said"),
+    [
+        (FlatRod.u("A", 0.0, float("nan"), 1.0), "start and end of the rods must be finite"),
+        (FlatRod.u("A", 0.0, "x", 1.0), "must be numbers of the shape"),
+        (FlatRod("A", "free", 0.0, 0.0, 1.0, (0.0, 0.0, 0.0), (1.0, 0.0)), "must be numbers of the shape"),
+        (FlatRod("A", "free", 0.0, 0.0, 1.0, (0.0, 0.0), (0.0, 0.0)), "rod A must have a direction"),
+        (FlatRod.u("A", 0.0, 1.0, -1.0), "rod A must .* start 1 m and end -1 m"),
+        (FlatRod.u("A", 0.0, 1.0, 1.0), "rod A must .* start 1 m and end 1 m"),
+    ],
+)
+def test_a_rod_that_is_no_line_is_refused(rod, said):
+    with pytest.raises(InputError, match=said):
+        FlatGrid.of([rod, FlatRod.v("B", 0.0, -1.0, 1.0)])
+
+
+def test_no_rods_make_an_empty_grid():
+    assert len(FlatGrid.of([]).rods) == 0

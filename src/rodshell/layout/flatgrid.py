@@ -13,7 +13,7 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout.profile import Profile
-from rodshell.validation import instance, listed, number, texts
+from rodshell.validation import finite, instance, listed, number, texts
 
 Family = Literal["u", "v", "free"]
 
@@ -184,12 +184,28 @@ class FlatGrid:
         ----------
         rods : straight rods.
         margin : crossings closer to an end of either rod are not joined [m].
+
+        Raises
+        ------
+        InputError : something else is given; a rod's numbers are not finite, it has no direction, or does not end
+            behind its start.
         """
         rods = listed("rods", rods, "a list of rodshell.FlatRod")
         for rod in rods:
             instance("each of the rods", rod, FlatRod)
         number("margin", margin, "m")
-        lines = np.array([(*rod.origin, *rod.direction, rod.start, rod.end) for rod in rods]).reshape(-1, 6)
+        lines = finite(
+            "origin x and y, direction x and y, start and end of the rods",
+            [(*rod.origin, *rod.direction, rod.start, rod.end) for rod in rods] or np.empty((0, 6)),
+            len(rods), 6,
+        )  # fmt: skip
+        wrong = (lines[:, 5] <= lines[:, 4]) | ~lines[:, 2:4].any(axis=1)
+        if wrong.any():
+            rod = rods[int(np.argmax(wrong))]
+            raise InputError(
+                f"rod {rod.name} must have a direction and end behind its start, not direction {rod.direction}, start "
+                f"{rod.start:g} m and end {rod.end:g} m"
+            )
         return FlatGrid(rods, Crossings(*_crossings(lines, margin)))
 
     def __repr__(self) -> str:
