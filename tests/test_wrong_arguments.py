@@ -167,6 +167,7 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.Cables(rod=ROD, pattern=None), "the pattern of diagonals must be text .*, not None"),
         (lambda: rs.Damping(rate="1"), 'the damping rate must be a number in 1/s, not "1"'),
         (lambda: rs.Damping(coefficients="1 2"), "the damping coefficients must be"),
+        (lambda: rs.Damping(coefficients=[[1.0], [1.0, 2.0]]), "the damping coefficients must be"),
         (lambda: rs.FlatGrid.of(None), "rods must be a list of rodshell.FlatRod, not None"),
         (lambda: rs.FlatGrid.of([ROD]), "each of the rods must be a rodshell FlatRod, not a Rod"),
         (lambda: rs.FlatGrid.of(CROSS.rods, margin="1"), 'margin must be a number in m, not "1"'),

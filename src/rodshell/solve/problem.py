@@ -358,8 +358,11 @@ class Damping:
     def __post_init__(self) -> None:
         if number("the damping rate", self.rate, "1/s") < 0:
             raise InputError(f"the damping rate must not be negative, not {self.rate} 1/s: it would feed energy in")
-        coefficients = "the damping coefficients"
-        if (finite(coefficients, self.coefficients, *np.shape(self.coefficients)) < 0).any():
+        try:
+            shape = np.shape(self.coefficients)
+        except ValueError:  # rows of several lengths, which `finite` refuses
+            shape = ()
+        if (finite("the damping coefficients", self.coefficients, *shape) < 0).any():
             raise InputError("damping coefficients must not be negative: they would feed energy in")
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> None:
