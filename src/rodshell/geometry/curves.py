@@ -99,7 +99,7 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
     shares = np.empty((spare + 1, 4))
     for n in range(len(s)):
         right[n] = _right_of(knots, s[n])
-        windows[n] = _window(knots, s[n], right[n], 0, count - 1, shares, n)
+        windows[n] = nearest_four(knots, s[n], right[n], 0, count - 1, shares, n)
     for m in range(lines):
         first, last = origin, origin
         while first > 0 and not np.isnan(points[first - 1, m, 0]):
@@ -120,7 +120,7 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
                 continue
             row, window, x, y, z = n, windows[n], 0.0, 0.0, 0.0
             if window < first or window + most - 1 > last:
-                row, window = spare, _window(knots, s[n], right[n], first, last, shares, spare)
+                row, window = spare, nearest_four(knots, s[n], right[n], first, last, shares, spare)
             for k in range(near):
                 x += shares[row, k] * points[window + k, m, 0]
                 y += shares[row, k] * points[window + k, m, 1]
@@ -130,18 +130,26 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
 
 
 @njit(error_model="numpy")
-def _window(knots, at, right, first, last, shares, row):  # type: ignore[no-untyped-def]
-    """Of the knots from the `first` to the `last`: the first of the four nearest to `at`, and their weights in
-    `shares[row]` (4,)."""
+def nearest_four(knots, at, right, first, last, shares, row):  # type: ignore[no-untyped-def]
+    """Of the knots from the `first` to the `last`: the first of the four nearest to `at`, with `right` knots before it,
+    and their weights in a cubic, put into `shares[row]` (4,)."""
     near = min(4, last - first + 1)
     window = min(max(right - near // 2, first), last + 1 - near)
+    if near == 4:  # of a known number, so that the loops become straight code
+        _put_shares(knots, at, window, 4, shares, row)
+    else:
+        _put_shares(knots, at, window, near, shares, row)
+    return window
+
+
+@njit(error_model="numpy", inline="always")
+def _put_shares(knots, at, window, near, shares, row):  # type: ignore[no-untyped-def]
     for j in range(near):
         above, below = 1.0, 1.0
         for k in range(near):
             if j != k:
                 above, below = above * (at - knots[window + k]), below * (knots[window + j] - knots[window + k])
         shares[row, j] = above / below
-    return window
 
 
 @njit()

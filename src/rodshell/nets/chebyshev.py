@@ -15,6 +15,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, NetLimitError
+from rodshell.geometry.curves import nearest_four
 from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.flatgrid import Family
@@ -280,7 +281,7 @@ def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: 
     start : (m + 1,) where each line begins in `s`.
     """
     most = max(len(u), len(v))
-    at, there, shares = np.empty(most), np.empty((most, 3)), np.empty(4)  # the known nodes of a line
+    at, there, shares = np.empty(most), np.empty((most, 3)), np.empty((1, 4))  # the known nodes of a line
     for m in range(len(line)):
         knots, count = (v if across[m] else u), 0
         for n in range(len(knots)):
@@ -296,17 +297,11 @@ def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: 
                 after -= 1
             while after < count and at[after] < s[e]:
                 after += 1
-            first = min(max(after - near // 2, 0), count - near)
-            for j in range(near):
-                above, below = 1.0, 1.0
-                for k in range(near):
-                    if j != k:
-                        above, below = above * (s[e] - at[first + k]), below * (at[first + j] - at[first + k])
-                shares[j] = above / below
+            first = nearest_four(at, s[e], after, 0, count - 1, shares, 0)
             for d in range(3):
                 value = 0.0
                 for j in range(near):
-                    value += shares[j] * there[first + j, d]
+                    value += shares[0, j] * there[first + j, d]
                 result[nodes[e], d] = value
 
 
