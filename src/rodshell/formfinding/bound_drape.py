@@ -1,9 +1,10 @@
 """The bound drape: march the net, then bind the elastic grid to the target (docs/theory.md, The bound drape).
 
 Every node slides on the target without friction, rods do not stretch, and bending alone determines what the net
-leaves open: the shape of each span between its joints. No load and no stretch stiffness enter, so that the
-result does not depend on scale or material. The axes and the anchor are held, as the net holds them. The solve starts
-from the net's lines with their ends corrected, close to the final rods.
+leaves open: the shape of each span between its joints. Out of the surface the rods follow its curvature; their
+bending within it, about the normal, has EI2, and twist angles are left out as for a round rod. No load and no stretch
+stiffness enter, so that the result does not depend on scale or material. The axes and the anchor are held, as the net
+holds them. The solve starts from the net's lines with their ends corrected, close to the final rods.
 """
 
 from collections.abc import Callable
@@ -21,12 +22,12 @@ from rodshell.joints import Joint
 from rodshell.kernels import njit
 from rodshell.layout import GridLayout, GridMesh, mesh_grid
 from rodshell.layout.mesh import spans_along
-from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.apron import with_apron
 from rodshell.progress import Progress, silent
 from rodshell.rods.elements import Stretch
-from rodshell.rods.section import GivenSection, Rod
+from rodshell.rods.isotropic import IsotropicBend
+from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, SolveReport, find_equilibrium
 from rodshell.solve.path import going_on
 from rodshell.solve.problem import Problem
@@ -73,16 +74,16 @@ def bound_drape(
     ends = np.array([(piece.start, piece.end) for piece in net.rods])
     spans = spans_along(mesh, ends, whole)
     start = net.node_positions(mesh)
-    rod_within = _within_surface(rod)
-    shell, normal = Shell.of(mesh, rod_within), unit(target.level(start)[1])
+    normal = unit(target.level(start)[1])
     corrected = corrected_ends(target, mesh, start, normal)
+    within = rod.bend_stiffnesses[1]
     problem = Problem(
-        elements=shell.elements,
-        stretch=_penalty(shell.stretch, rod_within, target),
+        elements=(IsotropicBend(mesh.bends, within / mesh.voronoi_lengths),),
+        stretch=_penalty(mesh, within, target),
         constraint=_bind(target, mesh, start, normal),
         length=target.size,
         inextensible=True,
-        flat_coordinates=shell.flat_coordinates,
+        flat_coordinates=mesh.flat[:, :2],
     )
     found = _in_layers(
         problem, target, mesh, corrected, eccentricity,
@@ -150,21 +151,11 @@ def _mark(spans, rod_nodes, marked):  # type: ignore[no-untyped-def]
             marked[rod_nodes[k]] = True
 
 
-def _within_surface(rod: Rod) -> Rod:
-    """The rod with EI2 in all directions.
-
-    Out of the surface the rods follow its curvature; only their bending within it is free, towards m2, the first
-    director being the normal. So the twist angles are left out, as for a round rod.
-    """
-    within = rod.bend_stiffnesses[1]
-    return Rod(GivenSection(rod.stretch_stiffness, within, within, rod.twist_stiffness))
-
-
-def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
+def _penalty(mesh: GridMesh, bend_stiffness: float, target: Target) -> Stretch:
     """Edges as a penalty: stiff enough to outweigh bending, which grows with the square of the size over the edge."""
-    weight = max(LEAST_PENALTY, PENALTY * (target.size / float(stretch.rest_lengths.mean())) ** 2)
-    stiffness = weight * rod.bend_stiffness / target.size**2
-    return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
+    weight = max(LEAST_PENALTY, PENALTY * (target.size / float(mesh.edge_lengths.mean())) ** 2)
+    stiffness = weight * bend_stiffness / target.size**2
+    return Stretch.elastic(mesh.edges, mesh.edge_lengths, np.full(len(mesh.edges), stiffness))
 
 
 def _in_layers(
