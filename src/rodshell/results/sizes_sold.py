@@ -6,7 +6,7 @@ from rodshell.rods.section import TRADE_SIZES, Section, size_text
 
 
 def sizes_sold(rod: RodType) -> tuple[Section, ...]:
-    """Sections in which the rod's material is sold, the thinnest first; none where it is no preset.
+    """Sections in which the rod's material is sold, the thinnest first; none where it is not a preset.
 
     Parameters
     ----------
