@@ -196,3 +196,15 @@ def test_a_line_is_continued_from_the_nodes_that_hang_together_with_its_origin()
         kept = 0 if line < 2 else 1  # three nodes know no cubic, but a parabola
         np.testing.assert_allclose(found[line, there][:, kept:], cubic(at[there])[:, kept:], rtol=0, atol=1e-11)
     assert at[np.isfinite(found[3, :, 0])].tolist() == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("edge", "steps"), [(0.25, [8, 6, 8]), (0.1, [10, 6, 20]), (0.09, [12, 6, 24]), (1.0, [6, 6, 6])]
+)
+def test_from_line_to_line_there_are_an_even_number_of_equal_steps_and_at_least_six(edge, steps):
+    lines = np.array([-1.0, 0.0, 0.25, 2.25])
+    nodes = net_extent._subdivided(lines, edge)
+    expected = [
+        low + (high - low) * k / n for low, high, n in zip(lines, lines[1:], steps, strict=False) for k in range(n)
+    ]
+    np.testing.assert_allclose(nodes, [*expected, 2.25], rtol=0, atol=1e-15)
