@@ -23,8 +23,8 @@ def command(source: str, unit: str | None, **values: Any) -> int:
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
     final_z0, final_x1, final_y1, final_z1 and, optionally, id; or with all coordinates in mm and _mm after each name,
-    as in schedule/rods.csv. A table has ball joints and a rod that is chosen to fit, DIR, an earlier result, its own,
-    unless options say otherwise. Each key of [rod], [joint], [checks], [fabrication] and [drawings] is an option.
+    as in schedule/rods.csv. A table has ball joints and a rod that is chosen to fit; DIR, an earlier result, keeps its
+    own. Each key of [rod], [joint], [checks], [fabrication] and [drawings] is an option that replaces what is kept.
     """
     output = read_output_options(values)
     from rodshell.job import Job
