@@ -113,6 +113,7 @@ def test_the_offer_foretells_what_refining_by_double_laths_gains() -> None:
     assert better.agreement["pinned"].rms_relative <= found.after * (1 + 1e-9)
     assert found.after < 1.2 * better.agreement["pinned"].rms_relative
     assert found.factorizations <= 20
+    assert 0.05 <= found.shares[0] <= found.shares[1] <= 0.95
     assert "--vary double --ends pinned" in found.words
     assert "choose clamped ends" in found.words
 
