@@ -16,16 +16,20 @@ LIMIT = 1.5e6  # bytes of a notebook
 
 SHOWN = """
 <script>
-setTimeout(() => {
-  const view = document.querySelector("iframe").contentDocument, canvas = view.querySelector("canvas");
-  const pen = document.createElement("canvas").getContext("2d");
-  [pen.canvas.width, pen.canvas.height] = [canvas.width, canvas.height];
-  pen.drawImage(canvas, 0, 0);
-  const bytes = pen.getImageData(0, 0, canvas.width, canvas.height).data, seen = new Set();
-  for (let k = 0; k < bytes.length; k += 4) seen.add((bytes[k] << 16) | (bytes[k + 1] << 8) | bytes[k + 2]);
-  const caption = view.querySelector(".caption").textContent;
-  document.body.dataset.found = JSON.stringify({ colours: seen.size, caption });
-}, 3000);
+const waiting = setInterval(() => {  // for the caption, which is there once the scene is
+  const view = document.querySelector("iframe")?.contentDocument, canvas = view?.querySelector("canvas");
+  const caption = view?.querySelector(".caption")?.textContent;
+  if (!canvas || !caption) return;
+  clearInterval(waiting);
+  setTimeout(() => {
+    const pen = document.createElement("canvas").getContext("2d");
+    [pen.canvas.width, pen.canvas.height] = [canvas.width, canvas.height];
+    pen.drawImage(canvas, 0, 0);
+    const bytes = pen.getImageData(0, 0, canvas.width, canvas.height).data, seen = new Set();
+    for (let k = 0; k < bytes.length; k += 4) seen.add((bytes[k] << 16) | (bytes[k + 1] << 8) | bytes[k + 2]);
+    document.body.dataset.found = JSON.stringify({ colours: seen.size, caption });
+  }, 3000);
+}, 200);
 </script>
 """
 
