@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FIRST = "1075d4c"  # the last commit before kernels were compiled ahead and drawings laid out once
 JOB = "import sys; from {package}.cli import entry; sys.argv[0] = 'rodshell'; entry()"
 BARE = "import numpy, scipy.sparse"
-FORM = ("form", "hemisphere", "--quiet")
+FORM = ("form", "hemisphere")
 FEW = ("--only", "csv", "--checks.stages", "0")
 ALL_FILES, TABLES, AGAIN = (
     "`form hemisphere`, all files",

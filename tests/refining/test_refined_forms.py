@@ -112,10 +112,14 @@ def test_the_offer_foretells_what_refining_by_double_laths_gains() -> None:
     better = rs.refine(plain, "double", ends="pinned")
     assert better.agreement["pinned"].rms_relative <= found.after * (1 + 1e-9)
     assert found.after < 1.2 * better.agreement["pinned"].rms_relative
-    assert found.factorizations <= 20
+    assert found.factorizations <= 14
     assert 0.05 <= found.shares[0] <= found.shares[1] <= 0.95
     assert "--vary double --ends pinned" in found.words
     assert "choose clamped ends" in found.words
+
+
+def test_a_form_that_was_refined_gets_no_offer() -> None:
+    assert offer(form().stages) is None
 
 
 def test_refine_pops_up_ends_that_the_form_did_not_have() -> None:

@@ -15,6 +15,7 @@ from rodshell.errors import InputError
 from rodshell.validation import choice, listed, number, positive
 
 Varies = Literal["size", "width", "height", "a", "b", "laths"]
+DOUBLE = (0.05, 0.95)  # least and most share of a rod's length that is made double, where the share is chosen
 GAUSS = 5  # points a piece: 1e-5 of the mean of 1/f where f grows eightfold over it
 
 

@@ -39,7 +39,7 @@ from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
 from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements, Stretch
+from rodshell.rods.elements import Elements, Stretch, with_frames
 from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.section import Rod
 from rodshell.validation import instance
@@ -226,6 +226,15 @@ class Shell:
         """
         count = len(self.within)
         return replace(self, within=elements[:count], between=elements[count:])
+
+    def with_frames_of(self, elements: tuple[Elements, ...]) -> "Shell":
+        """The same shell with the source frames of another one, so that twist angles mean the same in both.
+
+        Parameters
+        ----------
+        elements : of a shell on the same mesh with other stiffnesses, in the same order.
+        """
+        return self.with_elements(tuple(map(with_frames, self.elements, elements)))
 
     def held_ends(self) -> Freedom:
         """As `freedom`, with every rod end held in place."""

@@ -5,9 +5,8 @@ that they describe is popped up again.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from math import inf
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,6 @@ from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
 from rodshell.refining.structure import Point, Structure, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
-from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.units import percent_text
@@ -364,7 +362,7 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
     """
     grid, here = design.grid, design.point.equilibrium
     shell = Shell.of(grid.mesh, stages.rod, clamped=ends == "clamped", joint=stages.joint)
-    shell = shell.with_elements(tuple(map(_with_frames, shell.elements, here.elements)))
+    shell = shell.with_frames_of(here.elements)
     problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
     if here.problem.load is None:
         found, made = find_equilibrium(problem, here.state, here.forces), 0
@@ -398,17 +396,6 @@ def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
         load[nodes, 2] = -structure.weight * STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
     if structure.dead_loads is not None:
         load[: len(structure.dead_loads)] += structure.dead_loads
-    shell = popped.shell.with_elements(tuple(map(_with_frames, popped.shell.elements, here.elements)))
+    shell = popped.shell.with_frames_of(here.elements)
     problem = replace(popped.equilibrium.problem, elements=shell.elements, load=load)
     return agreement(replace(popped, equilibrium=find_equilibrium(problem, here.state, here.forces)), stages.target)
-
-
-def _with_frames(element: Elements, like: Elements) -> Elements:
-    """An energy with the source frames of another one of its kind."""
-    assert is_dataclass(element)
-    sources: dict[str, Any] = {
-        field.name: getattr(like, field.name) for field in fields(element) if field.name.startswith("source_")
-    }
-    if hasattr(element, "bends"):
-        sources["bends"] = _with_frames(element.bends, like.bends)
-    return replace(element, **sources)

@@ -15,7 +15,7 @@ from scipy.sparse import csc_array
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.layout import Profile
-from rodshell.layout.profile import Varies
+from rodshell.layout.profile import DOUBLE, Varies
 from rodshell.refining.change import STIFFNESSES, Change
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
@@ -180,8 +180,8 @@ class DoubleLaths:
     least, most : share of each rod's length that is double [-].
     """
 
-    least: float = 0.05
-    most: float = 0.95
+    least: float = DOUBLE[0]
+    most: float = DOUBLE[1]
 
     name = "double"
 

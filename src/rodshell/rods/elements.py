@@ -13,7 +13,7 @@ edge: at the solution the strain vanishes and N0 is the axial force.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -70,6 +70,23 @@ class Stressed(Elements, Protocol):
         hessians : (m, 3k, 3k), which are filled.
         """
         ...
+
+
+def with_frames(element: Elements, like: Elements) -> Elements:
+    """An energy with the source frames of another one.
+
+    Parameters
+    ----------
+    element : whose frames are replaced.
+    like : an energy of the same kind, on the same blocks.
+    """
+    assert is_dataclass(element)
+    sources: dict[str, Any] = {
+        field.name: getattr(like, field.name) for field in fields(element) if field.name.startswith("source_")
+    }
+    if hasattr(element, "bends"):
+        sources["bends"] = with_frames(element.bends, like.bends)
+    return replace(element, **sources)
 
 
 def each_gradient(elements: Elements, state: Floats) -> Floats:
