@@ -6,6 +6,7 @@ from math import inf
 import numpy as np
 
 import rodshell as rs
+from rodshell.output.drawings import drawing_set
 from rodshell.refining.offer import offer
 
 
@@ -19,11 +20,12 @@ def _forms() -> Iterator[object]:
 
 
 def _commands() -> Iterator[object]:
-    """What `rodshell form` does: the checks of a form, and the offer of a refinement."""
+    """What `rodshell form` does: the checks of a form, the offer of a refinement, and the drawings."""
     small = {"layout.rods": "5x5", "layout.spacing": "80 mm", "layout.edge": "40 mm"}
     form = rs.Job.load("hemisphere", small).run()
     yield form.stages
     yield offer(form.stages)
+    yield drawing_set(form.archive())
 
 
 def _joints() -> Iterator[object]:

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import cos, hypot, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats
+from rodshell.kernels import njit
 from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
 
 Extent = tuple[float, float, float, float]
@@ -38,8 +40,8 @@ class Label(NamedTuple):
 
     def written(self, size: float) -> Text:
         """The text itself, its box about the centre."""
-        across = np.array([-np.sin(self.angle), np.cos(self.angle)])
-        baseline = self.centre - (0.5 * LINE - BELOW) * size * across
+        (x, y), down = self.centre.tolist(), (0.5 * LINE - BELOW) * size
+        baseline = np.array([x + down * sin(self.angle), y - down * cos(self.angle)])
         return Text(self.text, baseline, size, "LABEL", anchor="middle", angle=self.angle)
 
     def box(self, size: float) -> Floats:
@@ -48,10 +50,11 @@ class Label(NamedTuple):
 
     def leader(self, size: float) -> Floats:
         """Line (2, 2) from the end to the nearest place of the text's box."""
-        along = np.array([np.cos(self.angle), np.sin(self.angle)])
-        axes = np.array([along, [-along[1], along[0]]])
-        half = 0.5 * size * np.array([LETTER * len(self.text) + 0.2, LINE])
-        return np.array([self.end, self.centre + np.clip(axes @ (self.end - self.centre), -half, half) @ axes])
+        (x, y), (a, b), c, s = self.end.tolist(), self.centre.tolist(), cos(self.angle), sin(self.angle)
+        wide, tall = 0.5 * size * (LETTER * len(self.text) + 0.2), 0.5 * size * LINE
+        u = min(max(c * (x - a) + s * (y - b), -wide), wide)
+        v = min(max(c * (y - b) - s * (x - a), -tall), tall)
+        return np.array([(x, y), (a + c * u - s * v, b + s * u + c * v)])
 
 
 class Room:
@@ -205,9 +208,9 @@ def off_its_mark(line: Floats, size: float) -> Floats:
     line : (2, 2) from the mark to the label.
     size : of the text, in the unit of the line; half of it is left out at the mark.
     """
-    a, b = line
-    share = min(0.5 * size / max(float(np.linalg.norm(b - a)), 1e-12), 0.9)
-    return thin(np.array([a + share * (b - a), b]), THIN * size)
+    (ax, ay), (bx, by) = line.tolist()
+    share = min(0.5 * size / max(hypot(bx - ax, by - ay), 1e-12), 0.9)
+    return thin(np.array([(ax + share * (bx - ax), ay + share * (by - ay)), (bx, by)]), THIN * size)
 
 
 def thin(line: Floats, width: float) -> Floats:
@@ -218,10 +221,10 @@ def thin(line: Floats, width: float) -> Floats:
     line : (2, 2) its two ends.
     width : of the room, in the unit of the line.
     """
-    a, b = line
-    along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
-    side = 0.5 * width * np.array([-along[1], along[0]])
-    return np.array([a - side, b - side, b + side, a + side])
+    (ax, ay), (bx, by) = line.tolist()
+    half = 0.5 * width / max(hypot(bx - ax, by - ay), 1e-12)
+    x, y = half * (ay - by), half * (bx - ax)  # to the left
+    return np.array([(ax - x, ay - y), (bx - x, by - y), (bx + x, by + y), (ax + x, ay + y)])
 
 
 def spread(positions: ArrayLike, gap: float) -> Floats:
@@ -299,10 +302,24 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     ----------
     box : (4, 2) corners in a row; lines : (m, 2, 2) ends.
     """
-    sides = box[[1, 3]] - box[0]
-    axes = (2.0 * sides / (sides**2).sum(axis=1)[:, None]).T
-    points = (lines - box.sum(axis=0) / 4).reshape(-1, 2) @ axes  # one product, not one for each line
-    return bool(runs_through(points.reshape(-1, 2, 2)).any())
+    return bool(_lines_meet(box, lines))
+
+
+@njit(error_model="numpy")
+def _lines_meet(box, lines):  # type: ignore[no-untyped-def]
+    """The rectangle is the square from -1 to 1 of its own axes."""
+    ux, uy, vx, vy = box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[3, 0] - box[0, 0], box[3, 1] - box[0, 1]
+    wide, tall = 2.0 / (ux * ux + uy * uy), 2.0 / (vx * vx + vy * vy)
+    x, y = 0.5 * (box[0, 0] + box[2, 0]), 0.5 * (box[0, 1] + box[2, 1])
+    for k in range(len(lines)):
+        px, py, qx, qy = lines[k, 0, 0] - x, lines[k, 0, 1] - y, lines[k, 1, 0] - x, lines[k, 1, 1] - y
+        a, b = wide * (px * ux + py * uy), tall * (px * vx + py * vy)
+        c, d = wide * (qx * ux + qy * uy), tall * (qx * vx + qy * vy)
+        left, right, low, high = min(a, c), max(a, c), min(b, d), max(b, d)
+        apart = left >= 1.0 or low >= 1.0 or right <= -1.0 or high <= -1.0
+        if not (apart or abs(a * d - b * c) > (right - left) + (high - low)):
+            return True
+    return False
 
 
 def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:
@@ -336,14 +353,6 @@ def lines_near(lines: Floats, low: Floats, high: Floats) -> Floats:
     a, b = lines[:, 0], lines[:, 1]
     near = (np.minimum(a, b) < high) & (np.maximum(a, b) > low)
     return np.asarray(lines[near[:, 0] & near[:, 1]])
-
-
-def runs_through(lines: Floats) -> Bools:
-    """(...) whether each of the lines (..., 2, 2) runs through the square from -1 to 1: no axis separates them."""
-    a, b, c, d = lines[..., 0, 0], lines[..., 0, 1], lines[..., 1, 0], lines[..., 1, 1]
-    left, low, right, high = np.minimum(a, c), np.minimum(b, d), np.maximum(a, c), np.maximum(b, d)
-    apart = (left >= 1.0) | (low >= 1.0) | (right <= -1.0) | (high <= -1.0)
-    return np.asarray(~(apart | (np.abs(a * d - b * c) > (right - left) + (high - low))))
 
 
 # Callouts

@@ -138,8 +138,8 @@ def _data(paths: Sequence[Path]) -> str:
 
 @cache
 def _data_of(count: int, closed: bool) -> str:
-    """The format of the data of a path with so many points; 15 digits show no more than was rounded to."""
-    return f"M{'L'.join(['%.15g %.15g'] * count)}{'Z' if closed else ''}"
+    """The format of the data of a path with so many points; 14 digits show no more than was rounded to."""
+    return f"M{'L'.join(['%.14g %.14g'] * count)}{'Z' if closed else ''}"
 
 
 def _look(pen: Pen) -> dict[str, Any]:

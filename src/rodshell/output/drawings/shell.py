@@ -9,11 +9,9 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.output.drawing import (
-    BELOW,
     INK,
     LAYERS,
     LETTER,
-    LINE,
     PALE,
     SMALL,
     SOFT,
@@ -24,7 +22,7 @@ from rodshell.output.drawing import (
 )
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.grid import joint_places, outlines_of, rods_of
-from rodshell.output.labels import Room, callouts, closed_segments, outward, runs_through, upright
+from rodshell.output.labels import Room, callouts, closed_segments, lines_meet, outward, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
 from rodshell.results.results import Brace
@@ -366,19 +364,14 @@ def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list
     angle = np.array([upright(float(direction)) for direction in np.arctan2(*(b - a).T[::-1])])
     along, above = (np.column_stack(pair) for pair in ((np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))))
     middle, wide = 0.5 * (a + b), LETTER * np.array([len(word) for word in words], dtype=float)
-    lines = np.stack([[a, c], [c, b], [b, d], [d, a], [a, b], [c, d]]).transpose(2, 0, 1, 3) - middle[:, None, None]
-    seen = np.einsum("nkpi,jni->nkpj", lines, np.stack([along, above]))  # along and across the diagonal
+    lines = np.array([[a, c], [c, b], [b, d], [d, a], [a, b], [c, d]]).transpose(2, 0, 1, 3).copy()
     room, found = Room(3 * text), dict[int, Text]()
     for size, (side, up) in ((text * share, side) for share in NUMBER_SIZES for side in SIDES):
-        off = side * (CLEAR + 0.5 * wide) * size
-        centre = np.column_stack([off, np.full(len(words), (up + 0.5 * LINE - BELOW) * size)])
-        half = 0.5 * size * np.column_stack([wide, np.full(len(words), LINE)])
-        met = runs_through((seen - centre[:, None, None]) / half[:, None, None]).any(axis=1)
-        for k in np.flatnonzero(~met).tolist():
-            if k in found:
-                continue
-            at = middle[k] + off[k] * along[k] + up * size * above[k]
-            written = Text(words[k], at, size, "LABEL", "middle", float(angle[k]), colour="#6b5212")
-            if room.claim(written.box()):
-                found[k] = written
+        at = middle + (side * (CLEAR + 0.5 * wide) * size)[:, None] * along + up * size * above
+        for k, word in enumerate(words):
+            if k not in found:
+                written = Text(word, at[k], size, "LABEL", "middle", float(angle[k]), colour="#6b5212")
+                box = written.box()
+                if not lines_meet(box, lines[k]) and room.claim(box):
+                    found[k] = written
     return list(found.values())
