@@ -105,7 +105,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_sweep": "f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2 f",
     },
     "output.labels": {
-        "_lines_meet": "f2 f3",
+        "each_meets": "f3 f4",
     },
     "rods.bend_twist": {
         "_bend_twist": "f2 i2 f2 f1 f2 f1 f3 f3 f1 f2 f3",

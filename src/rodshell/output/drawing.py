@@ -143,14 +143,22 @@ class Text(NamedTuple):
     def box(self) -> Floats:
         """(4, 2) corners of the room that it takes [mm], each letter taken as wide as a broad one."""
         x, y = self.at.tolist()
-        return np.array(_corners(x, y, cos(self.angle), sin(self.angle), self.size, len(self.text), BACK[self.anchor]))
+        return np.array(corners(x, y, cos(self.angle), sin(self.angle), self.size, len(self.text), BACK[self.anchor]))
 
 
 BACK: dict[Anchor, float] = {"start": 0.0, "middle": -0.5, "end": -1.0}  # where a text begins, in its widths
 
 
-def _corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[T, T]]:
-    """x and y of the four corners of a text's room, or of many: of numbers, or of arrays (t,)."""
+def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[T, T]]:
+    """x and y of the four corners of a text's room, or of many: of numbers, or of arrays (t,).
+
+    Parameters
+    ----------
+    x, y : where its baseline starts, is centred or ends.
+    c, s : cosine and sine of the angle of its baseline.
+    size, letters : of the text.
+    back : where it begins, see `BACK`.
+    """
     width = LETTER * size * letters
     left = back * width
     right, low, high = left + width, -BELOW * size, (LINE - BELOW) * size
@@ -211,7 +219,7 @@ class Drawing:
         at = np.array([mark.at for mark in self.marks]).reshape(-1, 2)
         radius = np.array([mark.radius for mark in self.marks]).reshape(-1, 1)
         rows = [(*t.at.tolist(), cos(t.angle), sin(t.angle), t.size, len(t.text), BACK[t.anchor]) for t in self.texts]
-        boxes = np.array(_corners(*np.array(rows).reshape(-1, 7).T))
+        boxes = np.array(corners(*np.array(rows).reshape(-1, 7).T))
         return (
             (np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)),
             (at - radius, at + radius),

@@ -302,24 +302,28 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     ----------
     box : (4, 2) corners in a row; lines : (m, 2, 2) ends.
     """
-    return bool(_lines_meet(box, lines))
+    return bool(each_meets(box[None], lines[None])[0])
 
 
 @njit(error_model="numpy")
-def _lines_meet(box, lines):  # type: ignore[no-untyped-def]
-    """The rectangle is the square from -1 to 1 of its own axes."""
-    ux, uy, vx, vy = box[1, 0] - box[0, 0], box[1, 1] - box[0, 1], box[3, 0] - box[0, 0], box[3, 1] - box[0, 1]
-    wide, tall = 2.0 / (ux * ux + uy * uy), 2.0 / (vx * vx + vy * vy)
-    x, y = 0.5 * (box[0, 0] + box[2, 0]), 0.5 * (box[0, 1] + box[2, 1])
-    for k in range(len(lines)):
-        px, py, qx, qy = lines[k, 0, 0] - x, lines[k, 0, 1] - y, lines[k, 1, 0] - x, lines[k, 1, 1] - y
-        a, b = wide * (px * ux + py * uy), tall * (px * vx + py * vy)
-        c, d = wide * (qx * ux + qy * uy), tall * (qx * vx + qy * vy)
-        left, right, low, high = min(a, c), max(a, c), min(b, d), max(b, d)
-        apart = left >= 1.0 or low >= 1.0 or right <= -1.0 or high <= -1.0
-        if not (apart or abs(a * d - b * c) > (right - left) + (high - low)):
-            return True
-    return False
+def each_meets(boxes, lines):  # type: ignore[no-untyped-def]
+    """(n,) whether one of its own lines (n, m, 2, 2) runs through each rectangle (n, 4, 2), which is the square from -1
+    to 1 of its own axes."""
+    met = np.zeros(len(boxes), dtype=np.bool_)
+    for n in range(len(boxes)):
+        (x0, y0), (x1, y1), (x2, y2), (x3, y3) = boxes[n, 0], boxes[n, 1], boxes[n, 2], boxes[n, 3]
+        x, y, ux, uy, vx, vy = 0.5 * (x0 + x2), 0.5 * (y0 + y2), x1 - x0, y1 - y0, x3 - x0, y3 - y0
+        wide, tall = 2.0 / (ux * ux + uy * uy), 2.0 / (vx * vx + vy * vy)
+        for k in range(lines.shape[1]):
+            px, py, qx, qy = lines[n, k, 0, 0] - x, lines[n, k, 0, 1] - y, lines[n, k, 1, 0] - x, lines[n, k, 1, 1] - y
+            a, b = wide * (px * ux + py * uy), tall * (px * vx + py * vy)
+            c, d = wide * (qx * ux + qy * uy), tall * (qx * vx + qy * vy)
+            left, right, low, high = min(a, c), max(a, c), min(b, d), max(b, d)
+            apart = left >= 1.0 or low >= 1.0 or right <= -1.0 or high <= -1.0
+            if not (apart or abs(a * d - b * c) > (right - left) + (high - low)):
+                met[n] = True
+                break
+    return met
 
 
 def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.output.drawing import (
+    BACK,
     INK,
     LAYERS,
     LETTER,
@@ -19,10 +20,11 @@ from rodshell.output.drawing import (
     Pen,
     Pencil,
     Text,
+    corners,
 )
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.grid import joint_places, outlines_of, rods_of
-from rodshell.output.labels import Room, callouts, closed_segments, lines_meet, outward, upright
+from rodshell.output.labels import Room, callouts, closed_segments, each_meets, outward, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
 from rodshell.results.results import Brace
@@ -361,17 +363,17 @@ def _crossing(braces: Sequence[Brace]) -> list[int]:
 def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list[Text]:
     """The numbers that find room along the diagonals (n, 2, 2) of cells with the `other` diagonals (n, 2, 2)."""
     (a, b), (c, d) = ends.transpose(1, 0, 2), other.transpose(1, 0, 2)
+    around = np.array([[a, c], [c, b], [b, d], [d, a], [a, b], [c, d]]).transpose(2, 0, 1, 3).copy()
+    letters = np.array([*map(len, words)], dtype=float)
     angle = np.array([upright(float(direction)) for direction in np.arctan2(*(b - a).T[::-1])])
     along, above = (np.column_stack(pair) for pair in ((np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))))
-    middle, wide = 0.5 * (a + b), LETTER * np.array([len(word) for word in words], dtype=float)
-    lines = np.array([[a, c], [c, b], [b, d], [d, a], [a, b], [c, d]]).transpose(2, 0, 1, 3).copy()
+    middle, centred = 0.5 * (a + b), np.full(len(words), BACK["middle"])
     room, found = Room(3 * text), dict[int, Text]()
     for size, (side, up) in ((text * share, side) for share in NUMBER_SIZES for side in SIDES):
-        at = middle + (side * (CLEAR + 0.5 * wide) * size)[:, None] * along + up * size * above
-        for k, word in enumerate(words):
-            if k not in found:
-                written = Text(word, at[k], size, "LABEL", "middle", float(angle[k]), colour="#6b5212")
-                box = written.box()
-                if not lines_meet(box, lines[k]) and room.claim(box):
-                    found[k] = written
+        at = middle + (side * (CLEAR + 0.5 * LETTER * letters) * size)[:, None] * along + up * size * above
+        (x, y), (cosine, sine), sizes = at.T, along.T, np.full(len(words), size)
+        boxes = np.array(corners(x, y, cosine, sine, sizes, letters, centred)).transpose(2, 0, 1).copy()
+        for k in np.flatnonzero(~each_meets(boxes, around)).tolist():
+            if k not in found and room.claim(boxes[k]):
+                found[k] = Text(words[k], at[k], size, "LABEL", "middle", float(angle[k]), colour="#6b5212")
     return list(found.values())
