@@ -110,9 +110,9 @@ def test_the_offer_foretells_what_refining_by_double_laths_gains() -> None:
     assert found is not None
     assert (found.ends, found.before) == ("pinned", plain.agreement["pinned"].rms_relative)
     better = rs.refine(plain, "double", ends="pinned")
-    assert better.agreement["pinned"].rms_relative <= found.after * (1 + 1e-9)
+    assert better.agreement["pinned"].rms_relative <= 1.01 * found.after  # it ends where a step gains less than that
     assert found.after < 1.2 * better.agreement["pinned"].rms_relative
-    assert found.factorizations <= 14
+    assert found.factorizations <= 10
     assert 0.05 <= found.shares[0] <= found.shares[1] <= 0.95
     assert "--vary double --ends pinned" in found.words
     assert "choose clamped ends" in found.words

@@ -1,6 +1,6 @@
 """What the cheapest refinement that anybody can build would gain: double laths over the middle of every rod.
 
-Two steps of Gauss and Newton's method in the share of each rod that is double, the derivative being the difference of
+One step of Gauss and Newton's method in the share of each rod that is double, the derivative being the difference of
 two shells: a few factorisations. Neither the gates of a refinement nor its limit on the lowest mode are tried.
 """
 
@@ -21,8 +21,8 @@ from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.units import percent_text
 
-FIRST, PROBE = 0.5, 0.05  # share of each rod that is double in the first design; the difference to the second
-STEPS = 2  # beyond these two
+FIRST, PROBE = 0.55, 0.1  # share of each rod that is double in the first design; the difference to the second
+DESIGNS = 3  # the third is where these two lead
 LONGEST = 0.3  # step of the share
 WORTH = 0.8  # of the gap before: a larger one after is a small gain
 
@@ -122,7 +122,7 @@ def _designs(patch: PatchForm, ends: Ends, telling: Callable[[int], None]) -> li
     found, like, share = list[_Design](), patch.popped[ends], FIRST
     if any(rod.profile is not None for rod in patch.footprint.rods):
         return found
-    for number in range(1, STEPS + 3):
+    for number in range(1, DESIGNS + 1):
         telling(number)
         like = _popped_up(patch, share, like)
         if not like.report.stable:
