@@ -119,26 +119,24 @@ class _Design:
 
 def _designs(patch: PatchForm, ends: Ends, telling: Callable[[int], None]) -> list[_Design]:
     """The designs of the search up to the first that is not stable; none for rods whose sections change already."""
-    found, like, share = list[_Design](), patch.popped[ends], FIRST
+    found, like = list[_Design](), patch.popped[ends]
     if any(rod.profile is not None for rod in patch.footprint.rods):
         return found
-    for number in range(1, DESIGNS + 1):
-        telling(number)
+    for number in range(DESIGNS):
+        telling(number + 1)
+        share = FIRST + number * PROBE if number < 2 else _next_share(*found)
         like = _popped_up(patch, share, like)
         if not like.report.stable:
             break
         found.append(_Design(share, like, agreement(like, patch.target)))
-        step = PROBE if number == 1 else _step(*found[-2:])
-        share = float(np.clip(share + np.clip(step, -LONGEST, LONGEST), *DOUBLE))
-        if share in [design.share for design in found]:
-            break
     return found
 
 
-def _step(before: _Design, here: _Design) -> float:
-    """To the least sum of squares of gaps that change with the share as they did since the design before."""
-    slope = (here.gap.gaps - before.gap.gaps) / (here.share - before.share)
-    return -float(slope @ here.gap.gaps) / max(float(slope @ slope), 1e-300)
+def _next_share(first: _Design, second: _Design) -> float:
+    """Where the sum of squares of gaps is least that change with the share as they do from one design to the other."""
+    slope = (second.gap.gaps - first.gap.gaps) / (second.share - first.share)
+    step = -float(slope @ second.gap.gaps) / max(float(slope @ slope), 1e-300)
+    return float(np.clip(second.share + np.clip(step, -LONGEST, LONGEST), *DOUBLE))
 
 
 def _popped_up(patch: PatchForm, share: float, like: PopUp) -> PopUp:
