@@ -233,7 +233,7 @@ def _rectangle(width: float, height: float) -> tuple[Floats, Floats, Floats]:
     return (end, along, lever) if width <= height else (along, end, lever)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bending:
     """Bending, twist and stress at every node of every rod: arrays (k,) in the order of the mesh's `rod_nodes`.
 

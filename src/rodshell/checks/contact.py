@@ -138,7 +138,7 @@ def worst_contact(parts: Mapping[str, Contact]) -> Contact:
     return replace(worst, rods=rods, pairs=sum(shape.pairs for shape in parts.values()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Outline:
     """A section's outline where it is widest: half its width along m1 and along m2 [m], whether it is a box or an
     ellipse, and by what these widths are multiplied at each entry (k, 2) of `rod_nodes`; None: 1 everywhere."""

@@ -42,7 +42,7 @@ MOST_TURNING = 400  # factorisations of turning the clamps; the paths that arriv
 AT_ONCE = 40  # iterations from the lifted grid to an equilibrium, before the energy is followed down
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Elsewhere:
     """Another shape than the final one, in which a shell comes to rest from flat.
 
@@ -84,7 +84,7 @@ class Gap:
         return f"from flat {from_flat}, and from the final shape back down to {percent_text(self.left)}{ends}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Deployment:
     """Stages of a deployment, in the order of the building site.
 

@@ -37,7 +37,7 @@ COPLANAR = 1e-3  # of the size: how far supports may lie off their plane for the
 MIRRORED = 0.02  # and the image off the reflection: trimmed ends lie some 1e-4 off the plane, layers keep their order
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OtherShape:
     """Another stable shape.
 

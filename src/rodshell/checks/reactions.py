@@ -23,7 +23,7 @@ from rodshell.solve.equilibrium import Equilibrium
 from rodshell.validation import brief
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Reactions:
     """Forces and moments of the supports on both ends of each rod in turn.
 
@@ -89,7 +89,7 @@ def _share(total: Floats, parts: Floats) -> float:
     return float(np.linalg.norm(total)) / largest if largest > 0 else 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JointLoads:
     """Of each of the grid's c crossings, in its order.
 

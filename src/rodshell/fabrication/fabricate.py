@@ -85,7 +85,7 @@ class Lath:
         return lengths
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fabricated:
     """Cut list and more, rod by rod in the order of the grid.
 

@@ -60,7 +60,7 @@ class PatchLayout:
                 positive("a patch's spacing", distance, "m")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MergedPopUp:
     """The popped-up shells of all patches, merged; the mechanical models stay separate.
 

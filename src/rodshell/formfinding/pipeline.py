@@ -41,7 +41,7 @@ ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other
 LONG_TAIL = 3.0  # spacings past a rod's last joint
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Agreement:
     """Distance between rods and target, over nodes and the middles of edges; of rods in layers from their own layer.
 

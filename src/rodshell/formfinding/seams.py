@@ -149,7 +149,7 @@ class End:
         return f"{self.patch}-{self.rod}.{self.side}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Meeting:
     """A point (3,) of a seam at which two rods of different patches end [m]."""
 
@@ -174,7 +174,7 @@ class PatchNet:
         return tuple(rod for rod in self.net.rods if not rod.virtual and rod.name not in self.layout.left_out)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _OpenEnd:
     """A rod end on a seam that no rod meets yet: the sides of the patch beyond, its tangent mirrored in the seam."""
 

@@ -123,7 +123,7 @@ class LoadedShell:
         return self.reactions.sum_of_forces
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LoadChecks:
     """A form under loads.
 

@@ -31,7 +31,7 @@ FORCES = ("force_pinned", "force_clamped")
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scale:
     """What colours a shell's rods.
 

@@ -23,7 +23,7 @@ STAGE = "stage_"
 FEWEST = 3  # ends of an outline
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GridRod:
     """One rod of a result, with its geometry.
 
@@ -184,7 +184,7 @@ def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
     return GridRod(rod, ends, nodes)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shape:
     """One shape of the grid.
 

@@ -369,7 +369,7 @@ MANY = 24  # names: where more find no room, the drawing needs a larger scale, n
 FARTHEST = 8.0  # from a place to the start of its name's line
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Callout:
     """A name, and the line (k, 2) to it from its place."""
 

@@ -23,7 +23,7 @@ UP = np.array([-_SE * _C, -_SE * _S, _CE])
 TOWARDS = np.array([_CE * _C, _CE * _S, _SE])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
     """A box in space [m] drawn `width` units wide.
 
@@ -124,7 +124,7 @@ LEVEL = 0.01  # of its width: an outline that rises more is not filled, which wo
 FADE = 0.42  # share of paper in the colour of the farthest rods
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pieces:
     """Parts of rods between two drawn nodes, rod by rod.
 
@@ -294,7 +294,7 @@ def _pieces(archive: Archive) -> Pieces:
     return Pieces(np.concatenate(drawn).astype(np.intp), begins, owner[begins])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Rods:
     """The rods of a picture, layer by layer.
 

@@ -48,7 +48,7 @@ TITLES = (
 WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DrapeRun:
     """One case by one method.
 

@@ -46,7 +46,7 @@ SLOW = 1e6  # times slower: inertia is negligible, each step is an equilibrium
 STATIC_STEPS = 60  # of such a revolution
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run:
     """A demonstration.
 

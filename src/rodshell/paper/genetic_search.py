@@ -213,7 +213,7 @@ _SQUARE = [
 # The run
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Found:
     """The generations of a search and its best variables (n,) [m]."""
 

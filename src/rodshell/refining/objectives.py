@@ -37,7 +37,7 @@ class Objective(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Gap:
     """The mean distance of the rods from the target over its size, G = (mean of |g|^p)^(1/p).
 

@@ -63,7 +63,7 @@ class MovingBody(Protocol):
     def freedom(self) -> Freedom: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """A body, its supports and the forces on it.
 
@@ -130,7 +130,7 @@ class Motion:
         return replace(self, elements=tuple(part for element in self.elements for part in in_parts(element, most)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Step:
     """A step taken: state (N, 3), velocity (N, 3), and the forces (N, 3) [N] that the supports exert."""
 

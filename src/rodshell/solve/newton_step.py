@@ -39,7 +39,7 @@ SHIFT_GROWTH = 8.0
 TINY = 1e-300  # no step is shorter, except zero
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _LastStep:
     """The last step, so that less of it can be taken: from where, at how many negative modes; the whole motion (n, 3),
     `reach` [m] long, with the change (e,) of the forces; and the share taken of both."""

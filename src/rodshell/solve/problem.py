@@ -75,7 +75,7 @@ class Constraint(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Supports:
     """Fixed directions that never turn: supports, clamps, ghost nodes.
 
@@ -144,7 +144,7 @@ class Pattern:
         return product(self.assembly.indptr, self.assembly.indices, values, x)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """A structure in equilibrium: elastic elements, edges, loads and a constraint.
 
@@ -275,7 +275,7 @@ class Force(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GravityForce:
     """Weight of the nodes. Twist angles have inertia but no weight.
 
@@ -306,7 +306,7 @@ class GravityForce:
         return force
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PointLoads:
     """Constant forces (k, 3) [N] on `blocks` (k,), which may repeat."""
 
@@ -373,7 +373,7 @@ class Damping:
         return self.rate * mass + finite("the damping coefficients", self.coefficients, *mass.shape)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExplicitForce:
     """A force without a gradient, held over each step.
 
@@ -399,7 +399,7 @@ class ExplicitForce:
         return _checked(self.force(time, state, velocity), mass.shape, self.force, time)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ImplicitForce:
     """A force with its gradient, taken at the end of each step.
 

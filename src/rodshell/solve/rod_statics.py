@@ -117,7 +117,7 @@ class RodLoads:
         return load
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SupportPath:
     """Where the prescribed blocks are at t from 0 to 1; a clamp's tangent turns along the great circle."""
 
@@ -171,7 +171,7 @@ class SupportPath:
         return Supports(self.free, moved, np.vstack([goals, *ghosts]))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _TurningClamp:
     """A clamp whose end goes straight from `start` to `goal` [m] while its tangent turns by `angle` [rad] to `side`."""
 
@@ -249,7 +249,7 @@ NEUTRAL = 1e-6  # a mode of less than this of EI/L, the rod moving by its length
 # the turn of a round rod's bow about the line of its clamps: round-off chooses its sign
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RodShape:
     """A rod in equilibrium.
 

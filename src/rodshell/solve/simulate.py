@@ -65,7 +65,7 @@ class MotionReport:
     reason: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sample:
     """A time of a motion; its `motion` has its source frames there, so that it can be continued.
 
@@ -84,7 +84,7 @@ class Sample:
         return self.motion.elastic_energy(self.state), self.motion.kinetic_energy(self.velocity)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TimeSeries:
     """A motion at k times.
 

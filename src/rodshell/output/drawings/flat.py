@@ -37,7 +37,7 @@ STRIPS_LEGEND = (
 TALL = 15.0  # text sizes from strip to strip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FlatPlan:
     """The content of the flat plan.
 

@@ -52,7 +52,7 @@ class Scene:
         return len(text).to_bytes(4, "little") + text + self.data
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Coloured:
     """What colours a shape, and its worst place: a point (3,) [m], and the value there in words."""
 
@@ -61,7 +61,7 @@ class Coloured:
     worst: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drawn:
     """What a scene is made of.
 
@@ -182,7 +182,7 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     ).scene()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Frame:
     """Where a scene lies, and which entries are drawn."""
 
