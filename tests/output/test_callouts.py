@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rodshell.geometry.boxes import boxes_meet, lines_meet
 from rodshell.output.drawing import Drawing, Text
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
 from rodshell.output.drawings.shell import supports_drawing
-from rodshell.output.labels import Room, boxes_meet, callouts, lines_meet, outward
+from rodshell.output.labels import Room, callouts, outward
 from rodshell.results import Archive
 from tests.output.forms import formed
 

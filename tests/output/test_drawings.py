@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from rodshell.errors import InputError
+from rodshell.geometry.boxes import boxes_meet, length_beneath, lines_meet
 from rodshell.output import export
 from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
@@ -22,7 +23,7 @@ from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan, st
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, bound, laid_out, room, tiled, title_block
 from rodshell.output.drawings.shell import SAME, bracing_drawing, elevations_drawing, erection_drawing, rod_curves
 from rodshell.output.grid import joint_places, rods_of
-from rodshell.output.labels import boxes_meet, length_beneath, lines_meet, spread
+from rodshell.output.labels import spread
 from rodshell.output.options import DrawingStyle, OutputOptions
 from rodshell.results import Archive
 from rodshell.results.wording import rounding_of

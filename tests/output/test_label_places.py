@@ -8,11 +8,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from rodshell.geometry.boxes import boxes_meet, lines_meet
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import fitted
 from rodshell.output.drawings.shell import supports_drawing
-from rodshell.output.labels import Room, boxes_meet, callouts, lines_meet, outward
+from rodshell.output.labels import Room, callouts, outward
 from rodshell.results import Archive
 from tests.output.forms import formed
 from tests.output.sample_archive import table_archive

@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 from rodshell.errors import OutputError
+from rodshell.geometry.boxes import boxes_meet, lines_meet
 from rodshell.output import export, save
 from rodshell.output.drawings.flat import flat_plan
-from rodshell.output.labels import boxes_meet, lines_meet, place
+from rodshell.output.labels import place
 from rodshell.output.pictures import picture_svg
 from rodshell.results import Archive, Results, read
 from rodshell.results.wording import shown_length

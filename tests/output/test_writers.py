@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+from rodshell.geometry.boxes import lines_meet
 from rodshell.output.colour_scale import mixed, scale_of
 from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
 from rodshell.output.grid import rods_of, shape_of
-from rodshell.output.labels import Room, lines_meet
+from rodshell.output.labels import Room
 from rodshell.output.pictures import DEPTHS, PAPER, picture
 from rodshell.output.png import drawing_png
 from rodshell.output.svg import drawing_svg, number

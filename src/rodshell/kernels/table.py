@@ -31,6 +31,9 @@ KERNELS: dict[str, dict[str, str]] = {
     "formfinding.trim": {
         "_end_tangents": "f2 i1 i1 i1 f1",
     },
+    "geometry.boxes": {
+        "each_meets": "f3 f4",
+    },
     "geometry.curves": {
         "_on_curve": "f1 f2 f1",
         "lagrange": "f2 f3 f1",
@@ -103,9 +106,6 @@ KERNELS: dict[str, dict[str, str]] = {
         "_rows_to_renew": "f3 i2 f2 f b2 f2",
         "_straighten": "f2 f2 f1 i1 f2 f1 f2 f3",
         "_sweep": "f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2 f",
-    },
-    "output.labels": {
-        "each_meets": "f3 f4",
     },
     "rods.bend_twist": {
         "_bend_twist": "f2 i2 f2 f1 f2 f1 f3 f3 f1 f2 f3",

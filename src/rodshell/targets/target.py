@@ -1,8 +1,10 @@
 """What every target offers: an implicit surface, continued smoothly past the end of the shell."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import wraps
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +12,11 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
+from rodshell.validation import array
 
+OF_PLAN = {"height_at", "lift"}  # methods of points of the plan, and of points in space
+OF_SPACE = {"implicit", "level", "margin", "covers", "retract", "on_surface", "outside", "contact"}
+OF_SPACE |= {"closest", "distance", "gap"}
 NO_FORCES = np.empty((0, 3))
 NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
 
@@ -45,13 +51,41 @@ class Gap(NamedTuple):
     hessian: Floats
 
 
+def _checking_points(method: Callable[..., Any], name: str, columns: int) -> Callable[..., Any]:
+    """The method, which converts points to an array (n, columns), or refuses them: a kernel would read what
+    lies in memory after too short a row."""
+
+    @wraps(method)
+    def checked(self: "Target", *given: Any, **named: Any) -> Any:
+        if not given:
+            named |= {name: array(name, named[name], np.float64, None, columns)} if name in named else {}
+        elif not (type(x := given[0]) is np.ndarray and x.dtype == float and x.ndim == 2 and x.shape[1] == columns):
+            given = array(name, x, np.float64, None, columns), *given[1:]
+        return method(self, *given, **named)
+
+    return checked
+
+
 @dataclass(frozen=True, eq=False)
 class Target(ABC):
     """A surface F(x) = 0 that ends at a base plane, a rim or the edge of its plan.
 
     The surface is continued smoothly past that end: the net is marched there, and rods are cut where they cross the
-    end. Lengths are in m, z is up.
+    end. Lengths are in m, z is up. Points may be given as nested sequences of numbers, too; each method of points
+    raises InputError for what has another shape.
     """
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls._check_points()
+
+    @classmethod
+    def _check_points(cls) -> None:
+        """Let the methods of points that this class defines check their points."""
+        for name, method in tuple(vars(cls).items()):
+            if name in OF_PLAN | OF_SPACE and not getattr(method, "__isabstractmethod__", False):
+                points, columns = ("xy", 2) if name in OF_PLAN else ("x", 3)
+                setattr(cls, name, _checking_points(method, points, columns))
 
     @property
     @abstractmethod
@@ -249,6 +283,9 @@ class Target(ABC):
             x, y = xy[int(np.argmin(np.isfinite(z)))]
             raise InputError(f"the target has no point over ({x:g}, {y:g}) m: choose one inside its rim")
         return np.column_stack([xy, z])
+
+
+Target._check_points()
 
 
 @njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]

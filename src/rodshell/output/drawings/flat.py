@@ -12,9 +12,10 @@ from itertools import product
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, median
+from rodshell.geometry.boxes import lines_meet
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
 from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
-from rodshell.output.labels import Label, Room, callouts, closed_segments, lines_meet, outward, place, spread, take
+from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
 from rodshell.results.archive import made_once

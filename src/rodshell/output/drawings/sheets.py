@@ -15,8 +15,9 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
-from rodshell.output.labels import Label, Room, length_beneath, nearby, take, thin
+from rodshell.output.labels import Label, Room, nearby, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash

@@ -8,6 +8,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.bounds import bounds
+from rodshell.geometry.boxes import each_meets
 from rodshell.output.drawing import (
     BACK,
     INK,
@@ -24,7 +25,7 @@ from rodshell.output.drawing import (
 )
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.grid import joint_places, outlines_of, rods_of
-from rodshell.output.labels import Room, callouts, closed_segments, each_meets, outward, upright
+from rodshell.output.labels import Room, callouts, closed_segments, outward, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
 from rodshell.results.results import Brace
