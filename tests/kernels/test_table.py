@@ -1,6 +1,10 @@
 """The table of kernels: complete, and the types are those that jobs call them with."""
 
 import ast
+import re
+import subprocess
+import sys
+import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -20,6 +24,21 @@ def test_a_row_has_a_type_for_each_argument() -> None:
     for module, rows in KERNELS.items():
         for name, row in rows.items():
             assert len(kernels_of(module)[name].args.args) == len(row.split()), f"{module}.{name}"
+
+
+def test_modules_of_kernels_import_without_what_is_not_there_when_a_wheel_is_built() -> None:
+    """The build installs `BUILDER` alone."""
+    root = SOURCE.parent.parent
+    hooks = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["metadata"]["hooks"]
+    tree = ast.parse((root / "hatch_build.py").read_text(encoding="utf-8"))
+    values = {node.targets[0].id: node.value for node in tree.body if isinstance(node, ast.Assign)}  # type: ignore[attr-defined]
+    there = {re.split(r"\W", word)[0] for word in ast.literal_eval(values["BUILDER"])}
+    missing = {re.split(r"\W", word)[0] for word in hooks["custom"]["dependencies"]} - there
+    assert {"pydantic", "pillow"} <= missing
+    code = "import sys\n" + "".join(f"sys.modules[{name!r}] = None\n" for name in sorted(missing | {"PIL"}))
+    code += "".join(f"import rodshell.{module}\n" for module in KERNELS)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert not done.returncode, done.stderr
 
 
 @cache
