@@ -152,7 +152,7 @@ def _least_squares(matrix: Floats, right: Floats, low: Floats, high: Floats) -> 
     free = np.asarray(np.linalg.lstsq(matrix, right)[0])
     if n == 1 or bool(((low <= free) & (free <= high)).all()):
         return np.clip(free, low, high)
-    from scipy.optimize import lsq_linear  # here: it takes as long to import as the step of an offer to compute
+    from scipy.optimize import lsq_linear  # here, as a search of one variable does not need it
 
     tight = high - low < 1e-12
     low, high = np.where(tight, low - 1e-12, low), np.where(tight, high + 1e-12, high)

@@ -78,7 +78,8 @@ def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Of
 
     Returns
     -------
-    None where the form has no stable shell and no target, or the time was over.
+    None where the form has no target, no stable shell, or rods whose sections change along them; where no design of a
+    patch is stable; or where the time was over.
     """
     if stages.status != "converged" or not stages.agreement:
         return None
