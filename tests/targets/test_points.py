@@ -27,9 +27,16 @@ def test_lists_are_points_as_arrays_are(name: str, method: str) -> None:
     evaluate, columns = getattr(TARGETS[name](), method), 2 if method in OF_PLAN else 3
     points = np.array(POINTS)[:, :columns]
     expected = evaluate(points)
-    for given in (points.tolist(), points.astype(np.float32).astype(float), np.asfortranarray(points)):
+    for given in (points.tolist(), np.asfortranarray(points)):
         for ours, theirs in zip(_arrays(evaluate(given)), _arrays(expected), strict=True):
-            np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-7)
+            np.testing.assert_array_equal(ours, theirs)
+
+
+def test_other_kinds_of_numbers_are_converted() -> None:
+    sphere = TARGETS["hemisphere"]()
+    np.testing.assert_array_equal(sphere.closest(np.array([[0, 0, 1]])), sphere.closest(np.array([[0.0, 0.0, 1.0]])))
+    single = np.array(POINTS, dtype=np.float32)
+    np.testing.assert_array_equal(sphere.distance(single), sphere.distance(single.astype(float)))
 
 
 @pytest.mark.parametrize("name", TARGETS)

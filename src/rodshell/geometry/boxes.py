@@ -44,8 +44,14 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
 
 @njit(error_model="numpy")
 def each_meets(boxes, lines):  # type: ignore[no-untyped-def]
-    """(n,) whether one of its own lines (n, m, 2, 2) runs through each rectangle (n, 4, 2), which is the square from -1
-    to 1 of its own axes."""
+    """(n,) whether one of its own lines runs through each rectangle.
+
+    In coordinates along its sides each rectangle is the square from -1 to 1.
+
+    Parameters
+    ----------
+    boxes : (n, 4, 2) corners of each in a row; lines : (n, m, 2, 2) ends of its m lines.
+    """
     met = np.zeros(len(boxes), dtype=np.bool_)
     for n in range(len(boxes)):
         (x0, y0), (x1, y1), (x2, y2), (x3, y3) = boxes[n, 0], boxes[n, 1], boxes[n, 2], boxes[n, 3]

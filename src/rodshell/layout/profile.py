@@ -19,10 +19,9 @@ Varies = Literal["size", "width", "height", "a", "b", "laths"]
 DOUBLE = (0.05, 0.95)  # least and most share of a rod's length that is made double, where the share is chosen
 # Gauss and Legendre's five points of a piece, and weights: 1e-5 of the mean of 1/f where f grows eightfold over it
 _NEAR, _FAR = (sqrt(5 + sign * 2 * sqrt(10 / 7)) / 3 for sign in (-1, 1))
+_LIGHT, _HEAVY = ((322 + sign * 13 * sqrt(70)) / 900 for sign in (-1, 1))
 GAUSS_POINTS = np.array([-_FAR, -_NEAR, 0.0, _NEAR, _FAR])
-GAUSS_WEIGHTS = (
-    np.array([322 - 13 * sqrt(70), 322 + 13 * sqrt(70), 512, 322 + 13 * sqrt(70), 322 - 13 * sqrt(70)]) / 900
-)
+GAUSS_WEIGHTS = np.array([_LIGHT, _HEAVY, 128 / 225, _HEAVY, _LIGHT])
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Mark, Path, 
 if TYPE_CHECKING:
     from reportlab.lib.colors import Color
     from reportlab.pdfgen.canvas import Canvas
+    from reportlab.pdfgen.pathobject import PDFPathObject
 
 POINTS = 72 / 25.4  # of a millimetre
 QUARTER = 4 / 3 * (sqrt(2) - 1)  # length of the handles of a quarter circle's Bezier curve over the radius
@@ -129,52 +130,29 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
     if pen.fill:
         canvas.setFillColor(_colour(pen.fill))
     for group in ([item] for item in items) if pen.fill else (items,):
-        canvas.drawPath(_Shapes(group), stroke=int(pen.width > 0), fill=int(bool(pen.fill)))
-
-
-class _Shapes:
-    """Lines and circles as one path, its numbers written at once: reportlab's own paths write each on its own.
-
-    Parameters
-    ----------
-    items : what is drawn, in its order.
-    """
-
-    def __init__(self, items: Iterable[Path | Mark]) -> None:
-        self._operators, self._numbers = list[str](), list[float]()
-        for item in items:
+        path = canvas.beginPath()
+        for item in group:
             if isinstance(item, Mark):
-                self._operators.append(CIRCLE)
-                self._numbers += _circle(item)
-            else:
-                self._operators.append(_polyline(len(item.points), item.closed))
-                self._numbers += item.points.ravel().tolist()
-
-    def getCode(self) -> str:  # as reportlab calls it
-        return f"n {' '.join(self._operators)}" % tuple(self._numbers)
-
-
-POINT = "%.3f %.3f"  # to a thousandth of a millimetre
-CIRCLE = f"{POINT} m {' '.join([f'{POINT} {POINT} {POINT} c'] * 4)}"
+                _add_circle(path, item)
+                continue
+            first, *others = item.points.tolist()
+            path.moveTo(*first)
+            for point in others:
+                path.lineTo(*point)
+            if item.closed:
+                path.close()
+        canvas.drawPath(path, stroke=int(pen.width > 0), fill=int(bool(pen.fill)))
 
 
-@cache
-def _polyline(count: int, closed: bool) -> str:
-    """The operators of a line through so many points [ISO 32000-1, 8.5.2]."""
-    return " ".join([f"{POINT} m", *[f"{POINT} l"] * (count - 1), *["h"] * closed])
-
-
-def _circle(mark: Mark) -> tuple[float, ...]:
-    """The points of a circle of four curves."""
+def _add_circle(path: "PDFPathObject", mark: Mark) -> None:
+    """A circle of four curves; reportlab's own method looks up the sines of right angles again for each."""
     (x, y), r = mark.at.tolist(), mark.radius
     k = QUARTER * r
-    return (
-        x + r, y,
-        x + r, y + k, x + k, y + r, x, y + r,
-        x - k, y + r, x - r, y + k, x - r, y,
-        x - r, y - k, x - k, y - r, x, y - r,
-        x + k, y - r, x + r, y - k, x + r, y,
-    )  # fmt: skip
+    path.moveTo(x + r, y)
+    path.curveTo(x + r, y + k, x + k, y + r, x, y + r)
+    path.curveTo(x - k, y + r, x - r, y + k, x - r, y)
+    path.curveTo(x - r, y - k, x - k, y - r, x, y - r)
+    path.curveTo(x + k, y - r, x + r, y - k, x + r, y)
 
 
 def _write(canvas: "Canvas", texts: Iterable[Text]) -> None:

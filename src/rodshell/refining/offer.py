@@ -1,10 +1,12 @@
 """What the cheapest refinement that anybody can build would gain: double laths over the middle of every rod.
 
 One step of Gauss and Newton's method in the share of each rod that is double, the derivative being the difference of
-two shells: a few factorisations. Neither the gates of a refinement nor its limit on the lowest mode are tried.
+two shells: a few factorisations. Where that gains nothing one more design is tried near 1: rods that are double from
+end to end have the shape of single ones, and a little less may be nearer. Neither the gates of a refinement nor its
+limit on the lowest mode are tried.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +24,8 @@ from rodshell.solve.problem import Problem
 from rodshell.units import percent_text
 
 FIRST, PROBE = 0.55, 0.1  # share of each rod that is double in the first design; the difference to the second
-DESIGNS = 3  # the third is where these two lead
-LONGEST = 0.3  # step of the share
+LONGEST = 0.3  # step to the third, which is where these two lead
+NEAR_ALL = 0.9  # share of the fourth, which is tried where these three gain nothing
 WORTH = 0.8  # of the gap before: a larger one after is a small gain
 
 
@@ -53,7 +55,12 @@ class Offer:
         low, high = (f"{100 * share:.0f}" for share in self.shares)
         part = f"the middle {low if low == high else f'{low} to {high}'} % of every rod"
         gain = f"{percent_text(self.before)} -> {percent_text(self.after)} rms"
-        if self.after > WORTH * self.before:
+        if self.after >= self.before:
+            words = (
+                f"no gain by double laths was found with {self.ends} ends "
+                f"({percent_text(self.before)} rms as it is, {percent_text(self.after)} in the best design tried)"
+            )
+        elif self.after > WORTH * self.before:
             words = f"double laths would gain little with {self.ends} ends ({gain})"
         else:
             words = f"double laths over {part}, {self.ends} ends: gap {gain} (--vary double --ends {self.ends})"
@@ -93,11 +100,11 @@ def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Of
 
     try:
         found = [_designs(patch, ends, telling) for patch in patches]
-    except (InputError, OutOfTimeError):
+    except InputError:
         return None
-    if not all(found):
+    if not all(designs for designs, _ in found):
         return None
-    best = [min(designs, key=lambda design: design.gap.rms) for designs in found]
+    best = [min(designs, key=lambda design: design.gap.rms) for designs, _ in found]
     shares = [design.share for design in best]
     return Offer(
         ends,
@@ -105,39 +112,48 @@ def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Of
         merged_agreement([design.gap for design in best]).rms_relative,
         (min(shares), max(shares)),
         {other: gap.rms_relative for other, gap in stages.agreement.items() if other != ends},
-        sum(design.popped.report.factorizations for designs in found for design in designs),
+        sum(factorizations for _, factorizations in found),
     )
 
 
 @dataclass(frozen=True)
 class _Design:
-    """A shell with double laths over a share of every rod, and its gap."""
+    """Double laths over a share of every rod, and the gap of the shell."""
 
     share: float
-    popped: PopUp
     gap: Agreement
 
 
-def _designs(patch: PatchForm, ends: Ends, telling: Callable[[int], None]) -> list[_Design]:
-    """The designs of the search up to the first that is not stable; none for rods whose sections change already."""
-    found, like = list[_Design](), patch.popped[ends]
+def _designs(patch: PatchForm, ends: Ends, telling: Callable[[int], None]) -> tuple[list[_Design], int]:
+    """The designs of the search up to the first that is not stable, or to the end of the time, and the factorisations
+    that all took; no designs for rods whose sections change already."""
+    found, like, factorizations = list[_Design](), patch.popped[ends], 0
     if any(rod.profile is not None for rod in patch.footprint.rods):
-        return found
-    for number in range(DESIGNS):
-        telling(number + 1)
-        share = FIRST + number * PROBE if number < 2 else _next_share(*found)
+        return found, factorizations
+    while (share := _next_share(found, patch.agreement[ends])) is not None:
+        try:
+            telling(len(found) + 1)
+        except OutOfTimeError:
+            break
         like = _popped_up(patch, share, like)
+        factorizations += like.report.factorizations
         if not like.report.stable:
             break
-        found.append(_Design(share, like, agreement(like, patch.target)))
-    return found
+        found.append(_Design(share, agreement(like, patch.target)))
+    return found, factorizations
 
 
-def _next_share(first: _Design, second: _Design) -> float:
-    """Where the sum of squares of gaps is least that change with the share as they do from one design to the other."""
-    slope = (second.gap.gaps - first.gap.gaps) / (second.share - first.share)
-    step = -float(slope @ second.gap.gaps) / max(float(slope @ slope), 1e-300)
-    return float(np.clip(second.share + np.clip(step, -LONGEST, LONGEST), *DOUBLE))
+def _next_share(found: Sequence[_Design], before: Agreement) -> float | None:
+    """The share to be tried after the designs that were found; None: no more."""
+    if len(found) < 2:
+        return FIRST + len(found) * PROBE
+    if len(found) == 2:
+        first, second = found
+        slope = (second.gap.gaps - first.gap.gaps) / (second.share - first.share)
+        step = -float(slope @ second.gap.gaps) / max(float(slope @ slope), 1e-300)  # to the least sum of squares
+        return float(np.clip(second.share + np.clip(step, -LONGEST, LONGEST), *DOUBLE))
+    gains = min(design.gap.rms for design in found) < before.rms
+    return None if gains or len(found) > 3 else NEAR_ALL
 
 
 def _popped_up(patch: PatchForm, share: float, like: PopUp) -> PopUp:

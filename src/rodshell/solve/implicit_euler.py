@@ -321,7 +321,7 @@ def _gradient(elements: tuple[Elements, ...], state: Floats) -> Floats:
     return gradient
 
 
-@dataclass
+@dataclass(eq=False)
 class _Newton:
     """Newton's iteration of one step."""
 

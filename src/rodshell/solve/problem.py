@@ -342,7 +342,7 @@ class PointLoads:
         return force
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Damping:
     """Viscous damping -(rate M + coefficients) v, implicit: it never overshoots.
 
@@ -373,7 +373,7 @@ class Damping:
         return self.rate * mass + finite("the damping coefficients", self.coefficients, *mass.shape)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class ExplicitForce:
     """A force without a gradient, held over each step.
 
