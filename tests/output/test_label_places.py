@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rodshell.geometry.boxes import boxes_meet, lines_meet
-from rodshell.output.drawing import Drawing
+from rodshell.output.drawing import LETTER, LINE, Drawing
 from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import fitted
 from rodshell.output.drawings.shell import supports_drawing
-from rodshell.output.labels import Room, callouts, outward
+from rodshell.output.labels import Label, Room, callouts, outward
 from rodshell.results import Archive
 from tests.output.forms import formed
 from tests.output.sample_archive import table_archive
@@ -128,3 +128,17 @@ def test_names_around_any_opening_are_clear_and_near(
         assert np.array_equal(one.line[0], place)
         assert off(one.written.box(), place) < 22 * size
         assert one.written.size >= 0.749 * size
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, -1.1, np.pi / 2])
+def test_a_line_to_a_label_ends_where_its_room_is_nearest(angle: float) -> None:
+    size, centre = 3.0, np.array([2.0, -1.0])
+    half = 0.5 * size * np.array([LETTER * 4 + 0.2, LINE])
+    u, v = (axis.ravel() for axis in np.meshgrid(np.linspace(-1, 1, 401), np.linspace(-1, 1, 401)))
+    along = np.array([np.cos(angle), np.sin(angle)])
+    room = centre + (half[0] * u)[:, None] * along + (half[1] * v)[:, None] * np.array([-along[1], along[0]])
+    for end in np.array([[9.0, 3.0], [-7.0, 2.0], [1.0, -9.0], [3.0, 8.0]]):
+        first, last = Label("U01a", centre, angle, end, moved=True).leader(size)
+        np.testing.assert_array_equal(first, end)
+        nearest = room[np.linalg.norm(room - end, axis=1).argmin()]
+        np.testing.assert_allclose(last, nearest, atol=0.02 * size)

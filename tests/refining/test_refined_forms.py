@@ -12,7 +12,7 @@ import rodshell as rs
 from rodshell.case.stage_tables import FAMILIES as WORDS
 from rodshell.cli import main
 from rodshell.errors import OutOfTimeError
-from rodshell.formfinding.pipeline import PatchForm
+from rodshell.formfinding.pipeline import Agreement, PatchForm
 from rodshell.formfinding.popup import PopUp
 from rodshell.output.viewer.scene import scene_of
 from rodshell.refining import acceptance
@@ -162,6 +162,16 @@ def test_the_offer_is_of_the_designs_that_are_stable(stable: int, monkeypatch: p
     assert (found is None) == (stable == 0)
     if found is not None:
         assert found.shares[0] in shares[:stable]
+
+
+def test_the_third_share_is_that_of_the_least_squares_of_gaps_that_are_linear_in_it() -> None:
+    start, slope = np.array([0.3, -1.0, 0.6]), np.array([-0.5, 1.3, -0.4])
+    best = -float(start @ slope) / float(slope @ slope)
+    gaps = [Agreement(start + share * slope, 1.0, 1.0, (0.0, 0.0, 0.0), 1.0) for share in (0.55, 0.65)]
+    designs = [of_offer._Design(share, gap) for share, gap in zip((0.55, 0.65), gaps, strict=True)]
+    assert 0.65 < best < 0.9
+    assert of_offer._next_share(designs, gaps[0]) == pytest.approx(best, rel=1e-12)
+    assert of_offer._next_share(designs[::-1], gaps[0]) == pytest.approx(best, rel=1e-12)
 
 
 @pytest.mark.parametrize("in_time", [0, 1])
