@@ -59,7 +59,7 @@ def _checking_points(method: Callable[..., Any], name: str, columns: int) -> Cal
     def checked(self: "Target", *given: Any, **named: Any) -> Any:
         if not given:
             named |= {name: array(name, named[name], np.float64, None, columns)} if name in named else {}
-        elif not (type(x := given[0]) is np.ndarray and x.dtype == float and x.ndim == 2 and x.shape[1] == columns):
+        elif not (type(x := given[0]) is np.ndarray and x.dtype.char == "d" and x.ndim == 2 and x.shape[1] == columns):
             given = array(name, x, np.float64, None, columns), *given[1:]
         return method(self, *given, **named)
 
