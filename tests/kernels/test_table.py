@@ -28,7 +28,7 @@ def test_a_row_has_a_type_for_each_argument() -> None:
 
 def test_modules_of_kernels_import_without_what_is_not_there_when_a_wheel_is_built() -> None:
     """The build installs `BUILDER` alone."""
-    root = SOURCE.parent.parent
+    root = Path(__file__).parents[2]
     hooks = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["metadata"]["hooks"]
     tree = ast.parse((root / "hatch_build.py").read_text(encoding="utf-8"))
     values = {node.targets[0].id: node.value for node in tree.body if isinstance(node, ast.Assign)}  # type: ignore[attr-defined]
