@@ -242,18 +242,18 @@ def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None
     """
     import numpy as np
 
-    wanted = ", ".join("n" if count is None else str(count) for count in shape)
+    whole = issubclass(kind, np.integer)
+    wanted = f"shape ({', '.join('n' if count is None else str(count) for count in shape)})"
     try:
         result = np.asarray(given)
-        allowed = "iu" if np.issubdtype(kind, np.integer) else "fiu"
-        if result.size and result.dtype.kind not in allowed:  # np.asarray([]) is an array of floats
+        if result.size and result.dtype.kind not in ("iu" if whole else "fiu"):  # np.asarray([]) is an array of floats
             raise TypeError
         result = result.astype(kind, copy=False)
     except (TypeError, ValueError):
-        what = "integers" if np.issubdtype(kind, np.integer) else "numbers"
-        raise InputError(f"{name} must be {what} of the shape ({wanted}), not {short(given)}") from None
+        what = "integers" if whole else "numbers"
+        raise InputError(f"{name} must be {what} of the {wanted}, not {short(given)}") from None
     if result.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, result.shape, strict=True)):
-        raise InputError(f"{name} must have the shape ({wanted}), not {result.shape}")
+        raise InputError(f"{name} must have the {wanted}, not {result.shape}")
     return result
 
 

@@ -237,84 +237,89 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
 
     The blocks of all elements lie in a row in `flat`, of each set `numbers` of elements with `widths` of blocks.
     """
-    n, sets = len(count), len(widths)
-    start, filled, pairs = np.zeros(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), 0
-    for at in flat:
-        start[at + 1] += 1
+    n, start = len(count), np.zeros(len(count) + 1, dtype=np.int64)  # where there is room for each block's rows
+    begin, pairs = 0, 0
+    for s in range(len(widths)):
+        k = widths[s]
+        for at in flat[begin : begin + numbers[s] * k]:
+            start[at + 1] += k - 1
+        begin, pairs = begin + numbers[s] * k, pairs + numbers[s] * k * k
     for j in range(n):
         start[j + 1] += start[j]
-        filled[j] = start[j]
-    elements = np.empty((len(flat), 4), dtype=np.int64)  # that touch each block: its place there, blocks, width, slots
-    begin = 0
-    for s in range(sets):
+    stop, rows = start[:n].copy(), np.empty(start[n], dtype=np.int64)
+    slots, begin, slot = np.empty(pairs, dtype=np.int64), 0, 0
+    for s in range(len(widths)):  # the rows of each block column once each, and which of them each pair is
         k = widths[s]
         for _ in range(numbers[s]):
-            for b in range(k):
-                e = filled[flat[begin + b]]
-                elements[e, 0], elements[e, 1], elements[e, 2], elements[e, 3] = b, begin, k, pairs
-                filled[flat[begin + b]] = e + 1
-            begin, pairs = begin + k, pairs + k * k
-    slots = np.empty(pairs, dtype=np.int64)
-    rows, kept, above = (
-        np.empty(pairs + n, dtype=np.int64),
-        np.empty(n + 1, dtype=np.int64),
-        np.empty(n, dtype=np.int64),
-    )
-    mark, place = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    for j in range(n):
-        mark[j] = -1
-    used, values, unknowns = 0, 0, 0
-    for j in range(n):  # block column by block column: its rows ascending, once each, a few dozen at most
-        first, high = used, 0
-        for e in range(start[j], start[j + 1] if count[j] > 0 else start[j]):
-            begin = elements[e, 1]
-            for a in range(elements[e, 2]):
-                i = flat[begin + a]
-                if i < j and mark[i] != j and count[i] > 0:
-                    mark[i], k = j, used
-                    while k > first and rows[k - 1] > i:
-                        rows[k] = rows[k - 1]
-                        k -= 1
-                    rows[k] = i
-                    used += 1
-        for e in range(first, used):
-            place[rows[e]] = values + high
-            high += count[rows[e]]
-        if count[j] > 0:
-            place[j], mark[j] = values + high, j
-        kept[j], above[j] = first, high
-        for e in range(start[j], start[j + 1]):
-            b, begin, k, slot = elements[e, 0], elements[e, 1], elements[e, 2], elements[e, 3]
             for a in range(k):
-                i = flat[begin + a]
-                slots[slot + a * k + b] = place[i] if mark[i] == j and (i < j or a == b) else -1
+                for b in range(a):
+                    i, j, upper, lower = flat[begin + a], flat[begin + b], slot + a * k + b, slot + b * k + a
+                    if i > j:
+                        i, j, upper, lower = j, i, lower, upper
+                    e = start[j]
+                    while e < stop[j] and rows[e] != i:
+                        e += 1
+                    if i == j or count[i] == 0 or count[j] == 0:
+                        e = -1
+                    elif e == stop[j]:
+                        rows[e] = i
+                        stop[j] += 1
+                    slots[upper], slots[lower] = e, -1
+            begin, slot = begin + k, slot + k * k
+    sorted_rows, order = np.empty_like(rows), np.empty_like(rows)
+    place, diagonal = np.empty_like(rows), np.empty(n, dtype=np.int64)  # where values begin
+    kept, above, used, values, unknowns = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0, 0
+    for j in range(n):  # a few dozen rows at most
+        first, high = used, 0
+        for e in range(start[j], stop[j]):
+            k = used
+            while k > first and sorted_rows[k - 1] > rows[e]:
+                sorted_rows[k], order[k] = sorted_rows[k - 1], order[k - 1]
+                k -= 1
+            sorted_rows[k], order[k] = rows[e], e
+            used += 1
+        for k in range(first, used):
+            place[order[k]] = values + high
+            high += count[sorted_rows[k]]
+        kept[j], above[j], diagonal[j] = first, high, values + high if count[j] > 0 else -1
         values += count[j] * high + count[j] * (count[j] + 1) // 2
         unknowns += count[j]
-    kept[n] = used
-    indptr, indices = np.zeros(unknowns + 1, dtype=np.int64), np.empty(values, dtype=np.int64)
-    block_begin, block_start = np.empty(n + 1, dtype=np.int64), np.empty(n + 1, dtype=np.int64)
+    kept[n], begin, slot = used, 0, 0
+    for s in range(len(widths)):
+        k = widths[s]
+        for _ in range(numbers[s]):
+            for a in range(k):
+                for b in range(k):
+                    if a == b:
+                        slots[slot] = diagonal[flat[begin + a]]
+                    elif slots[slot] >= 0:
+                        slots[slot] = place[slots[slot]]
+                    slot += 1
+            begin += k
+    indptr, indices, first_of = np.zeros(unknowns + 1, dtype=np.int64), np.empty(values, dtype=np.int64), stop
+    block_begin, block_start, block_of = np.empty(n + 1, dtype=np.int64), np.empty(n + 1, dtype=np.int64), diagonal
     value, unknown, blocks = 0, 0, 0
     for j in range(n):
-        filled[j] = unknown
+        first_of[j] = unknown
         for c in range(count[j]):
             for e in range(kept[j], kept[j + 1]):
-                i = rows[e]
-                for r in range(filled[i], filled[i] + count[i]):
+                i = sorted_rows[e]
+                for r in range(first_of[i], first_of[i] + count[i]):
                     indices[value] = r
                     value += 1
             for r in range(c + 1):
-                indices[value] = filled[j] + r
+                indices[value] = first_of[j] + r
                 value += 1
             unknown += 1
             indptr[unknown] = value
         if count[j] > 0:
-            block_begin[blocks], block_start[blocks], place[j] = filled[j], kept[j], blocks
+            block_begin[blocks], block_start[blocks], block_of[j] = first_of[j], kept[j], blocks
             blocks += 1
             for e in range(kept[j], kept[j + 1]):
-                rows[e] = place[rows[e]]
+                sorted_rows[e] = block_of[sorted_rows[e]]
     block_begin[blocks], block_start[blocks] = unknown, used
     begins, starts = block_begin[: blocks + 1].copy(), block_start[: blocks + 1].copy()
-    return indptr, indices, above, slots, begins, starts, rows[:used].copy()
+    return indptr, indices, above, slots, begins, starts, sorted_rows[:used].copy()
 
 
 @njit(error_model="numpy", nogil=True)

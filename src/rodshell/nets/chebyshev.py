@@ -297,6 +297,10 @@ def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: 
                 after -= 1
             while after < count and at[after] < s[e]:
                 after += 1
+            if after < count and at[after] == s[e]:  # itself
+                for d in range(3):
+                    result[nodes[e], d] = there[after, d]
+                continue
             first = nearest_four(at, s[e], after, 0, count - 1, shares, 0)
             for d in range(3):
                 value = 0.0

@@ -424,13 +424,15 @@ def _maps(  # type: ignore[no-untyped-def]
                 a = neighbours[e] if e >= start[b] else b
                 if place[a] < k:
                     continue
-                right = max(a, b)
-                at = source[e] if a != b else indptr[begin[b]] + above[b]
-                for c in range(begin[right + 1] - begin[right]):
-                    for r in range(begin[min(a, b) + 1] - begin[min(a, b)] if a != b else c + 1):
-                        i, j = (r, c) if b < a or a == b else (c, r)
-                        entry_source[entry] = at + r
-                        entry_place[entry] = (local[k] + i) * stride + local[place[a]] + j
+                right, pivot = max(a, b), local[k] * stride + local[place[a]]  # where its first value goes
+                at, rows_of, columns_of, down, across = indptr[begin[b]] + above[b], weight[k], weight[k], stride, 1
+                if b < a:
+                    at, columns_of = source[e], begin[a + 1] - begin[a]
+                elif a < b:
+                    at, rows_of, down, across = source[e], begin[a + 1] - begin[a], 1, stride
+                for c in range(columns_of):
+                    for r in range(rows_of if a != b else c + 1):
+                        entry_source[entry], entry_place[entry] = at + r, pivot + down * r + across * c
                         entry += 1
                     at += above[right] + c + 1
         entry_start[s + 1] = entry
