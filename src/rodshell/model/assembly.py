@@ -266,21 +266,23 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
                         stop[j] += 1
                     slots[upper], slots[lower] = e, -1
             begin, slot = begin + k, slot + k * k
-    sorted_rows, order = np.empty_like(rows), np.empty_like(rows)
-    place, diagonal = np.empty_like(rows), np.empty(n, dtype=np.int64)  # where values begin
-    kept, above, used, values, unknowns = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0, 0
-    for j in range(n):  # a few dozen rows at most
+    total, most = 0, 0
+    for j in range(n):
+        total, most = total + stop[j] - start[j], max(most, stop[j] - start[j])
+    ascending, order, diagonal = np.empty(total, dtype=np.int64), np.empty(most, dtype=np.int64), np.empty_like(count)
+    kept, above, used, values, unknowns = np.empty(n + 1, dtype=np.int64), np.empty_like(count), 0, 0, 0
+    for j in range(n):  # sorted, a few dozen at most, and in the place of each where its values begin
         first, high = used, 0
         for e in range(start[j], stop[j]):
             k = used
-            while k > first and sorted_rows[k - 1] > rows[e]:
-                sorted_rows[k], order[k] = sorted_rows[k - 1], order[k - 1]
+            while k > first and ascending[k - 1] > rows[e]:
+                ascending[k], order[k - first] = ascending[k - 1], order[k - 1 - first]
                 k -= 1
-            sorted_rows[k], order[k] = rows[e], e
+            ascending[k], order[k - first] = rows[e], e
             used += 1
         for k in range(first, used):
-            place[order[k]] = values + high
-            high += count[sorted_rows[k]]
+            rows[order[k - first]] = values + high
+            high += count[ascending[k]]
         kept[j], above[j], diagonal[j] = first, high, values + high if count[j] > 0 else -1
         values += count[j] * high + count[j] * (count[j] + 1) // 2
         unknowns += count[j]
@@ -293,7 +295,7 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
                     if a == b:
                         slots[slot] = diagonal[flat[begin + a]]
                     elif slots[slot] >= 0:
-                        slots[slot] = place[slots[slot]]
+                        slots[slot] = rows[slots[slot]]
                     slot += 1
             begin += k
     indptr, indices, first_of = np.zeros(unknowns + 1, dtype=np.int64), np.empty(values, dtype=np.int64), stop
@@ -303,7 +305,7 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
         first_of[j] = unknown
         for c in range(count[j]):
             for e in range(kept[j], kept[j + 1]):
-                i = sorted_rows[e]
+                i = ascending[e]
                 for r in range(first_of[i], first_of[i] + count[i]):
                     indices[value] = r
                     value += 1
@@ -316,10 +318,10 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
             block_begin[blocks], block_start[blocks], block_of[j] = first_of[j], kept[j], blocks
             blocks += 1
             for e in range(kept[j], kept[j + 1]):
-                sorted_rows[e] = block_of[sorted_rows[e]]
+                ascending[e] = block_of[ascending[e]]
     block_begin[blocks], block_start[blocks] = unknown, used
     begins, starts = block_begin[: blocks + 1].copy(), block_start[: blocks + 1].copy()
-    return indptr, indices, above, slots, begins, starts, sorted_rows[:used].copy()
+    return indptr, indices, above, slots, begins, starts, ascending
 
 
 @njit(error_model="numpy", nogil=True)
