@@ -242,8 +242,7 @@ def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None
     """
     import numpy as np
 
-    whole = issubclass(kind, np.integer)
-    wanted = f"shape ({', '.join('n' if count is None else str(count) for count in shape)})"
+    wanted, whole = ", ".join("n" if count is None else str(count) for count in shape), issubclass(kind, np.integer)
     try:
         result = np.asarray(given)
         if result.size and result.dtype.kind not in ("iu" if whole else "fiu"):  # np.asarray([]) is an array of floats
@@ -251,9 +250,9 @@ def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None
         result = result.astype(kind, copy=False)
     except (TypeError, ValueError):
         what = "integers" if whole else "numbers"
-        raise InputError(f"{name} must be {what} of the {wanted}, not {short(given)}") from None
+        raise InputError(f"{name} must be {what} of the shape ({wanted}), not {short(given)}") from None
     if result.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, result.shape, strict=True)):
-        raise InputError(f"{name} must have the {wanted}, not {result.shape}")
+        raise InputError(f"{name} must have the shape ({wanted}), not {result.shape}")
     return result
 
 
