@@ -241,13 +241,14 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
     begin, pairs = 0, 0
     for s in range(len(widths)):
         k = widths[s]
-        for at in flat[begin : begin + numbers[s] * k]:
-            start[at + 1] += k - 1
+        for e in range(begin, begin + numbers[s] * k):
+            start[flat[e] + 1] += k - 1
         begin, pairs = begin + numbers[s] * k, pairs + numbers[s] * k * k
+    stop = np.empty(n, dtype=np.int64)
     for j in range(n):
         start[j + 1] += start[j]
-    stop, rows = start[:n].copy(), np.empty(start[n], dtype=np.int64)
-    slots, begin, slot = np.empty(pairs, dtype=np.int64), 0, 0
+        stop[j] = start[j]
+    rows, slots, begin, slot = np.empty(start[n], dtype=np.int64), np.empty(pairs, dtype=np.int64), 0, 0
     for s in range(len(widths)):  # the rows of each block column once each, and which of them each pair is
         k = widths[s]
         for _ in range(numbers[s]):
@@ -269,8 +270,12 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
     total, most = 0, 0
     for j in range(n):
         total, most = total + stop[j] - start[j], max(most, stop[j] - start[j])
-    ascending, order, diagonal = np.empty(total, dtype=np.int64), np.empty(most, dtype=np.int64), np.empty_like(count)
-    kept, above, used, values, unknowns = np.empty(n + 1, dtype=np.int64), np.empty_like(count), 0, 0, 0
+    ascending, order, diagonal = (
+        np.empty(total, dtype=np.int64),
+        np.empty(most, dtype=np.int64),
+        np.empty(n, dtype=np.int64),
+    )
+    kept, above, used, values, unknowns = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0, 0
     for j in range(n):  # sorted, a few dozen at most, and in the place of each where its values begin
         first, high = used, 0
         for e in range(start[j], stop[j]):
