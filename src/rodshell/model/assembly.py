@@ -276,7 +276,7 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
         np.empty(n, dtype=np.int64),
     )
     kept, above, used, values, unknowns = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0, 0
-    for j in range(n):  # sorted, a few dozen at most, and in the place of each where its values begin
+    for j in range(n):  # a few dozen rows at most, sorted; `rows` then says where the values of each begin
         first, high = used, 0
         for e in range(start[j], stop[j]):
             k = used
