@@ -314,6 +314,15 @@ def test_positions_along_a_rod_are_those_of_the_net(family, offset):
     np.testing.assert_allclose(net.positions(rod, s), exact, rtol=0, atol=2e-5)  # 1.4e-5 measured
 
 
+def test_positions_at_nodes_of_the_net_are_these() -> None:
+    net = chebyshev_net(Hemisphere(radius=R), GridLayout.orthogonal(spacing=0.04, edge=0.01))
+    for rod in net.rods:
+        lines, along = (net.net.v, net.net.u) if rod.family == "u" else (net.net.u, net.net.v)
+        line, there = int(np.abs(lines - rod.offset).argmin()), (along > rod.start) & (along < rod.end)
+        points = net.net.points[there, line] if rod.family == "u" else net.net.points[line, there]
+        np.testing.assert_allclose(net.positions(rod, along[there]), points, rtol=0, atol=1e-15)
+
+
 def test_smallest_angle_is_that_of_the_similarity_equation():
     net = net_on_sphere("17x17 at 30 mm")
     x = np.abs(net.min_angle_at)

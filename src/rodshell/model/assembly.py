@@ -288,7 +288,7 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
         for k in range(first, used):
             rows[order[k - first]] = values + high
             high += count[ascending[k]]
-        kept[j], above[j], diagonal[j] = first, high, values + high if count[j] > 0 else -1
+        kept[j], above[j], diagonal[j] = first, high, values + high
         values += count[j] * high + count[j] * (count[j] + 1) // 2
         unknowns += count[j]
     kept[n], begin, slot = used, 0, 0
