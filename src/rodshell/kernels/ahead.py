@@ -18,7 +18,7 @@ from time import monotonic
 from typing import Any
 
 from rodshell.kernels import PACKAGE, Kernel
-from rodshell.kernels.jit import arguments_of
+from rodshell.kernels.jit import arguments_of, types_found_once
 from rodshell.kernels.table import KERNELS, OF_SOME_JOBS
 
 LONG_ENOUGH = 0.1  # share of the work after which the time that is left is estimated
@@ -38,7 +38,7 @@ def compile_kernels(progress: Callable[[int, int, float | None], None], *, every
     if not missing:
         return 0
     begun = monotonic()
-    with _helper(every) as helper, _without_collector():
+    with _helper(every) as helper, _without_collector(), types_found_once():
         work = [_work(kernel) for kernel, _ in missing]
         waiting, made = set(range(len(missing))), 0
         progress(0, len(missing), None)
@@ -139,7 +139,7 @@ def _help() -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=end_with_the_other, daemon=True).start()
-    with _without_collector():
+    with _without_collector(), types_found_once():
         for kernel, arguments in reversed(_rows("every" in sys.argv)):
             if not _is_kept(kernel, arguments):
                 _compile(kernel, arguments)
