@@ -11,10 +11,21 @@ from rodshell.formfinding.pipeline import PatchForm, agreement, popped_again
 from rodshell.formfinding.trim import Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import Crossings
+from rodshell.model.edge_properties import LENGTH
 from rodshell.progress import silent
 from rodshell.refining import acceptance, refine
 from rodshell.refining import gates as gates_module
-from rodshell.refining.gates import GATES, SPAN_ERROR, Gates, _from_flat, gates, misfit, with_errors
+from rodshell.refining.gates import (
+    GATES,
+    SPAN_ERROR,
+    Gates,
+    _errors,
+    _from_flat,
+    gates,
+    misfit,
+    span_lengths,
+    with_errors,
+)
 from rodshell.solve.equilibrium import find_equilibrium
 
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
@@ -274,6 +285,20 @@ def test_an_interrupted_search_says_how_to_go_on_and_goes_on_there() -> None:
     assert rest.gap_after.rms == pytest.approx(whole.gap_after.rms, rel=0.02)
     with pytest.raises(rs.InputError, match="has 2 values"):
         refine.refine(stages(), "taper", start=start[:2])
+
+
+@pytest.mark.parametrize("error", [1e300, 0.021, -1e-3, np.nan])
+def test_an_error_of_a_span_is_shorter_than_a_span(error: float) -> None:
+    """Spans of 40 mm."""
+    with pytest.raises(rs.InputError, match=r"refine.tolerance.*; spans are about 40 mm long: give at most half"):
+        acceptance.refined(stages(), (refine.FAMILIES["taper"],), span_error=error)
+
+
+def test_the_shortest_spans_are_not_turned_round_by_an_error_of_long_ones() -> None:
+    lengths = span_lengths(stages().footprint.mesh)
+    assert lengths.min() < 0.8 * np.median(lengths)
+    errors = np.concatenate([_errors(stages(), 0.02, seed) for seed in range(4)])[:, LENGTH]
+    assert 0.45 < np.abs(errors).max() <= 0.5
 
 
 def test_where_none_passes_the_form_stays_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,11 +17,11 @@ from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
 from rodshell.formfinding.popup import Ends
 from rodshell.progress import Progress, silent
-from rodshell.refining.gates import GATES, SPAN_ERROR, Gates, gates, worst_with_errors
+from rodshell.refining.gates import GATES, LARGEST_ERROR, SPAN_ERROR, Gates, gates, span_lengths, worst_with_errors
 from rodshell.refining.gauss_newton import Step
 from rodshell.refining.refine import LEAST_EIGENVALUE, Candidate, Refinement, between, loaded_gap, popped_up, refine
 from rodshell.refining.variables import Family
-from rodshell.units import percent_text
+from rodshell.units import length_text, percent_text
 
 Stages = PatchForm | PatchedForm
 FIRMER = (0.75, 1.0)  # shares of the lowest eigenvalue that are asked for where a shell does not withstand errors
@@ -157,6 +157,7 @@ def _of_piece(
 ) -> Refined:  # fmt: skip
     """Of a form in one piece: where the best design is refused, what refused it is respected in another search."""
     names = tuple(family.name for family in vary)
+    _check_error(stages, asked.span_error)
     progress("refine", ", ".join(names), 0.0)
     if ends in stages.popped and not stages.popped[ends].report.stable:
         judged = gates(_alone(stages, ends), span_error=asked.span_error, progress=progress)
@@ -183,6 +184,16 @@ def _of_piece(
             best, before=stages, after=stages, refused=refused, gate_factorizations=more, stopped=last.stopped
         )
     return replace(best, before=stages, stopped=last.stopped)
+
+
+def _check_error(form: PatchForm, span_error: float | None) -> None:
+    """That an error is one of a span, and not as large as most spans are long."""
+    usual = float(np.median(span_lengths(form.footprint.mesh)))
+    if span_error is not None and not 0.0 <= span_error <= LARGEST_ERROR * usual:
+        raise InputError(
+            f"refine.tolerance, the largest error of a span as it is built, is {length_text(span_error)}; spans are "
+            f"about {length_text(usual)} long: give at most half of that"
+        )
 
 
 def _explained(refused: str, stages: PatchForm, asked: _Asked) -> tuple[str, int]:

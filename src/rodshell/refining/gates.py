@@ -38,6 +38,7 @@ SAMPLES = 8
 MOST_AT_ONCE = 10  # iterations from the state that is foreseen to first order
 ERROR_STEPS = (0.25, 0.5, 0.75, 1.0)  # shares of the errors, one after the other, where that leads to no stable state
 SPAN_ERROR = 0.1e-3 / 0.2  # largest, of each span's length: 0.1 mm where the target's size is 0.2 m
+LARGEST_ERROR = 0.5  # of a span, as a share of its length
 STIFFNESS_ERROR = 0.05  # largest, of each rod's EI and GJ
 WORSE, WORSE_BY = 1.5, 0.0015  # with errors the rms gap may be so many times its value, and so much more
 MOST_FROM_FLAT = 600  # factorisations; the paths that arrive take 25 to 470
@@ -232,8 +233,9 @@ def _errors(form: PatchForm, span_error: float | None, seed: int) -> Floats:
     span = spans(mesh)
     result = np.zeros((len(span), PROPERTIES))
     error = SPAN_ERROR * form.target.size if span_error is None else span_error
-    longer = error * random.uniform(-1.0, 1.0, int(span[-1]) + 1)
-    result[:, LENGTH] = (longer / np.bincount(span, mesh.edge_lengths))[span]
+    lengths = span_lengths(mesh)
+    longer = np.minimum(error, LARGEST_ERROR * lengths) * random.uniform(-1.0, 1.0, len(lengths))
+    result[:, LENGTH] = (longer / lengths)[span]
     result[:, EI1:LENGTH] = STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))[mesh.edge_rods, None]
     return result
 
@@ -250,6 +252,11 @@ def spans(mesh: GridMesh) -> Ints:
     rods = mesh.edge_rods
     begins = np.append(True, (rods[1:] != rods[:-1]) | joint[mesh.edges[1:, 0]])
     return np.cumsum(begins) - 1
+
+
+def span_lengths(mesh: GridMesh) -> Floats:
+    """(spans,) lengths [m]; see `spans`."""
+    return np.bincount(spans(mesh), mesh.edge_lengths)
 
 
 def misfit(mesh: GridMesh) -> float:
