@@ -256,7 +256,7 @@ def spans(mesh: GridMesh) -> Ints:
 
 def span_lengths(mesh: GridMesh) -> Floats:
     """(spans,) lengths [m]; see `spans`."""
-    return np.bincount(spans(mesh), mesh.edge_lengths)
+    return np.bincount(spans(mesh), weights=mesh.edge_lengths).astype(float)
 
 
 def misfit(mesh: GridMesh) -> float:
