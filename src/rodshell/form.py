@@ -1,7 +1,7 @@
 """A form that was found: its stages, its checks and fabrication, and its files."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -14,6 +14,7 @@ from rodshell.case import Case
 from rodshell.checks import Checks, check
 from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
+from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed

@@ -46,21 +46,24 @@ def text_of(entity: DXFEntity, writer: type[TagWriter]) -> str:
     return stream.getvalue()
 
 
-def test_entities_are_written_as_those_of_ezdxf() -> None:
-    a, b = (1.0, 2 / 3, 0.0), (-4.5, 1e-7, 0.0)
-    points = np.array([a, b, (7.0, 1e9, 0.0)])[:, :2]
-    line, circle = {"layer": "CUT", "start": a, "end": b}, {"layer": "0", "center": a, "radius": 1 / 7}
-    text = {"layer": "Maße", "insert": a, "height": 2.5, "text": "Ω 50 %", "style": "SANS"}
+@pytest.mark.parametrize("words", ["Ω 50 %", "%s %(layer)s", "insert 0"])
+@pytest.mark.parametrize("a", [(1.0, 2 / 3, 0.0), (-1e9, 5.0, 0.25)])
+def test_entities_are_written_as_those_of_ezdxf(a: tuple[float, float, float], words: str) -> None:
+    """Also after others with the same attributes, from which they have their pattern."""
+    b = (-4.5, 1e-7, 0.0)
+    line, circle = {"layer": "CUT", "start": a, "end": b}, {"layer": words, "center": a, "radius": 1 / 7}
+    text = {"layer": "Maße", "insert": a, "height": 2.5, "text": words, "style": "SANS"}
     turned = text | {"rotation": 30.0, "halign": 2, "align_point": b}
     pairs = [
         (PlainLine(**line), Line.new(dxfattribs=line)), (PlainCircle(**circle), Circle.new(dxfattribs=circle)),
         (PlainText(**text), Text.new(dxfattribs=text)), (PlainText(**turned), Text.new(dxfattribs=turned)),
     ]  # fmt: skip
-    for closed in (False, True):
-        theirs = LWPolyline.new(dxfattribs={"layer": "DIM"})
-        theirs.set_points(points, format="xy")
-        theirs.closed = closed
-        pairs.append((PlainPolyline(points, closed=closed, layer="DIM"), theirs))
+    for points in (np.array([a, b, (7.0, 1e9, 0.0)])[:, :2], np.array([a, b])[:, :2]):
+        for closed in (False, True):
+            theirs = LWPolyline.new(dxfattribs={"layer": "DIM"})
+            theirs.set_points(points, format="xy")
+            theirs.closed = closed
+            pairs.append((PlainPolyline(points, closed=closed, layer="DIM"), theirs))
     for ours, theirs in pairs:
         assert text_of(ours, Writer) == text_of(theirs, TagWriter)
 

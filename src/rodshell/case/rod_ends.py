@@ -2,7 +2,6 @@
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, Profile, straight_rods
 from rodshell.results.records import Stiffness

@@ -11,13 +11,14 @@ clamps after the deployment.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise, takewhile
 from math import prod
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import end_directions, laid_below, turned
 from rodshell.model import Shell

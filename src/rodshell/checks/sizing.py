@@ -12,13 +12,14 @@ arc over a single rod's chord is right only where the ends of all rods belong to
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import VON_MISES, bending_of, largest_stress
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.popup import PopUp
 from rodshell.joints import Ball, Joint

@@ -7,7 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import count
 from pathlib import Path
 from time import monotonic
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import click
 
 from rodshell.cli.interruption import Interruption
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept

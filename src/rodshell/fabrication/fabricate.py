@@ -1,11 +1,11 @@
 """Cut list, layers, splices, stock and bracing of a grid, in one call, and the lengths that decide the cutting."""
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints, median
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.fabrication.cutting import Nesting, nest, splices
 from rodshell.layout import GridMesh, Profile

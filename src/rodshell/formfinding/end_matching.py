@@ -7,12 +7,13 @@ corrected, until the rods end at their points.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.nets import ChebyshevNet, chebyshev_net

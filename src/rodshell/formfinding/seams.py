@@ -4,12 +4,13 @@ The rods are chosen such that where a rod ends on a seam, a rod of the next patc
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from string import ascii_uppercase
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.end_matching import EndGoals, Point, match_net, rod_ends
 from rodshell.formfinding.trim import NEAREST_JOINT

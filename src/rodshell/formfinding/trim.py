@@ -1,10 +1,9 @@
 """Trim what extends past the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped

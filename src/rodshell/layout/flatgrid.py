@@ -1,7 +1,7 @@
 """Straight rods in a plane, their crossings, and the layers in which they lie."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from reprlib import repr as short
 from typing import Literal, NamedTuple
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout.profile import Profile

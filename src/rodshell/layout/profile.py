@@ -5,13 +5,13 @@ follows from it for the other stiffnesses, the mass and the stress is in `rods.v
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import sqrt
 from typing import Literal, get_args
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.validation import choice, listed, number, positive
 

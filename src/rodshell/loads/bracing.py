@@ -1,11 +1,12 @@
 """Bracing of an erected shell: cables along the diagonals of its cells, stressed when they are put in."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.layout import GridMesh
 from rodshell.layout.cells import Pattern, diagonals, rim_diagonals

@@ -1,7 +1,8 @@
 """What a shell is checked under: loads and their combinations, its bracing, and how stability is looked at."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.loads.bracing import Cables
 from rodshell.loads.kinds import LineLoad, Load, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind

@@ -6,7 +6,6 @@ are not forces: they move supports, or change the length at which rods are free 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import cos, sin
 from typing import Literal, get_args
@@ -14,6 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.loads.tributary import Tributary
 from rodshell.targets.heightfield import Formula, parse_formula

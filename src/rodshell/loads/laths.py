@@ -6,13 +6,14 @@ laid without axial force, its ends are free, and at each joint it is held over t
 outer layer, free to turn there as on a bolt. Between joints it can buckle: it has nodes there.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rodshell.arrays import Floats, Ints, median
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import joint_normals
 from rodshell.joints.standoff import Standoffs

@@ -7,13 +7,13 @@ triangles' size, and those of a symmetric shell are symmetric: the triangles are
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import cross, dot
 from rodshell.targets import Target
 from rodshell.validation import brief

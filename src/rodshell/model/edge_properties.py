@@ -12,12 +12,13 @@ Joints keep the lengths of these half edges.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from rodshell.arrays import Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.joints import Joint, Linker
 from rodshell.joints.crossings import RodNodes, stencils
 from rodshell.joints.joint import elastic_joints, resists

@@ -11,7 +11,7 @@ Eccentric joints lay the rods in two layers, whose mesh gives each rod its own n
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints, median
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle, unit
 from rodshell.joints import (

@@ -1,11 +1,11 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.errors import OutputError
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid

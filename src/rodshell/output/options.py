@@ -2,11 +2,12 @@
 
 import datetime
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
 from rodshell.checks.bending import VON_MISES, require_known_stress
 from rodshell.checks.check import MOST_STAGES
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.joints import Joint

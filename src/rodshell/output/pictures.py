@@ -3,11 +3,12 @@
 The view is axonometric: from the right, the front and above, without perspective.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.geometry.bounds import bounds
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
 from rodshell.output.drawing import Drawing, Path, Pen, Pencil

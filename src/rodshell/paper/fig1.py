@@ -4,13 +4,14 @@ The shells are popped up, as in the paper, with their ends pinned on G; the tabl
 rods' direction.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.formfinding import PatchForm, find_stages
 from rodshell.output.svg import tag
 from rodshell.paper.figure import (

@@ -3,7 +3,6 @@
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from os import PathLike
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
+from rodshell.dataclass import dataclass
 from rodshell.layout import GridLayout, GridMesh
 from rodshell.output.pictures import RIGHT, TOWARDS, UP
 from rodshell.output.schedules import csv_text

@@ -7,11 +7,12 @@ stays as it was. Each patch of a form is refined by itself: its ends at the seam
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again

@@ -6,11 +6,11 @@ equilibrium next to the predicted one shrinks the radius, and so does one that a
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import OutOfTimeError
 from rodshell.refining.objectives import Objective, residuals, slopes
 from rodshell.refining.structure import Point

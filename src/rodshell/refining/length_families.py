@@ -4,12 +4,13 @@ Each moves points of rods, joints and ends, along them. Nodes between two such p
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
 from rodshell.arrays import Floats, Ints, median
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, FlatRod, GridMesh
 from rodshell.layout.flatgrid import Crossings

@@ -5,12 +5,13 @@ that they describe is popped up again.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement

@@ -7,12 +7,12 @@ zero.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.layout import GridMesh
 
 SAME_FLAT, SAME_SHAPE = 1e-6, 1e-4  # of the size: rods are cut to 1e-6, and drapes converge to 1e-5

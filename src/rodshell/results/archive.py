@@ -10,7 +10,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import wraps
 from io import BytesIO
 from pathlib import Path
@@ -20,6 +20,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.dataclass import dataclass
 from rodshell.errors import OutputError
 from rodshell.results.folder import ResultFolder, reading
 from rodshell.results.results import Results, Verdict, read_results

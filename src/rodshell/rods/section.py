@@ -5,10 +5,11 @@ A section has two axes, those of the material directors m1 and m2. The second mo
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import cached_property
 from math import pi, tanh
 
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.rods.materials import Material as Material
 from rodshell.rods.materials import PresetName

@@ -12,12 +12,13 @@ turns back at a limit point, where K is singular but the bordered system is not.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status

@@ -23,13 +23,14 @@ can hold slip, with the force of friction held over the rest of the step.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isfinite
 from typing import Protocol, Self, TypeVar
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.model import Freedom

@@ -13,7 +13,6 @@ takes the state for straight on: it misses what a shell sinks before it buckles,
 the path says.
 """
 
-from dataclasses import dataclass
 from math import pi
 
 import numpy as np
@@ -21,6 +20,7 @@ from scipy.sparse import csc_matrix, diags
 from threadpoolctl import threadpool_limits
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError, StabilityError
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load, LoadedAssembly

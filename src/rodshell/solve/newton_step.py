@@ -8,11 +8,12 @@ part of it is taken. This is a trust region whose measure are the modes; the ene
 those strains.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all

@@ -16,11 +16,12 @@ the elements where the descent starts, so that metres, radians and soft and stif
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import OutOfTimeError
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
 from rodshell.solve.newton_matrix import SparseSum

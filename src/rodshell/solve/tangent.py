@@ -7,11 +7,11 @@ curvature times its contact forces. Where edges are inextensible, their stiffnes
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.elements import Elements, Stressed, Stretch

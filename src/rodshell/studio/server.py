@@ -10,7 +10,6 @@ import json
 import secrets
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rodshell.case.keys import case_keys
 from rodshell.case.link import OUTLINES, SURFACES, UPLOAD, upload_name
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.output.viewer import viewer_script, viewer_style
 from rodshell.studio.jobs import Jobs

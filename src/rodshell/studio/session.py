@@ -13,13 +13,14 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from rodshell.case.link import UPLOAD
 from rodshell.case.load import BUILT_IN, FILE_KEYS
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.studio.worker import News, Order, run_worker
 from rodshell.units import shown

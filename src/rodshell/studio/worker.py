@@ -13,7 +13,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from io import BytesIO
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -21,6 +21,7 @@ from time import monotonic, process_time
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, RodshellError
 
 TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"

@@ -7,7 +7,6 @@ together. A sample (Latin hypercube, Sobol) is such a table too, so that a sweep
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from math import isfinite, pi, prod, tau
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.case import Case
 from rodshell.case.load import FILE_KEYS
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.units import shown

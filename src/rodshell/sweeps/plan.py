@@ -3,7 +3,6 @@
 import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import product
 from math import prod
@@ -13,6 +12,7 @@ from typing import Any, Literal, get_args
 
 from rodshell.case import BUILT_IN
 from rodshell.case.load import flattened
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.sweeps.axes import BASE, Axis, read_axes

@@ -2,10 +2,11 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
+from rodshell.dataclass import dataclass
 from rodshell.progress import Progress, silent
 from rodshell.sweeps.columns import CONVERGED, is_usable
 from rodshell.sweeps.computing import Computation, Wanted, opened_computation

@@ -9,10 +9,10 @@ import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from rodshell.dataclass import dataclass
 from rodshell.errors import OutputError
 
 STORE, LOCK, ARCHIVES = "sweep.sqlite", "sweep.lock", "archives"  # in the folder of a sweep

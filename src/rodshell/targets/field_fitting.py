@@ -1,11 +1,12 @@
 """From a triangle mesh to its smooth field: samples, openings filled, least squares, continuation past an open rim."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import pi, sqrt
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
 from rodshell.targets.smooth_field import TERMS, CellList, SmoothField

@@ -1,13 +1,14 @@
 """A target given by a surface in triangles: its smooth field, where the shell ends, and its highest point."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.targets.field_fitting import cubic_spacing, fill_openings, fit_field, mesh_samples

@@ -1,13 +1,13 @@
 """A target from a file: a mesh, a NURBS surface or heights on a lattice; scaled, turned and moved into place."""
 
 import warnings
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.mesh_files import (

@@ -5,7 +5,6 @@ surface; jagged edges of meshes are smoothed.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
@@ -13,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.dataclass import dataclass
 from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit

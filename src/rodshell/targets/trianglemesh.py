@@ -1,12 +1,12 @@
 """A triangle mesh as a surface: vertices merged, faces oriented alike, in one smooth piece; others are refused."""
 
-from dataclasses import dataclass
 from functools import cached_property
 from math import cos, degrees, radians
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints, Longs
+from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot
 

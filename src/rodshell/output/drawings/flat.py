@@ -5,13 +5,13 @@ distances start at one end, so that errors do not add up.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, median
+from rodshell.dataclass import dataclass
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
 from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
