@@ -1,4 +1,4 @@
-"""Memory of arrays: what a solve frees serves the next; and the median."""
+"""Memory of arrays: what a solve frees serves the next; the median and distinct values."""
 
 import platform
 import subprocess
@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from rodshell.arrays import median
+from rodshell.arrays import distinct, median
 
 MEASURED = """
 import resource
@@ -39,3 +39,12 @@ def test_the_median_is_numpys(shape: int | tuple[int, int]) -> None:
     values = np.random.default_rng(3).normal(size=shape)
     assert median(values) == np.median(values)
     assert median(values.tolist()) == np.median(values)
+
+
+@pytest.mark.parametrize("shape", [0, 1, 2, 30, (4, 3)])
+def test_distinct_values_are_numpys(shape: int | tuple[int, int]) -> None:
+    whole = np.random.default_rng(5).integers(-4, 4, size=shape)
+    for values in (whole, whole / 3.0):
+        found = distinct(values)
+        assert found.dtype == values.dtype
+        assert found.tolist() == np.unique(values).tolist()

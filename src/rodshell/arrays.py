@@ -1,5 +1,7 @@
 """Types of arrays: double precision, indices, 64-bit integers, booleans; and what all need of them."""
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -7,6 +9,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Longs = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 # glibc returns freed memory at the top of its heap to the system, and the system clears each page that is asked for
 # again: milliseconds a solve. By what it has seen a program free at once it raises the size that it keeps (mallopt(3),
@@ -26,3 +29,16 @@ def median(values: ArrayLike) -> float:
     half = len(flat) // 2
     parted = np.partition(flat, (~half, half))
     return 0.5 * float(parted[~half] + parted[half])
+
+
+def distinct(values: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The distinct values in ascending order, as `np.unique` finds them, which first imports NumPy's masked arrays.
+
+    Parameters
+    ----------
+    values : of any shape, none of them NaN.
+    """
+    ascending = np.sort(values, axis=None)
+    is_new = np.ones(len(ascending), dtype=bool)
+    is_new[1:] = ascending[1:] > ascending[:-1]
+    return ascending[is_new]

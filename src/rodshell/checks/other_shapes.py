@@ -232,9 +232,10 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     """
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]
-    springs, inner = joined[mesh.edges], np.setdiff1d(joined, joined[mesh.ends])
-    count = np.zeros(mesh.node_count, dtype=np.intp)
-    count[inner] = 1  # x, y and z alike: one unknown a node
+    springs, count = joined[mesh.edges], np.zeros(mesh.node_count, dtype=np.intp)
+    count[joined] = 1  # x, y and z alike: one unknown a node
+    count[joined[mesh.ends]] = 0
+    inner = np.flatnonzero(count)
     free = Freedom(Freedom.free(mesh.node_count).directions, count)
     stiffness = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3)) / mesh.edge_lengths[:, None, None]
     assembly = Assembly.of([springs], free)

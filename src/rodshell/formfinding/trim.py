@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, distinct
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals, place_in_layers
@@ -236,6 +236,6 @@ def _recut(draped: Draped, rods: tuple[FlatRod, ...]) -> tuple[GridMesh, Floats]
     mesh = mesh_grid(FlatGrid.of(rods), draped.layout.edge)
     names = {rod.name: k for k, rod in enumerate(draped.mesh.grid.rods)}
     positions = draped.mesh.prolong(draped.positions, mesh, rods=[names[rod.name] for rod in rods])
-    ends = np.unique(mesh.ends)
+    ends = distinct(mesh.ends)
     positions[ends] = draped.target.retract(positions[ends])
     return mesh, positions

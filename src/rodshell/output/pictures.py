@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, distinct
 from rodshell.dataclass import dataclass
 from rodshell.geometry.bounds import bounds
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
@@ -231,7 +231,7 @@ def deployment_picture(archive: Archive) -> Drawing:
     """
     known = shape_names(archive)
     names = [name for name in known if name.startswith(STAGE) or name in ("flat", "popped_pinned")]
-    chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
+    chosen = distinct(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
     view, rods, whole, last = _view_of_all(archive), rods_of(archive), Pencil(), None
     width = WIDTH + 2 * SIDE
     share = (width - 2 * GUTTER) / COLUMNS / WIDTH
@@ -288,7 +288,7 @@ def _pieces(archive: Archive) -> Pieces:
     lengths = [len(rod.nodes) for rod in rods_of(archive)]
     stride, drawn, first = max(1, -(-sum(lengths) // SEGMENTS)), [np.empty(0, dtype=np.intp)], 0
     for length in lengths:
-        drawn.append(first + np.unique([*range(0, length - 1, stride), length - 1][:length]))
+        drawn.append(first + np.array([*range(0, length - 1, stride), length - 1][:length], dtype=np.intp))
         first += length
     owner = np.repeat(np.arange(len(lengths)), [len(entries) for entries in drawn[1:]])
     begins = np.flatnonzero(owner[1:] == owner[:-1])

@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, median
+from rodshell.arrays import Bools, Floats, distinct, median
 from rodshell.dataclass import dataclass
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
@@ -231,7 +231,7 @@ def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
     """
     found = []
     for patch in _patches(plan):
-        x, y = (np.unique(np.round([_offset(plan.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
+        x, y = (distinct(np.round([_offset(plan.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
         met = np.zeros((len(y), len(x)), dtype=bool)
         for u, v in patch:
             row, column = (int(np.abs(offsets - _offset(plan.rods[k])).argmin()) for offsets, k in ((y, u), (x, v)))

@@ -281,8 +281,9 @@ def _walks(outlines: list[Ints], ends: Floats, alone: Bools) -> Iterator[Ints]:
                 break
             walk.append(runs.pop(nearest - 1))
         yield np.concatenate(walk)
-    on_none = np.setdiff1d(np.flatnonzero(alone), np.concatenate([[], *outlines]).astype(np.intp))
-    yield from on_none[:, None]
+    on_none = alone.copy()
+    on_none[np.concatenate([[], *outlines]).astype(np.intp)] = False
+    yield from np.flatnonzero(on_none)[:, None]
 
 
 def _runs(loop: Ints, alone: Bools) -> list[Ints]:
