@@ -2,12 +2,12 @@
 
 The standard library writes and compiles five or six functions for each frozen class, which took a sixth of a short
 command. Only `__init__` has to be written for each; the others are the same functions for all classes. Fields,
-`replace` and all else are those of the standard library, and a type checker sees its decorator; `__dataclass_params__`
-alone does not know that a class is frozen.
+`replace` and all else are those of the standard library, and a type checker sees its decorator.
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import MISSING, FrozenInstanceError, fields
 from functools import cache
 from operator import attrgetter
@@ -33,7 +33,12 @@ def _declared(cls: type, *, eq: bool, repr: bool, kw_only: bool) -> type:
     """The class as a frozen dataclass, with what it defines itself."""
     given = dict(vars(cls))
     cls.__doc__ = cls.__doc__ or cls.__name__  # else the standard library asks for the signature
-    cls = dataclasses.dataclass(cls, init=False, repr=False, eq=False, kw_only=kw_only)
+    with _thawed(cls):
+        cls = dataclasses.dataclass(cls, init=False, repr=False, eq=False, kw_only=kw_only)
+    vars(cls)["__dataclass_params__"].frozen = True
+    known = vars(cls)["__dataclass_fields__"].values()
+    if any(field.hash is not None or field._field_type.name == "_FIELD_INITVAR" for field in known):
+        raise TypeError(f"{cls.__name__} has an InitVar or a field with hash=, which only dataclasses.dataclass knows")
     methods: dict[str, Any] = {"__init__": _init(cls), "__setattr__": _set, "__delattr__": _delete}
     methods |= {"__repr__": _repr} if repr else {}
     methods |= {"__eq__": _equal, "__hash__": _hash} if eq else {}
@@ -43,6 +48,21 @@ def _declared(cls: type, *, eq: bool, repr: bool, kw_only: bool) -> type:
         if name not in given:
             setattr(cls, name, method)
     return cls
+
+
+@contextmanager
+def _thawed(cls: type) -> Iterator[None]:
+    """The classes that it inherits from pass as not frozen meanwhile, as it does; they must be frozen."""
+    bases = [vars(base)["__dataclass_params__"] for base in cls.__mro__[1:] if "__dataclass_params__" in vars(base)]
+    if not all(base.frozen for base in bases):
+        raise TypeError("cannot inherit frozen dataclass from a non-frozen one")
+    for base in bases:
+        base.frozen = False
+    try:
+        yield
+    finally:
+        for base in bases:
+            base.frozen = True
 
 
 def _init(cls: type) -> Callable[..., None]:

@@ -172,6 +172,26 @@ def test_what_does_not_fit_is_refused_in_the_same_words(name: str, given: dict[s
     assert ours == theirs
 
 
+@pytest.mark.parametrize("frozen", [True, False])
+@pytest.mark.parametrize("base", ["Point", "Tube", "Open", "Ordered"])
+@pytest.mark.parametrize("heir", [dataclass, dataclasses.dataclass])
+def test_classes_of_both_kinds_inherit_from_each_other(base: str, heir: Callable[..., Any], frozen: bool) -> None:
+    def inherited(parent: type) -> object:
+        made = heir(frozen=frozen)(type("Heir", (parent,), {"__annotations__": {"more": float}, "more": 1.0}))
+        return [item.name for item in fields(made)], made.__dataclass_params__.frozen
+
+    assert said(inherited, getattr(OURS, base)) == said(inherited, getattr(THEIRS, base))
+    assert getattr(OURS, base).__dataclass_params__.frozen == getattr(THEIRS, base).__dataclass_params__.frozen
+
+
+@pytest.mark.parametrize("given", [field(hash=False, default=1.0), dataclasses.InitVar])
+def test_what_only_the_standard_library_knows_is_refused(given: Any) -> None:
+    kind = given[float] if given is dataclasses.InitVar else float
+    body = {"__annotations__": {"value": kind}, "value": 1.0 if given is dataclasses.InitVar else given}
+    with pytest.raises(TypeError, match=r"which only dataclasses\.dataclass knows"):
+        dataclass(frozen=True)(type("Other", (), body))
+
+
 def test_defaults_are_made_for_each_and_computed_properties_are_kept() -> None:
     first, second = OURS.Rod(2.0), OURS.Rod(2.0)
     assert first.names is not second.names
