@@ -176,11 +176,11 @@ def test_what_does_not_fit_is_refused_in_the_same_words(name: str, given: dict[s
 @pytest.mark.parametrize("base", ["Point", "Tube", "Open", "Ordered"])
 @pytest.mark.parametrize("heir", [dataclass, dataclasses.dataclass])
 def test_classes_of_both_kinds_inherit_from_each_other(base: str, heir: Callable[..., Any], frozen: bool) -> None:
-    def inherited(parent: type) -> object:
+    def inherited(heir: Callable[..., Any], parent: type) -> object:
         made = heir(frozen=frozen)(type("Heir", (parent,), {"__annotations__": {"more": float}, "more": 1.0}))
         return [item.name for item in fields(made)], made.__dataclass_params__.frozen
 
-    assert said(inherited, getattr(OURS, base)) == said(inherited, getattr(THEIRS, base))
+    assert said(inherited, heir, getattr(OURS, base)) == said(inherited, dataclasses.dataclass, getattr(THEIRS, base))
     assert getattr(OURS, base).__dataclass_params__.frozen == getattr(THEIRS, base).__dataclass_params__.frozen
 
 
