@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from rodshell.results import Results, Verdict
+from rodshell.results.summary import summary_text
 from rodshell.results.verdict import facts, verdict, verdict_of
 from rodshell.results.wording import rounded_down
 
@@ -342,6 +343,16 @@ def test_a_weight_that_one_shell_carries_does_not_lead_before_what_both_suffer()
 def test_almost_its_own_weight_is_not_all_of_it() -> None:
     for factor, said in ((0.994, "99 %"), (0.996, "99.6 %"), (0.99999, "99.9 %")):
         assert f"carries only {said} of it" in verdict(changed(("self_weight.pinned.load_factor", factor))).headline
+
+
+@pytest.mark.parametrize(("bracing", "by"), [([], "slip"), ([10.0], "bending")])
+def test_the_summary_says_what_carries_the_weight_and_what_slips(bracing: list[float], by: str) -> None:
+    governs = {"by": by, "rod": "U03", "at": 1.0}
+    found = {"limit_factor": 2.0, "bracing": bracing, "utilisation": 0.9, "governs": governs, "at_factor": 1.0}
+    text = summary_text(changed(("loads", {"winter": {"pinned": found}})))
+    assert f"own weight carried{' without bracing' if bracing else ''}: 3 times" in text
+    of = "the force at which a joint slips (U03)" if by == "slip" else "the design strength (bending, U03)"
+    assert f", 90 % of {of}\n" in text
 
 
 def test_with_bracing_its_own_weight_is_a_matter_of_erection() -> None:

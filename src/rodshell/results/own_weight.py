@@ -33,7 +33,7 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
     found = {end: results.self_weight[end] for end in ends if end in results.self_weight}
     parts = light(results, ends)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
-    if any(shell.bracing for supported in results.loads.values() for shell in supported.values()):
+    if is_braced(results):
         carries = "is known to carry only" if lost & set(parts) else "carries only"
         weight = _parts(parts, "its own weight")
         words = f"{_alone(parts)}the shell {carries} {weight} without its bracing: support it until that is in place"
@@ -67,6 +67,16 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
     if set(found) != set(ends):
         said.append("whether it carries its own weight was not checked")
     return said, bool(standing)
+
+
+def is_braced(results: Results) -> bool:
+    """Whether the shell has bracing under its loads; its own weight alone is checked without.
+
+    Parameters
+    ----------
+    results : with the checks under loads.
+    """
+    return any(shell.bracing for supported in results.loads.values() for shell in supported.values())
 
 
 def _alone(factors: Mapping[Ends, float]) -> str:

@@ -5,6 +5,7 @@ from math import degrees
 
 from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.loaded import DesignStrength
+from rodshell.results.own_weight import is_braced
 from rodshell.results.records import Bent, RodType
 from rodshell.results.results import Bending, Results
 from rodshell.results.sizes_sold import thinner_than_sold
@@ -212,8 +213,9 @@ def _curved(bent: Bent, length: Length) -> str:
 def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
     """How much of its own weight the shell carries, and the forces at its supports."""
     least = " (weakest patch, its seam held)" if results.patches else ""
+    what = f"own weight carried{' without bracing' * is_braced(results)}"
     for ends, weighed in results.self_weight.items():
-        line = f"  weight    {ends:<8}own weight carried: {share_of_weight(weighed)}{least}"
+        line = f"  weight    {ends:<8}{what}: {share_of_weight(weighed)}{least}"
         if weighed.deflection is not None:
             line += f"; deflection under it: {length(weighed.deflection)}"
         yield line
@@ -235,8 +237,11 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
             at = "" if found.at_factor == 1 else f" at {rounded_down(found.at_factor or 0.0)} times"
             line += f"; deflection{at} {length(found.max_deflection)}"
             if found.utilisation is not None:
-                by = f" ({found.governs.by}, {found.governs.rod})" if found.governs and found.governs.by else ""
-                line += f", {percent(found.utilisation)} of the design strength{by}"
+                worst = found.governs
+                of = f"the design strength{f' ({worst.by}, {worst.rod})' if worst and worst.by else ''}"
+                if worst and worst.by == "slip":
+                    of = f"the force at which a joint slips ({worst.rod})"
+                line += f", {percent(found.utilisation)} of {of}"
             yield line
 
 
