@@ -318,12 +318,13 @@ export function createViewer(root, { controls = true } = {}) {
     const worst = boxes.worst.checked && geometry.worst.userData?.at ? geometry.worst.userData : null;
     geometry.worst.visible = Boolean(worst);
     geometry.worst.scale.setScalar(Math.max(0.35, distance / 2.2));
-    label.hidden = !worst;
-    if (worst) {
-      const place = geometry.worst.position.clone().project(camera);
+    const place = worst && geometry.worst.position.clone().project(camera);
+    label.hidden = !worst || Math.max(Math.abs(place.x), Math.abs(place.y), Math.abs(place.z)) > 1; // outside the view
+    if (!label.hidden) {
       label.textContent = worst.text;
-      label.style.left = `${(0.5 + 0.5 * place.x) * width}px`;
-      label.style.top = `${(0.5 - 0.5 * place.y) * height}px`;
+      const half = 0.5 * label.offsetWidth, above = label.offsetHeight + 10;
+      label.style.left = `${Math.max(half, Math.min(width - half, (0.5 + 0.5 * place.x) * width))}px`;
+      label.style.top = `${Math.max(above, (0.5 - 0.5 * place.y) * height)}px`;
     }
     renderer.render(world, camera);
   }
