@@ -279,8 +279,7 @@ def _png(content: Content) -> Files:
     from rodshell.output.png import drawing_png
 
     archive = content.archive
-    popped = [name for name in _shells(archive) if name != "draped"]
-    for name in ("flat", *(popped or _shells(archive))) if _meshed(archive) else []:
+    for name in ("flat", *((archive.final,) if archive.final else ())) if _meshed(archive) else []:
         shape = shape_of(archive, name)
         if shape.gap is not None or shape.stress is None:
             yield f"pictures/{name}.png", drawing_png(picture(archive, name))
