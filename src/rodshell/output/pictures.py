@@ -120,7 +120,7 @@ PAPER, INK, SOFT, GROUND = "#fdfdfb", "#22282f", "#7b838a", "#f1efe8"
 FAMILIES = ("#1f5f8b", "#a8552a")
 DEPTHS = 20  # layers of depth: rods of a nearer layer pass over those of a farther one,
 LAG = 2  # and are set off against those so many layers farther: rods that meet at a joint do not cut each other
-SEGMENTS = 14000  # pieces of rods at most, so that files stay small
+PIECE = 5.0  # drawing units: about the length of a piece, or of an edge that is longer; finer ones make files large
 LEVEL = 0.01  # of its width: an outline that rises more is not filled, which would look like a surface
 FADE = 0.42  # share of paper in the colour of the farthest rods
 
@@ -243,7 +243,7 @@ def deployment_picture(archive: Archive) -> Drawing:
         _ground_curves(ground, view, shape, rods)
         corner = cell * (k % COLUMNS, k // COLUMNS) + (GUTTER - SIDE, 0.0)
         whole.paths += ground.done("", "", 12.5).placed(share, corner).paths
-        drawn = _Rods.of(archive, view, shape, scale)
+        drawn = _Rods.of(archive, view, shape, scale, share)
         drawn = replace(drawn, plane=share * drawn.plane + corner, pen=share * drawn.pen)
         drawn.draw(whole, range(DEPTHS), halos=False)
         middle = corner[0] + share * float(view.project(shape.positions)[:, 0].mean())
@@ -282,11 +282,25 @@ def _view_of_all(archive: Archive) -> View:
     return View.of(np.concatenate([*shells, *archive.states["history"]]), WIDTH)
 
 
+def _pieces(archive: Archive, length: float) -> Pieces:
+    """Pieces of about a length [m]: of rods with shorter edges, nodes are left out evenly."""
+    rods, kept = [rod for rod in rods_of(archive) if len(rod.nodes) > 1], _pieces_by_stride(archive)
+    edge = sum(rod.length for rod in rods) / max(sum(len(rod.nodes) - 1 for rod in rods), 1)
+    stride = max(1, round(length / max(edge, 1e-12)))
+    if stride not in kept:
+        kept[stride] = _by_stride([len(rod.nodes) for rod in rods_of(archive)], stride)
+    return kept[stride]
+
+
 @made_once
-def _pieces(archive: Archive) -> Pieces:
-    """At most about SEGMENTS pieces: of finely divided rods, nodes are left out evenly."""
-    lengths = [len(rod.nodes) for rod in rods_of(archive)]
-    stride, drawn, first = max(1, -(-sum(lengths) // SEGMENTS)), [np.empty(0, dtype=np.intp)], 0
+def _pieces_by_stride(archive: Archive) -> dict[int, Pieces]:
+    """Those that were asked for so far, by the edges in each."""
+    return {}
+
+
+def _by_stride(lengths: list[int], stride: int) -> Pieces:
+    """Pieces of so many edges, the last one of a rod shorter; lengths: nodes of each rod."""
+    drawn, first = [np.empty(0, dtype=np.intp)], 0
     for length in lengths:
         drawn.append(first + np.array([*range(0, length - 1, stride), length - 1][:length], dtype=np.intp))
         first += length
@@ -315,8 +329,9 @@ class _Rods:
     pen: float
 
     @staticmethod
-    def of(archive: Archive, view: View, shape: Shape, scale: Scale | None) -> "_Rods":
-        rods, pieces = rods_of(archive), _pieces(archive)
+    def of(archive: Archive, view: View, shape: Shape, scale: Scale | None, share: float = 1.0) -> "_Rods":
+        """Of a shape, whose lengths are drawn at a share of the view's scale."""
+        rods, pieces = rods_of(archive), _pieces(archive, PIECE / (share * view.scale))
         nodes = np.concatenate([np.empty(0, dtype=np.intp), *(rod.nodes for rod in rods)])[pieces.drawn]
         nearness = view.depth(shape.positions)[nodes]
         near = 0.5 * (nearness[pieces.first] + nearness[pieces.first + 1])

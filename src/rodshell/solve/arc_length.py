@@ -85,6 +85,7 @@ class ArcLength:
         self.is_node = np.isin(np.arange(len(unloaded.state)), problem.stretch.blocks)
         edge = float(problem.stretch.rest_lengths.mean()) if len(problem.stretch.blocks) else 1.0
         self._unit = np.where(self.is_node, 1.0, edge)[:, None]  # other blocks are angles: they count as small lengths
+        self._weight = self._unit**2 / max(1, int(self.is_node.sum()))
         self._per_factor = PER_FACTOR * self.length
         self._scale = np.empty(0)
         self.round_off = 0.0  # relative error of the lowest stiffness at t = 0, since the stiffest is rounded
@@ -328,7 +329,7 @@ class ArcLength:
 
     def inner(self, a: Floats, b: Floats) -> float:
         """Inner product of displacements (n, 3) over the number of nodes, measured as by `reach` [m2]."""
-        return float(np.einsum("ij,ij,ij->", self._unit**2, a, b)) / max(1, int(self.is_node.sum()))
+        return float(np.einsum("ij,ij->", self._weight * a, b))
 
     def _tangent(
         self, elements: tuple[Elements, ...], state: Floats, forces: Floats, factor: float

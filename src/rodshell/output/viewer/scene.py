@@ -22,7 +22,7 @@ from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
 from rodshell.output.grid import GridJoint, GridRod, Shape, joints_of, rods_of, shape_names, shape_of
 from rodshell.output.models import section_outline, widths_along
-from rodshell.output.pictures import FAMILIES, SEGMENTS
+from rodshell.output.pictures import FAMILIES
 from rodshell.output.schedules import Table, heading, joints_table, rods_table
 from rodshell.results import Archive, wording
 from rodshell.results.wording import nice_ticks, rounding_of
@@ -30,6 +30,7 @@ from rodshell.results.wording import nice_ticks, rounding_of
 STEPS = 65535  # of a coordinate: 16 bits
 COLOURS: tuple[Colour, ...] = ("stress", "gap", "curvature", "force")
 UNKNOWN = 255  # in place of the index of a colour
+SEGMENTS = 14000  # of rods at most, so that pages stay small
 VERSION = 1
 
 
