@@ -92,6 +92,7 @@ if TYPE_CHECKING:
         heights_from,
         surface_from,
     )
+    from rodshell.version import __version__
 
 _HOMES = {
     "rodshell.checks": ("check",),
@@ -135,6 +136,7 @@ _HOMES = {
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
     ),
+    "rodshell.version": ("__version__",),
 }  # fmt: skip
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -148,11 +150,10 @@ __all__ = [
     "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle",
     "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample",
     "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Strength",
-    "Target", "Temperature",
-    "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads",
-    "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise",
-    "pop_up", "pop_up_table", "read", "read_sweep", "refine", "save", "search", "simulate", "solve_rod",
-    "straight_rods", "surface_from", "sweep", "trim",
+    "Target", "Temperature", "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "__version__", "agreement", "bar",
+    "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export", "fabricate", "find_form",
+    "heights_from", "map_back", "mesh_grid", "optimise", "pop_up", "pop_up_table", "read", "read_sweep", "refine",
+    "save", "search", "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 

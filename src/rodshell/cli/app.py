@@ -65,9 +65,9 @@ class LazyGroup(click.Group):
 
 def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
+        from rodshell.version import __version__
 
-        click.echo(f"rodshell {version('rodshell')}")
+        click.echo(f"rodshell {__version__}")
         ctx.exit()
 
 

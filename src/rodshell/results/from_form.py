@@ -5,7 +5,6 @@ This is the only file of the folder that knows the forms: in one piece, in patch
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from importlib.metadata import version
 from math import degrees
 from platform import python_version
 from typing import TYPE_CHECKING, Any, get_args
@@ -59,6 +58,7 @@ from rodshell.rods.varied import sizes
 from rodshell.solve.equilibrium import SolveReport
 from rodshell.targets import Target as TargetSurface
 from rodshell.targets.surface_mesh import surface_mesh
+from rodshell.version import __version__, version_of
 
 if TYPE_CHECKING:
     from rodshell.refining.acceptance import Refined
@@ -247,10 +247,13 @@ def rod_type(rod: RodModel) -> RodType:
 
 def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
     """What every result begins with."""
-    versions = {"numpy": np.__version__, "scipy": version("scipy")}  # without its import, which most forms do not need
+    versions = {
+        "numpy": np.__version__,
+        "scipy": version_of("scipy"),
+    }  # without its import, which most forms do not need
     return {
         **{key: Results.model_fields[key].default for key in ("format", "version", "units")},
-        "version_rodshell": version("rodshell"),
+        "version_rodshell": __version__,
         "versions": {"python": python_version(), **versions, "kernels": description()},
         "name": name,
         "status": status,

@@ -191,9 +191,9 @@ async def _static(request: Request) -> Response:
 
 
 async def _version(_: Request) -> Response:
-    from importlib.metadata import version
+    from rodshell.version import __version__
 
-    return JSONResponse({"rodshell": version("rodshell")})
+    return JSONResponse({"rodshell": __version__})
 
 
 async def _start(request: Request) -> Response:

@@ -6,7 +6,6 @@ The same job in another folder, with its files called otherwise, is the same job
 import hashlib
 import json
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import rodshell
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.units import shown
+from rodshell.version import __version__
 
 DIGITS = 32
 
@@ -67,4 +67,4 @@ def program_version() -> str:
     home = Path(rodshell.__file__).parent
     for file in sorted(home.rglob("*.py")):
         digest.update(f"{file.relative_to(home).as_posix()}\n".encode() + file.read_bytes())
-    return f"{version('rodshell')}+{digest.hexdigest()[:12]}"
+    return f"{__version__}+{digest.hexdigest()[:12]}"
