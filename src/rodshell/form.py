@@ -25,6 +25,7 @@ from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout
 from rodshell.layout.cells import Pattern
+from rodshell.loads.strength import net_factors
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
 from rodshell.progress import Progress, silent
@@ -397,10 +398,11 @@ class Form:
         results = self.results()
         if isinstance(self.stages, PatchedForm):
             results = with_seam_forces(results, self.stages, checks)
+        mesh, asked = self.footprint.mesh, self.case.strength.build()
         results = checked_results(
-            results, self.footprint.mesh, checks, self.fabrication,
-            limits=self.options.limits(self.rod, self.case.strength.build()), shear_strength=strengths.shear_strength,
-            strength=strengths.strength, strength_of=strengths.strength_of,
+            results, mesh, checks, self.fabrication,
+            limits=self.options.limits(self.rod, asked), net=net_factors(mesh, self.rod.section, asked.hole),
+            shear_strength=strengths.shear_strength, strength=strengths.strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         if self.loaded is not None:
             from rodshell.results.from_loads import loaded_results

@@ -3,16 +3,17 @@
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.linalg import eigh
 
 import rodshell as rs
-from rodshell.errors import InputError
+from rodshell.errors import ConvergenceError, InputError
 from rodshell.formfinding.popup import Ends
 from rodshell.layout.cells import diagonals
-from rodshell.loads.check import _load, mechanism, tributary_of
+from rodshell.loads.check import LoadedShell, _load, mechanism, tributary_of
 from rodshell.loads.kinds import LoadedNodes
 from rodshell.loads.strength import area_of, preset_limits
 from rodshell.loads.structure import Structure
@@ -140,6 +141,32 @@ def test_each_mode_is_an_imperfection_of_its_own() -> None:
     ]
     assert found.imperfect_factor == pytest.approx(min(each), rel=5e-3)
     assert max(each) > 1.02 * min(each)
+
+
+def test_an_imperfection_that_is_not_found_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shell that falls in one mode falls; one that falls in none is not known to stand."""
+    from importlib import import_module
+
+    def found(snow: float, missing: int) -> LoadedShell:
+        calls = iter(range(100))
+
+        def start(*given: Any) -> Any:
+            if next(calls) == missing:
+                raise ConvergenceError("no equilibrium")
+            return imperfect(*given)
+
+        monkeypatch.setattr(import_module("rodshell.loads.check"), "imperfect", start)
+        asked = one(rs.Snow(snow), stability=rs.Stability(imperfection=0.1, modes=2))
+        return rs.check_loads(shell("oval"), asked).shells["all"]["pinned"]
+
+    whole = found(300.0, -1)
+    assert whole.imperfect_factor is not None
+    few = 300.0 * whole.imperfect_factor
+    for missing in (0, 3):
+        weak, strong = found(2.0 * few, missing), found(0.2 * few, missing)
+        assert weak.imperfect_factor == pytest.approx(0.5, rel=0.3)
+        assert weak.imperfect_kind == whole.imperfect_kind
+        assert (strong.imperfect_factor, strong.imperfect_kind) == (None, "lost")
 
 
 def test_point_and_line_loads_have_their_forces() -> None:

@@ -345,6 +345,27 @@ def test_almost_its_own_weight_is_not_all_of_it() -> None:
         assert f"carries only {said} of it" in verdict(changed(("self_weight.pinned.load_factor", factor))).headline
 
 
+def test_what_is_too_much_before_loads_act_is_not_blamed_on_them() -> None:
+    """Once for all combinations, with its place where one of them knows it."""
+    place = {"rod": "U03", "at": 1.0}
+    parts = {"bending": 1.3, "slip": 5.7, "permanent": 1.6, "slip_unloaded": 5.6}
+    snow = {"limit_factor": 2.0, "at_factor": 1.0, "utilisation": 5.7, "utilisations": parts}
+    wind = snow | {"utilisation": 5.6, "governs": {"by": "slip_unloaded"} | place}
+    found = verdict(
+        changed(("loads", {"snow": {"pinned": snow | {"governs": {"by": "slip"} | place}}, "wind": {"pinned": wind}}))
+    )
+    assert [reason for reason in found.reasons if "before loads act" in reason] == [
+        "with pinned ends the erected shell, before loads act, uses 160 % of the rods' permanent design strength",
+        "with pinned ends before loads act a joint of the erected shell has to transfer 560 % of the force at which it "
+        "slips in U03, 1000 mm from its start",
+    ]
+    assert not any("slips under" in reason for reason in found.reasons)
+    parts["slip_unloaded"] = 0.9  # then loads make it slip
+    assert any("570 % of the force at which it slips under snow in U03" in reason for reason in verdict(
+        changed(("loads", {"snow": {"pinned": snow | {"governs": {"by": "slip"} | place}}}))
+    ).reasons)  # fmt: skip
+
+
 @pytest.mark.parametrize(("bracing", "by"), [([], "slip"), ([10.0], "bending")])
 def test_the_summary_says_what_carries_the_weight_and_what_slips(bracing: list[float], by: str) -> None:
     governs = {"by": by, "rod": "U03", "at": 1.0}

@@ -479,15 +479,18 @@ def _with_imperfections(
     if amplitude is None or buckling is None or not len(buckling.shapes):
         return None, None, 0
     kind: Limit = "none"
-    least, work = np.inf, 0
+    least, work, missing = np.inf, 0, False
     for shape, sign in product(buckling.shapes, (1.0, -1.0)):
         try:
             start = imperfect(structure.equilibrium, shape, sign * amplitude)
         except ConvergenceError:
-            return None, "lost", work
+            missing = True
+            continue
         # as far as it could be the smallest
         path = load_path(start, load, most=min(MOST, least), stations=(), progress=progress)
         work += path.factorizations
         if path.limit != "none" and path.factor < least:
             least, kind = path.factor, path.limit
+    if missing and (least >= 1 or kind == "lost"):  # else the shell falls in one that was found
+        return None, "lost", work
     return (None if np.isinf(least) else least), kind, work

@@ -38,7 +38,7 @@ from rodshell.rods.design_strength import DESIGN, DURATIONS, Duration
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Section, Tube
 from rodshell.validation import brief, not_negative, positive
 
-By = Literal["bending", "shear", "slip", "permanent"]
+By = Literal["bending", "shear", "slip", "permanent", "slip_unloaded"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,13 +212,15 @@ class Utilisation:
         return None if by is None else (by, int(np.argmax(self.uses[by])))
 
     def with_permanent(self, permanent: "Utilisation") -> "Utilisation":
-        """The same, where the erected shell's own utilisation counts too.
+        """The same, where the erected shell's own utilisation counts too, and the slip of its joints.
 
         Parameters
         ----------
         permanent : of the erected shell by the permanent strength.
         """
         uses = dict(self.uses)
+        if "slip" in permanent.uses:
+            uses["slip_unloaded"] = permanent.uses["slip"]
         rods = [permanent.uses[by] for by in ("bending", "shear") if by in permanent.uses]
         if rods:
             uses["permanent"] = np.maximum.reduce(rods)
@@ -269,9 +271,7 @@ def utilisation(
     uses: dict[By, Floats] = {}
     strength = limits.bending.get(duration)
     if strength is not None and bent.stress is not None:
-        net = np.ones(len(mesh.rod_nodes))
-        if asked.hole:
-            net[_at_joints(mesh)] = net_section(section, asked.hole)
+        net = net_factors(mesh, section, asked.hole)
         drawn = np.abs(bent.axial_strain) * rod.stretch_stiffness / area_of(rod)
         stress = bent.stress + drawn * (1.0 / limits.axial - 1.0)
         uses["bending"] = net * stress / strength
@@ -343,6 +343,20 @@ def net_section(section: Section | GivenSection, hole: float) -> float:
             f"strength.hole = {hole:g} m: a hole of that diameter leaves nothing of the rod: make it smaller"
         )
     return 1.0 / left
+
+
+def net_factors(mesh: GridMesh, section: Section | GivenSection, hole: float) -> Floats:
+    """(k,) stress of the net section over that of the full one, at each entry of `rod_nodes`: 1 but at joints.
+
+    Parameters
+    ----------
+    mesh : of the flat grid.
+    section, hole : as of `net_section`; 0: there is no hole.
+    """
+    factors = np.ones(len(mesh.rod_nodes))
+    if hole:
+        factors[_at_joints(mesh)] = net_section(section, hole)
+    return factors
 
 
 def _at_joints(mesh: GridMesh) -> Bools:

@@ -23,6 +23,7 @@ BY = {
     "shear": "torsion and shear force",
     "slip": "slip of a joint",
     "permanent": "the erected shell, permanent",
+    "slip_unloaded": "slip of a joint of the erected shell",
 }
 STATED = (
     "The erected shell is an equilibrium of elastic rods, without weight and held up until its bracing is fixed; the "
@@ -132,7 +133,11 @@ def _span(results: Results) -> float | None:
 
 def _stability(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     """Three figures side by side."""
-    imperfect = "not asked for" if shell.imperfect_kind is None else shown_factor(shell.imperfect_factor)
+    imperfect = shown_factor(shell.imperfect_factor)
+    if shell.imperfect_kind is None:
+        imperfect = "not asked for"
+    elif shell.imperfect_kind == "not followed":
+        imperfect = "not known" + f" above {imperfect}" * (shell.imperfect_factor is not None)
     above = (shell.imperfect_factor or np.inf) > CLOSE * (shell.limit_factor or np.inf)
     if above and shell.limit_kind == "bifurcation" and shell.imperfect_kind not in (None, "not followed"):
         imperfect += " (the bifurcation is stable)"

@@ -74,6 +74,7 @@ def checked_results(
     *,
     strength: float | None,
     limits: Limits = Limits(bending={}),
+    net: Floats | None = None,
     shear_strength: float | None = None,
     strength_of: str | None = None,
 ) -> Results:
@@ -85,13 +86,14 @@ def checked_results(
     mesh : of the flat grid, its rods in the order of the results.
     strength : of the rods' material [Pa]; None: not known.
     limits : design strengths of the rods, by which utilisation is counted where they are known.
+    net : (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
     shear_strength : of the rods' material [Pa]; None: not known.
     strength_of : the preset material that the strengths are of, where they were not given.
     """
     material = results.rod.material if results.rod else None
     anisotropic = material is not None and material.shear is not None  # as timber is
     torsion = checks.shear_unknown(strength) if anisotropic and shear_strength is None else ()
-    withstood = _Withstood.of(limits, strength)
+    withstood = _Withstood.of(limits, strength, np.ones(len(mesh.rod_nodes)) if net is None else net)
     bending = _bending(checks, mesh, withstood)
     found = results.changed(
         warnings=(*checks.warnings, *torsion, *results.warnings, *fabricated.warnings),
@@ -168,25 +170,37 @@ _PARTS = {
 
 
 class _Withstood(NamedTuple):
-    """By what the utilisation of the final shapes and that of the deployment are counted [Pa]."""
+    """By what the utilisation of the final shapes and that of the deployment are counted [Pa], and by which factors
+    (k,) their stresses."""
 
+    net: Floats
     standing: float | None
     erection: float | None
     given: bool = False
 
     @classmethod
-    def of(cls, limits: Limits, strength: float | None) -> "_Withstood":
+    def of(cls, limits: Limits, strength: float | None, net: Floats) -> "_Withstood":
         """Design strengths where they are known; then a final shape has to withstand its stress permanently."""
         if limits.bending:
-            return cls(limits.bending.get("permanent"), limits.erection, limits.given)
-        return cls(strength, limits.erection or strength)
+            return cls(net, limits.bending.get("permanent"), limits.erection, limits.given)
+        return cls(net, strength, limits.erection or strength)
+
+    def stressed(self, bent: BendingCheck) -> Floats:
+        """The stress at each entry of `rod_nodes`, or the curvature where the stress is not known."""
+        return self.net * (bent.curvature if bent.stress is None else bent.stress)
+
+    def worst_place(self, bent: BendingCheck, mesh: GridMesh) -> dict[str, Any]:
+        """The most stressed place: the rod, and how far along it [m]."""
+        at = int(np.argmax(self.stressed(bent)))
+        rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
+        return {"rod": rod.name, "at": float(mesh.stations[at]) - rod.start}
 
     def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
         """Worst figures over a part of the rods' nodes, in any of the shapes."""
         figures = _worst([*final, *stages], where)
         judged = ((final, self.standing), (stages, self.erection))
         shares = [
-            float(shape.stress[where].max()) / strength
+            float((self.net * shape.stress)[where].max()) / strength
             for shapes, strength in judged
             for shape in shapes
             if strength is not None and shape.stress is not None
@@ -249,7 +263,7 @@ def _rods(
 def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
     everywhere, shapes = slice(None), dict[str, Any]()
     for ends, bent in checks.bending.items():
-        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **_place(bent, mesh))
+        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **withstood.worst_place(bent, mesh))
     if checks.deployment is not None:
         stages = list(zip(checks.deployment.share.tolist(), checks.deployment_bending, strict=True))
         stage = int(np.argmax([bent.curvature.max() for bent in checks.deployment_bending]))
@@ -257,22 +271,10 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
         figures = withstood.worst(final, [bent for share, bent in stages if share < 1], everywhere)
         shapes["pop_up"] = WorstBent(**figures, share=float(checks.deployment.share[stage]))
     if checks.stages_below_final:
-        share, worst = max(checks.stages_below_final, key=lambda stage: float(_stressed(stage[1]).max()))
+        share, worst = max(checks.stages_below_final, key=lambda stage: float(withstood.stressed(stage[1]).max()))
         figures = withstood.worst((), [bent for _, bent in checks.stages_below_final], everywhere)
-        shapes["deployment"] = WorstBent(**figures, share=share, **_place(worst, mesh))
+        shapes["deployment"] = WorstBent(**figures, share=share, **withstood.worst_place(worst, mesh))
     return Bending(strength=withstood.standing, erection_strength=withstood.erection, **shapes)
-
-
-def _stressed(bent: BendingCheck) -> Floats:
-    """The stress at each entry of `rod_nodes`, or the curvature where the stress is not known."""
-    return bent.curvature if bent.stress is None else bent.stress
-
-
-def _place(bent: BendingCheck, mesh: GridMesh) -> dict[str, Any]:
-    """The most stressed place: the rod, and how far along it [m]."""
-    at = int(np.argmax(_stressed(bent)))
-    rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
-    return {"rod": rod.name, "at": float(mesh.stations[at]) - rod.start}
 
 
 def _contact(checks: Checks) -> Contact:

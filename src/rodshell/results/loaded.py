@@ -20,6 +20,7 @@ class Utilisations(Record):
     shear: Number = key("of torsion and the shear force")
     slip: Number = key("of the force and the moment at which joints slip")
     permanent: Number = key("of the erected shell without loads, by the permanent strength")
+    slip_unloaded: Number = key("of the force at which joints slip, by the erected shell without loads")
 
 
 class DesignStrength(Record):

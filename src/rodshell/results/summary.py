@@ -10,7 +10,7 @@ from rodshell.results.records import Bent, RodType
 from rodshell.results.results import Bending, Results
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import strength_name
-from rodshell.results.verdict import CONVERGED, unknown_below, verdict_of
+from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict_of
 from rodshell.results.wording import (
     NAMES,
     case_rows,
@@ -228,8 +228,10 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
     """What each combination of loads does, a line for each end condition."""
     for name, by_ends in results.loads.items():
         for ends, found in by_ends.items():
-            limit = shown_factor(found.limit_factor)
-            line = f"  {name:<9} {ends:<8}stable up to {limit} times the loads ({found.limit_kind})"
+            limit = f"up to {shown_factor(found.limit_factor)} times the loads ({found.limit_kind})"
+            if found.limit_factor is None and found.limit_kind == "none":
+                limit = "beyond 100 times the loads"
+            line = f"  loads     {ends:<8}{name}: stable {limit}"
             if found.linear_factor is not None:
                 line += f", linear {shown_factor(found.linear_factor)}"
             if found.imperfect_factor is not None:
@@ -239,8 +241,10 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
             if found.utilisation is not None:
                 worst = found.governs
                 of = f"the design strength{f' ({worst.by}, {worst.rod})' if worst and worst.by else ''}"
-                if worst and worst.by == "slip":
+                if worst and worst.by in ("slip", "slip_unloaded"):
                     of = f"the force at which a joint slips ({worst.rod})"
+                if worst and worst.by in UNLOADED:
+                    of += " before loads act"
                 line += f", {percent(found.utilisation)} of {of}"
             yield line
 
@@ -255,8 +259,12 @@ def _deployment(results: Results) -> Iterator[str]:
             None: "not known whether it is reached",
         }
         yield f"  from flat {deployment.ends or 'pinned':<8}{words[deployment.reached_from_flat]}"
-        if deployment.clamped and deployment.clamped.reached_from_flat:
-            yield "  from flat clamped reached: the ends are turned into their clamps after the deployment"
+        if deployment.clamped and deployment.clamped.reached_from_flat is not None:
+            turned = {
+                True: "reached: the ends are turned into their clamps after the deployment",
+                False: "turning the ends into their clamps ends in another shape",
+            }
+            yield f"  from flat clamped {turned[deployment.clamped.reached_from_flat]}"
     for ends, searched in results.other_shapes.items():
         others = [shape for shape in searched.found if not shape.mirror]
         found = ["its mirror image"] if len(others) < len(searched.found) else []

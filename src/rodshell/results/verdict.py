@@ -146,12 +146,15 @@ BY_WORDS = {
     "shear": "the rods use {} of their design strength in shear",
     "slip": "a joint has to transfer {} of the force at which it slips",
     "permanent": "the erected shell, before loads act, uses {} of the rods' permanent design strength",
+    "slip_unloaded": "before loads act a joint of the erected shell has to transfer {} of the force at which it slips",
 }
 """What is used too much, where it is not bending."""
+UNLOADED = ("permanent", "slip_unloaded")  # of these no load is the cause
 
 
 def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
-    """Combinations of loads under which the shell falls or breaks."""
+    """Combinations of loads under which the shell falls or breaks, and what is too much before they act."""
+    unloaded = dict[str, str]()
     for name, by_ends in results.loads.items():
         found = by_ends.get(ends)
         if found is None:
@@ -162,18 +165,30 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
         elif limit is not None and limit < 1 and found.limit_kind != "not followed":
             how = "snaps through" if found.limit_kind == "limit point" else "buckles"
             yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded_down(limit)} times these loads"
-        place = found.governs
-        said = place is not None and place.by == "permanent" and (bent_of(results, ends).utilisation or 0.0) > 1
-        if used is not None and used > 1 and not said:
+        place, parts = found.governs, found.utilisations
+        governs = (place.by if place else None) or ""
+        before = {by: getattr(parts, by, None) or 0.0 for by in UNLOADED}
+        if before["permanent"] <= (bent_of(results, ends).utilisation or 0.0):
+            before["permanent"] = 0.0  # is said of the unloaded shell
+        for by, share in before.items():
+            if share > 1:
+                where = f" in {place.rod}, {_mm(results, place.at)} from its start" if place and governs == by else ""
+                words = f"with {ends} ends {BY_WORDS[by].format(_too_much(share))}{where}"
+                unloaded[by] = max(unloaded.get(by, ""), words, key=len)  # the same under all, or with its place
+        blamed = governs not in UNLOADED and not (governs == "slip" and before["slip_unloaded"] > 1)
+        if used is not None and used > 1 and blamed:
             where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
             at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
-            share = f"{max(101, round(100 * used))} %"
-            by = BY_WORDS.get((place.by if place else None) or "", "the rods use {} of their design strength")
-            under = "" if place is not None and place.by == "permanent" else f" under {name}{at}"
-            yield f"with {ends} ends {by.format(share)}{under}{where}"
+            words = BY_WORDS.get(governs, "the rods use {} of their design strength")
+            yield f"with {ends} ends {words.format(_too_much(used))} under {name}{at}{where}"
         if (braced := found.bracing_utilisation) is not None and braced > 1:
-            share = f"{max(101, round(100 * braced))} %"
-            yield f"with {ends} ends the bracing uses {share} of its design strength under {name}"
+            yield f"with {ends} ends the bracing uses {_too_much(braced)} of its design strength under {name}"
+    yield from unloaded.values()
+
+
+def _too_much(share: float) -> str:
+    """A share above 1, never shown as 100 %."""
+    return f"{max(101, round(100 * share))} %"
 
 
 def _contact_faults(results: Results, shape: str) -> Iterator[str]:
@@ -196,7 +211,7 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
     used, strain = bent.utilisation, bent.max_bending_strain
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
     if used is not None and used > 1 and not (shape == "deployment" and holds_while_erected(results, used)):
-        share = f"{max(101, round(100 * used))} %"  # never 100 % of what is too much
+        share = _too_much(used)
         if by_design_strength(results):
             yield f"{_shape(shape, bent)} the rods use {share} of {strength_name(results, shape)}{where}"
         else:
@@ -218,7 +233,7 @@ def _erection(results: Results, *, thinner: bool) -> Iterator[str]:
     used = bent.utilisation
     if used is not None and used > 1 and holds_while_erected(results, used):
         yield (
-            f"{_shape('deployment', bent)}, the ends moved evenly, the rods use {max(101, round(100 * used))} % of "
+            f"{_shape('deployment', bent)}, the ends moved evenly, the rods use {_too_much(used)} of "
             f"{strength_name(results, 'deployment')}: erect it in another way{', or use thinner rods' * thinner}"
         )
 
