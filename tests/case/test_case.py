@@ -432,6 +432,10 @@ def test_values_that_do_not_fit_together_are_refused_when_built(overrides: dict[
     ("overrides", "message"),
     [
         ({"drape.objective": "gap"}, "nothing is searched for: set drape.anchor or layout.rotate"),
+        (
+            {"fabrication.end_allowance": "1 km"},
+            "fabrication.end_allowance = 1000.0: more than the 200 mm of the target's",
+        ),
         ({"fabrication.kerf": "3 mm"}, "kerf of 0.003 m is lost where stock is cut: give its stock_length"),
         (
             {"fabrication.stock_length": "1 mm"},

@@ -289,6 +289,7 @@ def test_bracing_stiffens_a_shell_and_laths_feel_their_own_bending() -> None:
         ("tubes", one(rs.PointLoad((30.0, 0.0), (0, 0, -1))), "away from the nearest rod"),
         ("tubes", one(rs.Settlement(("U99.0",), (0, 0, -1))), 'the support "U99.0", which the shell does not have'),
         ("tubes", one(rs.Wind(1.0, "sqrt(x)")), "give a formula that is finite"),
+        ("tubes", one(rs.Wind(1.0, "1/(x - 0.001)")), "pressure coefficients lie between -3 and 3"),
         ("tubes", one(rs.Snow(1.0), bracing=rs.Cables(rod=ROPE, prestrain=0.5)), "pulls the shell out of its shape"),
     ],
 )
@@ -304,6 +305,7 @@ def test_what_does_not_fit_the_form_is_refused_in_one_sentence(form: str, loads:
         (lambda: rs.SelfWeight(cladding=-1.0), "must be 0 or more"),
         (lambda: rs.Wind(-1.0, 0.5), "must be 0 or more"),
         (lambda: rs.Wind(1.0, "z"), '"z" is not allowed'),
+        (lambda: rs.Wind(1.0, -30), "the wind's coefficient -30 reaches 30: pressure coefficients lie"),
         (lambda: rs.Snow(1.0, "quarter"), "must be"),
         (lambda: rs.Loads(loads={}, combinations={"a": {"b": 1.0}}), "has no loads"),
         (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={}), "has no combinations"),

@@ -16,7 +16,7 @@ from rodshell.output.colour_scale import mixed, scale_of
 from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
 from rodshell.output.grid import rods_of, shape_of
 from rodshell.output.labels import Room
-from rodshell.output.pictures import DEPTHS, PAPER, picture
+from rodshell.output.pictures import DEPTHS, PAPER, deployment_picture, picture
 from rodshell.output.png import drawing_png
 from rodshell.output.svg import drawing_svg, number
 from rodshell.results import Archive, Results
@@ -24,6 +24,20 @@ from tests.output.forms import archive as archive_of
 from tests.output.sample_archive import sample_archive
 
 numbers = st.floats(-1e6, 1e6).map(lambda x: float(np.round(x, 4))) | st.sampled_from([0.0, -0.001, 100.0, -0.5, 1.005])
+
+
+def test_the_deployment_of_a_target_far_from_the_origin_is_drawn_alike() -> None:
+    """The flat grid with its middle at the origin, too."""
+    made = archive_of("dome")
+    aside = {
+        name: values + (3.0, -5.0, 0.25) if values.ndim > 1 and values.shape[-1] == 3 and name != "flat" else values
+        for name, values in made.states.items()
+        if name != "target_faces"
+    }
+    here, there = deployment_picture(made), deployment_picture(replace(made, states=aside))
+    assert len(here.paths) == len(there.paths)
+    for one, other in zip(here.paths, there.paths, strict=True):
+        np.testing.assert_allclose(other.points, one.points, atol=1e-6)
 
 
 def test_a_png_is_read_back_pixel_by_pixel() -> None:

@@ -120,7 +120,7 @@ def test_the_offer_foretells_what_refining_by_double_laths_gains() -> None:
     assert found.factorizations <= 10
     assert 0.05 <= found.shares[0] <= found.shares[1] <= 0.95
     assert "--vary double --ends pinned" in found.words
-    assert "choose clamped ends" in found.words
+    assert "with clamped ends, which need supports that hold the rods' directions, it is" in found.words
 
 
 def test_a_form_whose_rods_have_profiles_gets_no_offer() -> None:

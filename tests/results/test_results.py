@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
+import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import OutputError
 from rodshell.output import save
@@ -106,6 +107,23 @@ def test_files_of_version_1_open_with_their_keys_renamed() -> None:
     assert old.patches[0].drape == old.drape
     gridshell = {"format": "gridshell-result", "version": 1, "version_gridshell": "0.1", "rods": []}
     assert Results.of(gridshell).version_rodshell == "0.1"
+
+
+@pytest.mark.parametrize(("radius", "spacing"), [("4 m", "1 m"), ("5 m", "0.9 m"), ("4.2 m", "1.3 m")])
+def test_crossings_without_a_joint_are_those_of_the_lines_that_have_none(radius: str, spacing: str) -> None:
+    """Two lines of a square layout cross where each lies between the ends of the other."""
+    layout = {"spacing": spacing, "edge": spacing, "rotate": "20 deg"}
+    case = {"target": {"kind": "cap", "radius": radius, "base": "1.5 m"}, "layout": layout, "joint": {"kind": "pin"}}
+    found = rs.Job.load(case | {"checks": {"stages": 0}, "pop_up": {"ends": "pinned"}}).run().archive().results
+    joints = {(rod.id, joint.other) for rod in found.rods for joint in rod.joints}
+    crossings = {
+        (u.id, v.id)
+        for u in found.rods
+        for v in found.rods
+        if (u.family, v.family) == ("u", "v") and u.start < v.offset < u.end and v.start < u.offset < v.end  # type: ignore[operator]
+    }
+    assert found.crossings_without_joint == len(crossings - joints)
+    assert len(crossings & joints) == len(joints) / 2
 
 
 def test_unknown_keys_are_kept_and_null_is_not_known() -> None:

@@ -230,7 +230,7 @@ def test_the_verdict_of_a_result_is_the_one_that_it_holds() -> None:
 
 
 def test_supports_are_recommended_only_where_both_can_be_used() -> None:
-    advice = "improve little here: pinned ones are enough"
+    advice = "bring the unloaded shell little nearer to the target"
     close = ("agreement.pinned", {"max": 0.003, "max_relative": 0.0015})
     near = changed(close)
     assert any(advice in fact for fact in facts(near))
@@ -290,6 +290,7 @@ def test_a_shell_that_sinks_far_under_its_own_weight_does_not_have_the_shape_tha
     found = verdict(changed(*gaps, *sunk))
     assert found.level == "check"
     assert "with clamped ends the shell moves by 5.00 mm (2.5 % of its size) under its own weight" in found.headline
+    assert "under its own weight, by 30.0 mm with pinned ends, so that" in found.headline
     assert verdict(changed(*gaps, sunk[0], ("self_weight.clamped.deflection", 0.003))).level == "good"
 
 
@@ -374,6 +375,31 @@ def test_the_summary_says_what_carries_the_weight_and_what_slips(bracing: list[f
     assert f"own weight carried{' without bracing' if bracing else ''}: 3 times" in text
     of = "the force at which a joint slips (U03)" if by == "slip" else "the design strength (bending, U03)"
     assert f", 90 % of {of}\n" in text
+
+
+@pytest.mark.parametrize(("pinned", "clamped", "reasons"), [
+    (1.01, 1.4, ["the shell carries only 1.01 times its own weight with pinned ends and 1.4 times its own weight with "
+                 "clamped ends, with little reserve for creep, imperfections and loads"]),
+    (1.01, 1.6, []),
+])  # fmt: skip
+def test_a_shell_that_just_stands_is_not_good(pinned: float, clamped: float, reasons: list[str]) -> None:
+    weights = [("self_weight.pinned.load_factor", pinned), ("self_weight.clamped.load_factor", clamped)]
+    found = verdict(changed(*weights))
+    assert found.level == ("check" if reasons else "good")
+    assert [reason for reason in found.reasons if "reserve" in reason] == reasons
+
+
+def test_joints_that_cannot_be_made_and_what_spans_are_left_are_said() -> None:
+    rods = [
+        {"id": name, "family": "u", "offset": 0.0, "start": -2.0, "end": 2.0, "length": 4.0,
+         "joints": [{"with": "V1", "at": first}, {"with": "V2", "at": 3.0}]}
+        for name, first in (("U1", 0.5), ("U2", 1.9))
+    ]  # fmt: skip
+    said = {count: summary_text(changed(("rods", rods), ("crossings_without_joint", count))) for count in (0, 1, 8)}
+    assert "  grid      2 rods, 2 joints\n" in said[0]
+    far = "so that U2 spans 1.9 m from an end to a joint\n"
+    assert f"2 joints, none at 1 crossing near rod ends, {far}" in said[1]
+    assert f"2 joints, none at 8 crossings near rod ends, {far}" in said[8]
 
 
 def test_with_bracing_its_own_weight_is_a_matter_of_erection() -> None:

@@ -223,6 +223,7 @@ class Case(Table):
         target = target or built(self.target)
         layout = built(self.layout, target)
         self._require_stock(layout)
+        self._require_allowance(target)
         self.bracing.build()
         loads = self.built_loads()
         if loads is not None and loads.locked_joints is not None:
@@ -247,6 +248,15 @@ class Case(Table):
             options.limits(rod, strength)
             if strength.hole:
                 net_section(rod.section, strength.hole)
+
+    def _require_allowance(self, target: "Target") -> None:
+        """InputError where rods are cut longer by more than the shell is wide: of no support."""
+        allowance = self.fabrication.end_allowance
+        if allowance > target.size:
+            raise InputError(
+                f"fabrication.end_allowance = {shown(allowance)}: more than the {length_text(target.size)} of the "
+                "target's size: give the length that the support holds, such as 50 mm"
+            )
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""

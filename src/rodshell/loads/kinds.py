@@ -24,6 +24,7 @@ GRAVITY = 9.81  # [m/s2]
 Distribution = Literal["uniform", "half", "drifted"]
 REACH = 1.0  # distances of two rods: a point load farther from every rod is refused
 SAMPLES = 400  # parts of a line load
+LARGEST_COEFFICIENT = 20.0  # of wind on a surface; codes have up to about 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +155,15 @@ class Wind:
             parse_formula(self.coefficient)
         else:
             number("the wind's coefficient", self.coefficient)
+            self._require_usual(np.array([self.coefficient], dtype=float), "")
+
+    def _require_usual(self, coefficients: Floats, where: str) -> None:
+        """InputError where one is not the pressure coefficient of any surface."""
+        if (largest := float(np.abs(coefficients).max(initial=0.0))) > LARGEST_COEFFICIENT:
+            raise InputError(
+                f"the wind's coefficient {shown(self.coefficient)} reaches {largest:.4g}{where}: pressure coefficients "
+                f"lie between -3 and 3, and none above {LARGEST_COEFFICIENT:g} is taken"
+            )
 
     @cached_property
     def _formula(self) -> Formula | None:
@@ -177,6 +187,8 @@ class Wind:
                     f"the wind's coefficient {shown(self.coefficient)} is {coefficient[k]} at x = {x[k]:.4g} m, "
                     f"y = {y[k]:.4g} m: give a formula that is finite everywhere on the shell"
                 )
+            k = int(np.argmax(np.abs(coefficient)))
+            self._require_usual(coefficient, f" at x = {x[k]:.4g} m, y = {y[k]:.4g} m")
         return np.asarray(-self.value * coefficient[:, None] * nodes.tributary.vectors)
 
 

@@ -1,5 +1,6 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -255,6 +256,20 @@ def shape_of(archive: Archive, name: str) -> Shape:
     gap = states.get(GAPS.get(name, ""))
     force = states.get(f"force_{ends}")
     return Shape(name, caption_of(archive, name), np.asarray(states[name], dtype=float), gap, stress, curvature, force)
+
+
+def deployed_shape(archive: Archive, name: str) -> Shape:
+    """A shape as the deployment passes it: the flat grid not in the axes of its drawings, but where it is laid out on
+    site before its ends move.
+
+    Parameters
+    ----------
+    name : one of `shape_names`.
+    """
+    shape, states = shape_of(archive, name), archive.states
+    if name == "flat" and "history" in states and states["history_share"][0] == 0:
+        return replace(shape, positions=np.asarray(states["history"][0], dtype=float))
+    return shape
 
 
 def outlines(rods: Floats) -> list[Ints]:

@@ -24,7 +24,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.drawings.flat import FlatPlan
-from rodshell.output.grid import STAGE, Shape, joint_places, joints_of, rods_of, shape_names, shape_of
+from rodshell.output.grid import STAGE, Shape, deployed_shape, joint_places, joints_of, rods_of, shape_names, shape_of
 from rodshell.output.svg import tag
 from rodshell.results import Archive
 from rodshell.results.records import Section, Stiffness
@@ -56,7 +56,7 @@ def vtp_text(archive: Archive, name: str) -> str:
     ----------
     name : of a shape, see `shape_names`.
     """
-    shape = shape_of(archive, name)
+    shape = deployed_shape(archive, name)
     rods = [(k, rod.nodes) for k, rod in enumerate(rods_of(archive)) if len(rod.nodes) > 1]
     nodes = archive.states["rod_nodes"]
     offsets = np.cumsum([len(nodes_of_rod) for _, nodes_of_rod in rods], dtype=np.int64)

@@ -12,7 +12,17 @@ from rodshell.dataclass import dataclass
 from rodshell.geometry.bounds import bounds
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
 from rodshell.output.drawing import Drawing, Path, Pen, Pencil
-from rodshell.output.grid import STAGE, GridRod, Shape, opens, outlines_of, rods_of, shape_names, shape_of
+from rodshell.output.grid import (
+    STAGE,
+    GridRod,
+    Shape,
+    deployed_shape,
+    opens,
+    outlines_of,
+    rods_of,
+    shape_names,
+    shape_of,
+)
 from rodshell.output.svg import number, picture_document
 from rodshell.results.archive import SHELLS, Archive, made_once
 from rodshell.results.wording import MINUS, UNDER, nice_ticks, shown_length
@@ -237,7 +247,7 @@ def deployment_picture(archive: Archive) -> Drawing:
     share = (width - 2 * GUTTER) / COLUMNS / WIDTH
     cell = np.array([share * WIDTH, -share * float(view.size[1]) - CAPTION])
     for k, name in enumerate(names[entry] for entry in chosen):
-        shape, ground = shape_of(archive, name), Pencil()
+        shape, ground = deployed_shape(archive, name), Pencil()
         scale = scale_of(archive, shape, "stress")
         last = scale or last
         _ground_curves(ground, view, shape, rods)

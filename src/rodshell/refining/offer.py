@@ -51,7 +51,7 @@ class Offer:
 
     @property
     def words(self) -> str:
-        """One line: the gain, and which ends to choose."""
+        """One line: the gain, and the gap with other ends."""
         low, high = (f"{100 * share:.0f}" for share in self.shares)
         part = f"the middle {low if low == high else f'{low} to {high}'} % of every rod"
         gain = f"{percent_text(self.before)} -> {percent_text(self.after)} rms"
@@ -68,10 +68,11 @@ class Offer:
             better = min(self.after, self.before)
             if gap < better:
                 words += (
-                    f"; choose {ends} ends where supports can hold the rods' directions: {percent_text(gap)} as it is"
+                    f"; with {ends} ends, which need supports that hold the rods' directions, it is "
+                    f"{percent_text(gap)} rms as it is"
                 )
             else:
-                words += f"; {ends} ends have {percent_text(gap)}: choose {self.ends} ones"
+                words += f"; with {ends} ends it is {percent_text(gap)} rms as it is"
         return words
 
 

@@ -23,7 +23,7 @@ from rodshell.formfinding.seams import End
 from rodshell.joints import joint_parameters
 from rodshell.joints.joint import Joint as JointModel
 from rodshell.kernels import description
-from rodshell.layout import Profile
+from rodshell.layout import FlatGrid, Profile
 from rodshell.nets import ChebyshevNet
 from rodshell.results.records import (
     Agreement,
@@ -99,6 +99,7 @@ def form_results(form: PatchForm) -> Results:
         rod=rod_type(form.rod),
         joint=_joint(form.joint),
         **_grid(form.footprint, form.boundary.points, form.dropped, form.rod),
+        crossings_without_joint=_without_joint(form.footprint.mesh.grid),
         end_tangents=form.boundary.tangents.tolist(),
         agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
         drape=_drape(form.draped),
@@ -328,6 +329,11 @@ def _drape_of_all(parts: list[Drape]) -> Drape:
 def _mesh_states(footprint: Footprint) -> States:
     mesh = footprint.mesh
     return {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
+
+
+def _without_joint(grid: FlatGrid) -> int:
+    """At how many crossings the rods have no joint."""
+    return len(FlatGrid.of(grid.rods).crossings) - len(grid.crossings)
 
 
 def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, str]], kind: RodModel) -> dict[str, Any]:

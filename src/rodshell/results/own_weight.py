@@ -18,6 +18,7 @@ from rodshell.rods.section import Section, size_text
 
 WITHOUT_STIFFNESS = ("ball", "pin", "rigid")  # joints
 ENOUGH = 1.05  # times its own weight: beyond what similarity is off
+RESERVE = 1.5  # times its own weight: a shell that carries less has none for creep, imperfections or a thin snow
 
 
 def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool]:
@@ -48,6 +49,10 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
             f"{_alone(falling)}the shell does not stand under its own weight: it carries only {_parts(falling)}"
             f"{others}{_other_rods(results, falling)}"
         )
+    known = {end: found[end].load_factor for end in standing if end not in lost}
+    if known and all(factor is not None and factor < RESERVE for factor in known.values()):
+        borne = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in known)
+        said.append(f"the shell carries only {borne}, with little reserve for creep, imperfections and loads")
     if unknown:
         said.append(
             f"{_alone(unknown)}it is not known whether the shell stands under its own weight: it could be followed "

@@ -286,6 +286,7 @@ class Results(Record):
     seams: Rows[Seam] = rows("seams between patches")
     net: Net | None = key("the inextensible net")
     rods: Rows[Rod] = rows("the rods, cut to their supports")
+    crossings_without_joint: Whole | None = key("where rods pass each other too near to an end for a joint, a count")
     dropped: Rows[Dropped] = rows("rods of the layout that are not part of the grid")
     footprint: Rows[Flat] = rows("flat place of each rod's start and end in turn", "m")
     boundary: Rows[Point] = rows("place in space of each rod's start and end in turn", "m")

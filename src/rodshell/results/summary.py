@@ -38,11 +38,10 @@ Length = Callable[[float | None], str]
 def summary_text(results: Results) -> str:
     """What was found, how good it is, and what to read first."""
     length, verdict = shown_length(results), verdict_of(results)
-    joints = sum(len(rod.joints) for rod in results.rods) // 2
     lines = [f"{results.name or 'rodshell'}: {verdict.headline}"]
     lines += [f"            {reason}" for reason in verdict.reasons[1:]]
     laths = f"; {lengths_text(results)}" if laths_text(results) else ""
-    lines.append(f"  grid      {len(results.rods)} rods, {joints} joints{laths}")
+    lines.append(f"  grid      {len(results.rods)} rods, {_joints(results, length)}{laths}")
     if results.rod:
         lines += _rod(results.rod, results.bending, results.strength)
     lines += _patches(results, length)
@@ -208,6 +207,21 @@ def _curved(bent: Bent, length: Length) -> str:
     if bent.twist_rate is not None and bent.twist_rate > STRAIGHT:
         words.append(f"twist {rounded(degrees(bent.twist_rate))} deg/m")
     return f" ({', '.join(words)})" if words else ""
+
+
+def _joints(results: Results, length: Length) -> str:
+    """How many there are, and where rods pass each other without one."""
+    joints = f"{sum(len(rod.joints) for rod in results.rods) // 2} joints"
+    if not (bare := results.crossings_without_joint):
+        return joints
+    tails = [
+        (max(rod.joints[0].at, (rod.end or 0.0) - (rod.start or 0.0) - rod.joints[-1].at), rod.id)
+        for rod in results.rods
+        if rod.joints
+    ]
+    far, name = max(tails)
+    where = f"{bare} crossing{'s' * (bare > 1)} near rod ends"
+    return f"{joints}, none at {where}, so that {name} spans {length(far)} from an end to a joint"
 
 
 def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:

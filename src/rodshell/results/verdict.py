@@ -263,7 +263,8 @@ def _off_words(results: Results, ends: Ends, gap: Agreement) -> str:
     dips = ends == "clamped" and bound and not buckles and not against_shear
     advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
     return (
-        f"with {ends} ends, the best that can be used, the shell deviates from the target by {_mm(results, gap.max)} "
+        f"with {ends} ends, the nearest that can be used, the shell deviates from the target by up to "
+        f"{_mm(results, gap.max)} "
         f"({percent(gap.max_relative)} of its size){where}{advice}"
     )
 
@@ -275,11 +276,12 @@ def _sinks(results: Results, usable: list[Ends]) -> list[str]:
     known = {ends: depth for ends, depth in sunk.items() if depth is not None}
     if not sizes or not known or min(known.values()) <= OFF * sizes[0]:
         return []
-    ends, depth = min(known.items(), key=lambda pair: pair[1])
+    (ends, depth), *others = sorted(known.items(), key=lambda pair: pair[1])
+    further = "".join(f", by {_mm(results, more)} with {other} ends" for other, more in others)
     return [
         f"with {ends} ends the shell moves by {_mm(results, depth)} ({percent(depth / sizes[0])} of its size) under "
-        "its own weight, so that it does not keep the shape whose gap to the target is given: use stiffer rods, or "
-        "brace it"
+        f"its own weight{further}, so that it does not keep the shape whose gap to the target is given: use stiffer "
+        "rods, or brace it"
     ]
 
 
@@ -461,7 +463,7 @@ def _advice(gaps: Mapping[Ends, float], relative: float | None) -> Iterator[str]
         share = percent(gaps["clamped"] / gaps["pinned"])
         yield f"Supports that hold the rods' directions (clamped) leave {share} of the gap that pinned ones leave."
     elif relative is None or relative <= OFF:
-        yield "Supports that hold the rods' directions (clamped) improve little here: pinned ones are enough."
+        yield "Supports that hold the rods' directions (clamped) bring the unloaded shell little nearer to the target."
 
 
 def _strength(results: Results) -> Iterator[str]:
