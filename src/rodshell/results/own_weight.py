@@ -51,8 +51,8 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
         )
     known = {end: found[end].load_factor for end in standing if end not in lost}
     if known and all(factor is not None and factor < RESERVE for factor in known.values()):
-        borne = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in known)
-        said.append(f"the shell carries only {borne}, with little reserve for creep, imperfections and loads")
+        weights = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in known)
+        said.append(f"the shell carries only {weights}, with little reserve for creep, imperfections and loads")
     if unknown:
         said.append(
             f"{_alone(unknown)}it is not known whether the shell stands under its own weight: it could be followed "
