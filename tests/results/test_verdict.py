@@ -367,6 +367,14 @@ def test_what_is_too_much_before_loads_act_is_not_blamed_on_them() -> None:
     ).reasons)  # fmt: skip
 
 
+def test_of_a_section_that_was_chosen_the_verdict_says_to_give_another() -> None:
+    for chosen, said in (({"section": True}, True), ({"material": True}, False)):
+        used = ("bending.pinned.utilisation", 1.27), ("bending.pinned.rod", "U03"), ("bending.pinned.at", 1.0)
+        found = verdict(changed(*used, ("rod", {"chosen": chosen}), ("bending.deployment.utilisation", 0.9)))
+        (reason,) = [reason for reason in found.reasons if "127 %" in reason]
+        assert reason.endswith(": the section that was chosen is too thick; give a thinner one (rod.section)") == said
+
+
 @pytest.mark.parametrize(("bracing", "by"), [([], "slip"), ([10.0], "bending")])
 def test_the_summary_says_what_carries_the_weight_and_what_slips(bracing: list[float], by: str) -> None:
     governs = {"by": by, "rod": "U03", "at": 1.0}

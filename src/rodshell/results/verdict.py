@@ -212,6 +212,8 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
     if used is not None and used > 1 and not (shape == "deployment" and holds_while_erected(results, used)):
         share = _too_much(used)
+        if shape in ENDS and results.rod and "section" in (results.rod.chosen or {}):
+            where += ": the section that was chosen is too thick; give a thinner one (rod.section)"
         if by_design_strength(results):
             yield f"{_shape(shape, bent)} the rods use {share} of {strength_name(results, shape)}{where}"
         else:
