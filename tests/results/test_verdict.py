@@ -361,6 +361,10 @@ def test_what_is_too_much_before_loads_act_is_not_blamed_on_them() -> None:
         "slips in U03, 1000 mm from its start",
     ]
     assert not any("slips under" in reason for reason in found.reasons)
+    assert any("the rods use 130 % of their design strength under snow" in reason for reason in found.reasons)
+    early = verdict(changed(("loads", {"snow": {"pinned": snow | {"utilisations": None, "utilisation": 1.6} | {
+        "governs": {"by": "permanent"} | place}}})))  # fmt: skip
+    assert any("before loads act, uses 160 %" in reason and "U03, 1000 mm" in reason for reason in early.reasons)
     parts["slip_unloaded"] = 0.9  # then loads make it slip
     assert any("570 % of the force at which it slips under snow in U03" in reason for reason in verdict(
         changed(("loads", {"snow": {"pinned": snow | {"governs": {"by": "slip"} | place}}}))
@@ -405,9 +409,9 @@ def test_joints_that_cannot_be_made_and_what_spans_are_left_are_said() -> None:
     ]  # fmt: skip
     said = {count: summary_text(changed(("rods", rods), ("crossings_without_joint", count))) for count in (0, 1, 8)}
     assert "  grid      2 rods, 2 joints\n" in said[0]
-    far = "so that U2 spans 1.9 m from an end to a joint\n"
-    assert f"2 joints, none at 1 crossing near rod ends, {far}" in said[1]
-    assert f"2 joints, none at 8 crossings near rod ends, {far}" in said[8]
+    far = "longest span from an end to a joint 1.9 m (U2)\n"
+    assert f"2 joints, none at 1 crossing near rod ends; {far}" in said[1]
+    assert f"2 joints, none at 8 crossings near rod ends; {far}" in said[8]
 
 
 def test_with_bracing_its_own_weight_is_a_matter_of_erection() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.errors import OutputError
+from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
 from rodshell.results.archive import BENT, GAPS, SHELLS, Archive, made_once
@@ -266,10 +267,22 @@ def deployed_shape(archive: Archive, name: str) -> Shape:
     ----------
     name : one of `shape_names`.
     """
-    shape, states = shape_of(archive, name), archive.states
-    if name == "flat" and "history" in states and states["history_share"][0] == 0:
-        return replace(shape, positions=np.asarray(states["history"][0], dtype=float))
-    return shape
+    shape, final = shape_of(archive, name), archive.final
+    if not shape.flat or final is None:
+        return shape
+    ends = np.array([rod.nodes[[0, -1]] for rod in rods_of(archive) if len(rod.nodes) > 1], dtype=np.intp).ravel()
+    return replace(shape, positions=laid_out(shape.positions, archive.states[final], ends))
+
+
+def laid_out(flat: Floats, final: Floats, ends: Ints) -> Floats:
+    """The flat grid (n, 3), moved in its plane to below a shape (n, 3): where its deployment begins.
+
+    Parameters
+    ----------
+    ends : (e,) nodes of the rod ends, which come as near as they can to where they end.
+    """
+    goals = final[ends]
+    return PlanarMotion.onto(flat[ends], goals).moved(flat, float(goals[:, 2].min()))
 
 
 def outlines(rods: Floats) -> list[Ints]:

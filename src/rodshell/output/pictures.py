@@ -294,26 +294,13 @@ def _view_of_all(archive: Archive) -> View:
 
 def _pieces(archive: Archive, length: float) -> Pieces:
     """Pieces of about a length [m]: of rods with shorter edges, nodes are left out evenly."""
-    rods, kept = [rod for rod in rods_of(archive) if len(rod.nodes) > 1], _pieces_by_stride(archive)
-    edge = sum(rod.length for rod in rods) / max(sum(len(rod.nodes) - 1 for rod in rods), 1)
-    stride = max(1, round(length / max(edge, 1e-12)))
-    if stride not in kept:
-        kept[stride] = _by_stride([len(rod.nodes) for rod in rods_of(archive)], stride)
-    return kept[stride]
-
-
-@made_once
-def _pieces_by_stride(archive: Archive) -> dict[int, Pieces]:
-    """Those that were asked for so far, by the edges in each."""
-    return {}
-
-
-def _by_stride(lengths: list[int], stride: int) -> Pieces:
-    """Pieces of so many edges, the last one of a rod shorter; lengths: nodes of each rod."""
+    lengths = [len(rod.nodes) for rod in rods_of(archive)]
+    whole = sum(rod.length for rod in rods_of(archive) if len(rod.nodes) > 1)
+    stride = max(1, round(length * sum(max(count - 1, 0) for count in lengths) / max(whole, 1e-12)))
     drawn, first = [np.empty(0, dtype=np.intp)], 0
-    for length in lengths:
-        drawn.append(first + np.array([*range(0, length - 1, stride), length - 1][:length], dtype=np.intp))
-        first += length
+    for count in lengths:
+        drawn.append(first + np.array([*range(0, count - 1, stride), count - 1][:count], dtype=np.intp))
+        first += count
     owner = np.repeat(np.arange(len(lengths)), [len(entries) for entries in drawn[1:]])
     begins = np.flatnonzero(owner[1:] == owner[:-1])
     return Pieces(np.concatenate(drawn).astype(np.intp), begins, owner[begins])

@@ -248,10 +248,7 @@ def rod_type(rod: RodModel) -> RodType:
 
 def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
     """What every result begins with."""
-    versions = {
-        "numpy": np.__version__,
-        "scipy": version_of("scipy"),
-    }  # without its import, which most forms do not need
+    versions = {"numpy": np.__version__, "scipy": version_of("scipy")}  # whose import most forms do not need
     return {
         **{key: Results.model_fields[key].default for key in ("format", "version", "units")},
         "version_rodshell": __version__,

@@ -50,7 +50,7 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
             f"{others}{_other_rods(results, falling)}"
         )
     known = {end: found[end].load_factor for end in standing if end not in lost}
-    if known and all(factor is not None and factor < RESERVE for factor in known.values()):
+    if known and not results.loads and all(factor is not None and factor < RESERVE for factor in known.values()):
         weights = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in known)
         said.append(f"the shell carries only {weights}, with little reserve for creep, imperfections and loads")
     if unknown:

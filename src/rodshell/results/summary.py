@@ -221,7 +221,7 @@ def _joints(results: Results, length: Length) -> str:
     ]
     far, name = max(tails)
     where = f"{bare} crossing{'s' * (bare > 1)} near rod ends"
-    return f"{joints}, none at {where}, so that {name} spans {length(far)} from an end to a joint"
+    return f"{joints}, none at {where}; longest span from an end to a joint {length(far)} ({name})"
 
 
 def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:

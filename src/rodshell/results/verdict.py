@@ -167,20 +167,24 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
             yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded_down(limit)} times these loads"
         place, parts = found.governs, found.utilisations
         governs = (place.by if place else None) or ""
-        before = {by: getattr(parts, by, None) or 0.0 for by in UNLOADED}
+        uses = {governs: used or 0.0}
+        if parts is not None:
+            uses |= {by: getattr(parts, by) or 0.0 for by in ("bending", "shear", "slip", *UNLOADED)}
+        before = {by: uses.pop(by, 0.0) for by in UNLOADED}
         if before["permanent"] <= (bent_of(results, ends).utilisation or 0.0):
             before["permanent"] = 0.0  # is said of the unloaded shell
+        if before["slip_unloaded"] > 1:
+            uses.pop("slip", None)  # loads are not to blame
+        where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
         for by, share in before.items():
             if share > 1:
-                where = f" in {place.rod}, {_mm(results, place.at)} from its start" if place and governs == by else ""
-                words = f"with {ends} ends {BY_WORDS[by].format(_too_much(share))}{where}"
+                words = f"with {ends} ends {BY_WORDS[by].format(_too_much(share))}{where * (by == governs)}"
                 unloaded[by] = max(unloaded.get(by, ""), words, key=len)  # the same under all, or with its place
-        blamed = governs not in UNLOADED and not (governs == "slip" and before["slip_unloaded"] > 1)
-        if used is not None and used > 1 and blamed:
-            where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
+        worst = max(uses, key=lambda by: uses[by], default="")
+        if uses.get(worst, 0.0) > 1:
             at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
-            words = BY_WORDS.get(governs, "the rods use {} of their design strength")
-            yield f"with {ends} ends {words.format(_too_much(used))} under {name}{at}{where}"
+            words = BY_WORDS.get(worst, "the rods use {} of their design strength").format(_too_much(uses[worst]))
+            yield f"with {ends} ends {words} under {name}{at}{where * (worst == governs)}"
         if (braced := found.bracing_utilisation) is not None and braced > 1:
             yield f"with {ends} ends the bracing uses {_too_much(braced)} of its design strength under {name}"
     yield from unloaded.values()

@@ -18,9 +18,8 @@ from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
-from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
-from rodshell.output.grid import GridJoint, GridRod, Shape, joints_of, rods_of, shape_names, shape_of
+from rodshell.output.grid import GridJoint, GridRod, Shape, joints_of, laid_out, rods_of, shape_names, shape_of
 from rodshell.output.models import section_outline, widths_along
 from rodshell.output.pictures import FAMILIES
 from rodshell.output.schedules import Table, heading, joints_table, rods_table
@@ -150,8 +149,7 @@ class Drawn:
         final = next((shape.positions for shape, _ in reversed(self.shapes) if not shape.flat), flat)
         if not len(flat):
             return flat
-        goals = final[ends]
-        return PlanarMotion.onto(flat[ends], goals).moved(flat, float(goals[:, 2].min()))
+        return laid_out(flat, final, ends)
 
 
 def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
