@@ -44,11 +44,22 @@ def test_holes_weaken_the_unloaded_shell_too() -> None:
     for shape in ("pinned", "deployment"):
         before, after = (getattr(results.bending, shape).utilisation for results in (full, net))
         assert after == pytest.approx(before / 0.8, rel=1e-9)
+    assert ", holes at joints counted\n" in summary_text(net)
+    assert "holes" not in summary_text(full)
     assert net.strength is not None
     assert full.strength is not None
     assert net.strength.erection_utilisation == net.bending.deployment.utilisation  # type: ignore[union-attr]
     permanent = net.loads["winter"]["pinned"].utilisations.permanent  # type: ignore[union-attr]
     assert permanent == pytest.approx(net.bending.pinned.utilisation, rel=0.1)  # type: ignore[union-attr]
+
+
+def test_the_worst_place_is_that_of_the_net_section() -> None:
+    """At a joint, where four fifths of the section are missing, and not between joints, where the rods bend most."""
+    found = rs.Job.load({**CASE, "strength": {"service_class": 3, "hole": "24 mm"}}).run().archive().results
+    assert found.bending is not None
+    assert found.bending.pinned is not None
+    (rod,) = [rod for rod in found.rods if rod.id == found.bending.pinned.rod]
+    assert min(abs(joint.at - found.bending.pinned.at) for joint in rod.joints) < 1e-9  # type: ignore[operator]
 
 
 def test_every_figure_of_the_page_is_that_of_the_result() -> None:
@@ -66,6 +77,7 @@ def test_every_figure_of_the_page_is_that_of_the_result() -> None:
         [100 * v for v in (parts.bending, parts.shear, parts.slip, parts.permanent)], rel=0.1
     )  # type: ignore[operator]
     assert loaded.utilisation == max(v for v in (parts.bending, parts.shear, parts.slip, parts.permanent) if v)
+    assert 0 < parts.slip_unloaded < parts.slip  # type: ignore[operator]
     assert loaded.governs is not None
     assert loaded.governs.rod in row[7]
     assert any("service class 3" in sentence and "EN 1995" in sentence for sentence in page["assumptions"])

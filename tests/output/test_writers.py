@@ -35,6 +35,8 @@ def test_the_deployment_of_a_target_far_from_the_origin_is_drawn_alike() -> None
         if name != "target_faces"
     }
     here, there = deployment_picture(made), deployment_picture(replace(made, states=aside))
+    edges = [np.linalg.norm(np.diff(path.points, axis=0), axis=1) for path in here.paths if path.layer == "CUT"]
+    assert 3 < np.median(np.concatenate(edges)) < 7  # the nodes are 2 units apart
     assert len(here.paths) == len(there.paths)
     for one, other in zip(here.paths, there.paths, strict=True):
         np.testing.assert_allclose(other.points, one.points, atol=1e-6)

@@ -362,6 +362,13 @@ def test_what_is_too_much_before_loads_act_is_not_blamed_on_them() -> None:
     ]
     assert not any("slips under" in reason for reason in found.reasons)
     assert any("the rods use 130 % of their design strength under snow" in reason for reason in found.reasons)
+    strong = ("strength", {"permanent": 80e6, "short": 98e6})  # by which 160 % are 131 %
+    snow["duration"] = "short"
+    quiet = verdict(changed(strong, ("loads", {"snow": {"pinned": snow | {"governs": {"by": "slip"} | place}}})))
+    assert not any("under snow" in reason for reason in quiet.reasons)
+    parts["bending"] = 1.4
+    loud = verdict(changed(strong, ("loads", {"snow": {"pinned": snow | {"governs": {"by": "slip"} | place}}})))
+    assert any("use 140 % of their design strength under snow" in reason for reason in loud.reasons)
     early = verdict(changed(("loads", {"snow": {"pinned": snow | {"utilisations": None, "utilisation": 1.6} | {
         "governs": {"by": "permanent"} | place}}})))  # fmt: skip
     assert any("before loads act, uses 160 %" in reason and "U03, 1000 mm" in reason for reason in early.reasons)
@@ -399,6 +406,23 @@ def test_a_shell_that_just_stands_is_not_good(pinned: float, clamped: float, rea
     found = verdict(changed(*weights))
     assert found.level == ("check" if reasons else "good")
     assert [reason for reason in found.reasons if "reserve" in reason] == reasons
+    loads = {"winter": {ends: {"limit_factor": 2.0} for ends in ("pinned", "clamped")}}  # these then say how much
+    assert verdict(changed(*weights, ("loads", loads))).level == "good"
+
+
+def test_the_summary_says_what_no_load_is_to_blame_for_and_that_none_was_enough() -> None:
+    found = {"limit_kind": "none", "utilisation": 1.6, "governs": {"by": "permanent", "rod": "U03", "at": 1.0}}
+    text = summary_text(changed(("loads", {"a long name": {"pinned": found}})))
+    assert "  loads     pinned  a long name: stable beyond 100 times the loads; deflection" in text
+    assert ", 160 % of the design strength (permanent, U03) before loads act\n" in text
+    turned = summary_text(changed(("deployment.clamped.reached_from_flat", False)))
+    assert "  from flat clamped turning the ends into their clamps ends in another shape\n" in turned
+
+
+def test_an_imperfect_shell_that_is_unstable_unloaded_does_not_fall_at_no_load() -> None:
+    found = {"limit_factor": 2.0, "imperfect_factor": 0.0, "imperfect_kind": "unstable unloaded"}
+    reasons = verdict(changed(("loads", {"winter": {"pinned": found}}))).reasons
+    assert "with pinned ends and imperfections the shell is unstable before the loads of winter act" in reasons
 
 
 def test_joints_that_cannot_be_made_and_what_spans_are_left_are_said() -> None:

@@ -30,6 +30,7 @@ RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK s
 
 STAGES = ("pop_up", "deployment")  # of the deployment: with the final shape, and without
 STRAIGHT = 1e-6  # 1/m, rad/m: what is less is round-off
+HOLES = 1.001  # of its stress over the strength: a utilisation above is that of net sections
 MOST_DROPPED = 6  # rods that are listed
 
 Length = Callable[[float | None], str]
@@ -197,6 +198,9 @@ def _bending(results: Results, length: Length) -> Iterator[str]:
             line += f" (torsion alone {stress(bent.torsion_stress)})"
         if bent.utilisation is not None:
             line += f", {percent(bent.utilisation)} of {strength_name(results, shape)}"
+            strength = (bending.erection_strength if shape == "deployment" else None) or bending.strength
+            if strength and bent.max_stress and bent.utilisation > HOLES * bent.max_stress / strength:
+                line += ", holes at joints counted"
         yield line + (f"; unknown below {whole_percent(unknown)} of it" if shape in STAGES and unknown else "")
 
 

@@ -7,6 +7,7 @@ not checked, and then the result is not good.
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from rodshell.results.loaded import LoadedShell
 from rodshell.results.own_weight import light, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
@@ -149,6 +150,7 @@ BY_WORDS = {
     "slip_unloaded": "before loads act a joint of the erected shell has to transfer {} of the force at which it slips",
 }
 """What is used too much, where it is not bending."""
+SAME_USE = 1.02  # of what the erected shell uses: more is the loads' doing
 UNLOADED = ("permanent", "slip_unloaded")  # of these no load is the cause
 
 
@@ -173,8 +175,8 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
         before = {by: uses.pop(by, 0.0) for by in UNLOADED}
         if before["permanent"] <= (bent_of(results, ends).utilisation or 0.0):
             before["permanent"] = 0.0  # is said of the unloaded shell
-        if before["slip_unloaded"] > 1:
-            uses.pop("slip", None)  # loads are not to blame
+        for by in _not_of_loads(results, found):
+            uses.pop(by, None)
         where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
         for by, share in before.items():
             if share > 1:
@@ -188,6 +190,19 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
         if (braced := found.bracing_utilisation) is not None and braced > 1:
             yield f"with {ends} ends the bracing uses {_too_much(braced)} of its design strength under {name}"
     yield from unloaded.values()
+
+
+def _not_of_loads(results: Results, found: LoadedShell) -> Iterator[str]:
+    """What is used as much without the loads: slip, and the rods by the strength for so long as the loads act."""
+    parts, strength = found.utilisations, results.strength
+    if parts is None:
+        return
+    if (parts.slip_unloaded or 0.0) > 1:
+        yield "slip"
+    permanent, lasting = (getattr(strength, name or "", None) for name in ("permanent", found.duration))
+    if permanent and lasting:
+        alone = (parts.permanent or 0.0) * permanent / lasting
+        yield from (by for by in ("bending", "shear") if (getattr(parts, by) or 0.0) <= SAME_USE * alone)
 
 
 def _too_much(share: float) -> str:
@@ -343,6 +358,8 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[str]:
                 yield f"{imperfectly} no equilibrium was found, and nothing is known of it"
             elif found.imperfect_kind == "not followed":
                 yield f"{imperfectly} nothing is known above {rounded_down(imperfect or 0.0)} times the loads"
+            elif found.imperfect_kind == "unstable unloaded":
+                yield f"with {end} ends and imperfections the shell is unstable before the loads of {name} act"
             elif imperfect is not None and imperfect < 1:
                 yield f"{imperfectly} the shell falls at {rounded_down(imperfect)} times these loads"
 
