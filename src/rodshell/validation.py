@@ -3,6 +3,7 @@
 Every check raises InputError with one sentence, which calls the argument by its `name`.
 """
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
@@ -201,10 +202,30 @@ def is_auto(value: object) -> bool:
 
 
 def file_path(name: str, value: object) -> Path:
-    """Return `value` as a path; refuse what is neither text nor a path."""
+    """Return `value` as a path, with ~ resolved.
+
+    Raises
+    ------
+    InputError : it is neither text nor a path, no system could have such a path, or nobody knows that home folder.
+    """
     if not isinstance(value, str | PathLike):
         raise InputError(f"{name} must be the path of a file, not {described(value)}")
-    return Path(value)
+    path = Path(value)
+    try:
+        os.fsencode(path)
+        path = path.expanduser()
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass
+    except UnicodeEncodeError:
+        raise InputError(f"{name} = {shown(str(path))} has characters that no file name here can have") from None
+    except RuntimeError:
+        raise InputError(f"{name} = {shown(str(path))}: there is no such user; write the path in full") from None
+    except ValueError as reason:  # a character NUL
+        raise InputError(f"{name} = {shown(str(path))} is not a path: {reason}") from None
+    except OSError as reason:  # such as a name of 5,000 characters
+        raise InputError(f"{name} = {shown(str(path))} cannot be looked up: {reason.strerror}") from None
+    return path
 
 
 def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
