@@ -22,12 +22,13 @@ PATIENCE = 120_000  # ms
 
 
 @contextmanager
-def browser_page(said: list[str]) -> Iterator[Page]:
-    """A page of Chromium; what its console says, and errors, go into `said`."""
+def browser_page(said: list[str], scale: float = 1.0) -> Iterator[Page]:
+    """A page of Chromium, drawn with `scale` pixels for each of its own; its console, and errors, go into `said`."""
     assert CHROMIUM, "no browser, and RODSHELL_BROWSER=required: install Chromium (Debian: apt-get install chromium)"
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        page = browser.new_context(viewport={"width": 1440, "height": 900}).new_page()
+        context = browser.new_context(viewport={"width": 1440, "height": 900}, device_scale_factor=scale)
+        page = context.new_page()
         page.set_default_timeout(PATIENCE)
         page.on("console", lambda message: said.append(message.text) if message.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: said.append(str(error)))

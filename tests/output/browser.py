@@ -38,6 +38,8 @@ UNITS = {
 }
 
 
+SCALE = 0.25  # pixels drawn for each of the page: the layout is the same, and the processor draws a sixteenth of them
+
 PROBE = """
 <script>
 window.requestAnimationFrame = work => setTimeout(() => work(performance.now()), 0);  // no screen, no frames
@@ -57,7 +59,7 @@ addEventListener("load", () => {
       const choice = part("select.colours");
       found.legends = [];
       const stages = found.stages.map((_, k) => k), bar = part(".bar");
-      for (const { value: kind } of choice.options) {
+      for (const { value: kind } of LEGENDS ? choice.options : []) {
         choice.value = kind; choice.dispatchEvent(new Event("change"));
         for (const k of [...stages, ...stages.toReversed()]) {
           slider.value = k; slider.dispatchEvent(new Event("input")); await wait();
@@ -105,17 +107,20 @@ def browser_options(folder: Path) -> list[str]:
     """Without a window, without a network; WebGL is drawn by the processor. The profile lies in `folder`."""
     return [
         "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-        "--window-size=1200,900", "--host-resolver-rules=MAP * ~NOTFOUND", "--proxy-server=127.0.0.1:9",
+        "--window-size=1200,900", f"--force-device-scale-factor={SCALE}",
+        "--host-resolver-rules=MAP * ~NOTFOUND", "--proxy-server=127.0.0.1:9",
         "--disable-background-networking", "--virtual-time-budget=30000", "--enable-logging=stderr", "--v=0",
         f"--user-data-dir={folder / 'profile'}",
     ]  # fmt: skip
 
 
-def open_report(page: Path, folder: Path) -> tuple[dict[str, Any], list[str]]:
-    """What a user finds who moves and clicks everything, and all that the console says."""
+def open_report(page: Path, folder: Path, *, legends: bool = True) -> tuple[dict[str, Any], list[str]]:
+    """What a user finds who moves and clicks everything (the colours of every stage, too, if `legends`), and all that
+    the console says."""
     assert CHROMIUM, "no browser, and RODSHELL_BROWSER=required: install Chromium (Debian: apt-get install chromium)"
     probed = folder / "probed.html"
-    probed.write_text(page.read_text(encoding="utf-8").replace("</body>", PROBE + "</body>"), encoding="utf-8")
+    probe = PROBE.replace("LEGENDS", str(legends).lower())
+    probed.write_text(page.read_text(encoding="utf-8").replace("</body>", probe + "</body>"), encoding="utf-8")
     command = [str(CHROMIUM), *browser_options(folder), "--dump-dom", probed.as_uri()]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240)
     console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]

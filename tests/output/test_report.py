@@ -25,7 +25,7 @@ from rodshell.results.verdict import facts
 from rodshell.results.wording import Rounding
 from rodshell.solve.path import Snap
 from tests.acceptance.cases import ROD
-from tests.output.browser import coloured, needs_browser, open_report, wrong_legends
+from tests.output.browser import SCALE, coloured, needs_browser, open_report, wrong_legends
 from tests.output.forms import TARGETS, archive, breaking, wished
 from tests.output.sample_archive import sample_archive, table_archive, with_deployment
 
@@ -103,7 +103,7 @@ def test_on_a_phone_words_are_whole_units_are_beside_their_numbers_and_loads_nee
 
     said: list[str] = []
     made = {"dome": archive("dome"), "breaking": breaking(), "loaded": loaded()}
-    with browser_page(said) as page:
+    with browser_page(said, SCALE) as page:
         for name, found in made.items():
             address = page_of(found, tmp_path / name).as_uri()
             for width in (360, 420, 1300):
@@ -144,7 +144,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @needs_browser
 def test_a_60_by_60_grid_is_usable_in_a_browser(large: Path, tmp_path: Path) -> None:
-    found, console = open_report(large, tmp_path)
+    found, console = open_report(large, tmp_path, legends=False)
     assert console == []
     assert len({picture for _, picture in found["stages"]}) == 11
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
-from tests.output.browser import needs_browser
+from tests.output.browser import SCALE, needs_browser
 
 if TYPE_CHECKING:
     import subprocess
@@ -69,7 +69,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     from tests.acceptance.studio import server
     from tests.acceptance.studio_browser import browser_page
 
-    with server(tmp_path_factory.mktemp("sessions")) as (address, process), browser_page([]) as page:
+    with server(tmp_path_factory.mktemp("sessions")) as (address, process), browser_page([], SCALE) as page:
         yield Server(address, process, page.context)
 
 
@@ -101,7 +101,7 @@ def new_studio(server: Server, tmp_path: Path) -> Iterator[Studio]:
     """A page in a session of its own."""
     browser = server.context.browser
     assert browser is not None
-    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, device_scale_factor=SCALE)
     with opened(server, context, tmp_path) as studio:
         yield studio
     context.close()
