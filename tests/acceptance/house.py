@@ -2,7 +2,7 @@
 
 Nothing that worked before it is lost: ten jobs run by the sources of an earlier commit, read from the history, and by
 those at hand give the same results; the earlier results open, are exported and run again; what users get wrong is
-refused in one sentence; files are counted. Everything is kept in FOLDER, if given, and what the earlier program
+refused in one sentence. Everything is kept in FOLDER, if given, and what the earlier program
 found is not computed again.
 """
 
@@ -54,7 +54,6 @@ SUFFIXES = (
     ".html",
     ".3dm",
 )  # one of each kind
-FEWEST_FILES, MOST_FILES = 120, 160
 SYMMETRIC = ("hemisphere", "ellipsoid", "patches", "laths", "gravity", "fall")  # jobs whose shells have mirror images
 DERIVED = 1e-10  # positions to 1e-16 of the size make strains of 1e-13, which stiff edges turn into stress
 POSITIONS = 1e-12  # of the size: the same operations in the same order
@@ -143,14 +142,10 @@ def misuse_rows(work: Path) -> Iterator[Row]:
 
 
 def tree_rows() -> Iterator[Row]:
-    """Files, and circles of imports."""
+    """Circles of imports, and types that are defined twice."""
     after = figures(ROOT / "src" / "rodshell")
-    yield Row("source tree", "files", after.files, MOST_FILES)
-    yield Row("source tree", "files, at least", -after.files, -FEWEST_FILES)
     yield Row("source tree", "files in circles of imports", sum(map(len, after.circles)), 0)
     yield Row("source tree", "definitions of array types outside arrays", after.array_aliases, 0)
-    share = after.parameter_sections / after.taking_parameters
-    yield Row("source tree", "functions with parameters undescribed", 1 - share, 0.5)
 
 
 def all_rows(work: Path) -> Iterator[Row]:

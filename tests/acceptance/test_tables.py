@@ -1,0 +1,69 @@
+"""Cheap rows of every acceptance table, so that none is missed unseen between the runs of `make accept-...`."""
+
+import re
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from tests.acceptance import (
+    house,
+    joints,
+    loads_shells,
+    loads_stability,
+    paper,
+    refine_derivatives,
+    verdict_drawings,
+    verdict_layers,
+    verdict_levels,
+    verdict_paths,
+    verdict_rods,
+    verdict_stress,
+    verdict_targets,
+)
+from tests.acceptance.rows import Row
+from tests.acceptance.test_acceptance import check_reached
+from tests.refining.test_families import EVERY
+
+pytestmark = pytest.mark.slow
+
+Rows = Callable[[], Iterator[Row]]
+CHEAP: dict[str, tuple[Rows, ...]] = {
+    "house": (house.tree_rows,),
+    "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
+    "loads": (
+        loads_stability.benchmark_rows, loads_stability.closed_form_rows, loads_stability.vibration_rows,
+        loads_shells.work_rows, loads_shells.cable_rows,
+    ),
+    "paper": (paper.tail_rows, paper.pop_up_rows),
+    "refine": tuple(partial(refine_derivatives.adjoint_rows, *case, laths=False) for case in EVERY[:2]),
+    "verdict": (
+        verdict_drawings.hostile_rows, verdict_layers.lath_rows, verdict_layers.thick_rows,
+        partial(verdict_levels.rows, ("strength exceeded", "the paper's hemisphere")), verdict_paths.work_rows,
+        verdict_rods.preset_rows, verdict_stress.curvature_rows, verdict_stress.design_rows,
+        verdict_stress.strength_rows, verdict_targets.stair_rows,
+    ),
+}  # fmt: skip
+ELSEWHERE = {
+    "accept": "test_acceptance.py",
+    "output": "test_output_rows.py",
+    "rods": "test_rods.py",
+    "rods_dynamics": "test_rods.py",
+    "studio": "test_studio_rows.py",
+    "sweep": "test_sweep_rows.py",
+    "targets": "test_any_target.py",
+}
+
+
+@pytest.mark.parametrize(("table", "number"), [(table, n) for table, rows in CHEAP.items() for n in range(len(rows))])
+def test_cheap_rows_of_every_table_reach_their_figures(table: str, number: int) -> None:
+    check_reached(CHEAP[table][number]())
+
+
+def test_every_table_that_make_prints_has_rows_that_are_tests() -> None:
+    here = Path(__file__)
+    tables = set(re.findall(r"-m tests\.acceptance\.(\w+)", here.parents[2].joinpath("Makefile").read_text()))
+    assert tables - {"house_figures"} == {*CHEAP, *ELSEWHERE}
+    for table, name in ELSEWHERE.items():
+        assert f"tests.acceptance.{table.removesuffix('accept')}" in here.with_name(name).read_text()
