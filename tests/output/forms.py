@@ -2,13 +2,16 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 import rodshell as rs
 from rodshell.fabrication import Fabrication
+from rodshell.output import save
 from rodshell.output.options import DrawingStyle, OutputOptions
 from rodshell.results import Archive
+from rodshell.results.archive import read
 from tests.acceptance.cases import ROD, ridge_formula
 
 TARGETS = {
@@ -65,13 +68,25 @@ def mesh_with_an_opening() -> rs.Target:
     return rs.Freeform.of(points[used], faces.reshape(-1, 3))
 
 
-@cache
-def formed(name: str) -> Archive:
-    """Also a roof on a rectangle, one with an "opening", and a dome that is "sewn" of two patches."""
-    if name in TARGETS:
-        return archive(name)
+KEPT = Path(__file__).with_name("archives")
+"""Archives of forms that take seconds; `python -m tests.output.forms` makes them again."""
+
+
+def found(name: str) -> Archive:
+    """A roof on a rectangle, one with an "opening", or a dome that is "sewn" of two patches."""
     if name == "sewn":
         layout = rs.GridLayout.orthogonal(spacing=0.03, edge=0.01)
         return rs.find_form(rs.Hemisphere(0.2), layout, ROD, seams=[[(-1.0, 0.0), (1.0, 0.0)]]).archive()
     target, spacing = (ROOF, 0.8) if name == "roof" else (mesh_with_an_opening(), 0.6)
     return rs.find_form(target, rs.GridLayout.orthogonal(spacing=spacing, edge=0.2), LATH).archive()
+
+
+@cache
+def formed(name: str) -> Archive:
+    """One of `TARGETS`, or one of those that are kept, see `found`."""
+    return archive(name) if name in TARGETS else read(KEPT / name)
+
+
+if __name__ == "__main__":
+    for kept in ("roof", "opening", "sewn"):
+        save(found(kept), KEPT / kept, [], force=True)

@@ -21,6 +21,7 @@ from rodshell.output.png import drawing_png
 from rodshell.output.svg import drawing_svg, number
 from rodshell.results import Archive, Results
 from tests.output.forms import archive as archive_of
+from tests.output.forms import formed, found
 from tests.output.sample_archive import sample_archive
 
 numbers = st.floats(-1e6, 1e6).map(lambda x: float(np.round(x, 4))) | st.sampled_from([0.0, -0.001, 100.0, -0.5, 1.005])
@@ -251,3 +252,12 @@ def test_mixed_colours_lie_between() -> None:
     assert mixed("#1f5f8b", "#fdfdfb", 0.0) == "#1f5f8b"
     assert mixed("#1f5f8b", "#fdfdfb", 1.0) == "#fdfdfb"
     assert mixed("#004080", "#80c000", 0.25) == "#206060"
+
+
+@pytest.mark.slow
+def test_a_kept_archive_is_what_the_program_finds_today() -> None:
+    """Tests of writers read it; `python -m tests.output.forms` makes it again."""
+    kept, now = formed("sewn"), found("sewn")
+    assert set(kept.states) == set(now.states)
+    for name in ("flat", "popped_pinned", "popped_clamped"):
+        np.testing.assert_allclose(kept.states[name], now.states[name], atol=1e-9)  # of a dome of .2 m
