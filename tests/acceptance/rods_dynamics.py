@@ -2,11 +2,9 @@
 
 import sys
 from collections.abc import Iterator
-from itertools import chain
 
 import numpy as np
 
-from benchmarks.rod_scaling import KINDS, measure
 from tests.acceptance.rows import Row, print_table
 from tests.solve import rod_motions as motions
 from tests.solve.rod_problems import order
@@ -43,19 +41,6 @@ def conservation_rows() -> Iterator[Row]:
     yield Row("free rod, 3 m/s, E 1e6 to 5e10", "energy grows in a step, relative", growth, 1e-12)
 
 
-def scaling_rows() -> Iterator[Row]:
-    """Least times of many, taken in turns; see `benchmarks/rod_scaling.py` for what a step and a solve are."""
-    for name, (kind, twist) in KINDS.items():
-        scaling = measure(kind, twist=twist)
-        note = f"slope {scaling.slope:.3f}, {scaling.nodes[0]} to {scaling.nodes[-1]} nodes"
-        yield Row(name, "log-log slope of a step, off 1", abs(scaling.slope - 1), 0.1, "", note)
-        for n, step, solve, own, memory in zip(
-            scaling.nodes, scaling.step, scaling.lapack, scaling.own, scaling.memory, strict=True
-        ):
-            note = f"{1e3 * step:.3g} ms, {step / own:.1f} of our own solves; {memory / 1e6:.0f} MB"
-            yield Row(name, f"step over LAPACK's banded solve, {n} nodes", step / solve, 3.0, "", note)
-
-
 def dynamics_rows() -> Iterator[Row]:
     yield from frequency_rows()
     yield from order_rows()
@@ -63,4 +48,4 @@ def dynamics_rows() -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(print_table("rods-dynamics", chain(dynamics_rows(), scaling_rows())))
+    sys.exit(print_table("rods-dynamics", dynamics_rows()))

@@ -1,4 +1,4 @@
-"""Every row of the rod's own table reaches its figure; `make accept-rods` prints it, with times besides."""
+"""Every row of the rod's own table reaches its figure; `make accept-rods` prints it."""
 
 import pytest
 
