@@ -297,7 +297,7 @@ def test_damaged_values_of_a_genetic_search_are_one_sentence(tmp_path: Path, cha
     assert StoredValues.read(file).values == [[0.1]]
     for text in (json.dumps({**good, **change}), "[" * 100_000, "", "\xff"):
         file.write_text(text, encoding="latin-1")
-        with pytest.raises(rs.InputError, match="cannot continue|not text"):
+        with pytest.raises(rs.InputError, match=r"cannot continue|not text"):
             StoredValues.read(file)
 
 
