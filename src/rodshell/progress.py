@@ -6,12 +6,10 @@ It may raise: KeyboardInterrupt ends the job; OutOfTimeError ends the stage, whi
 import sys
 from collections.abc import Callable
 from time import monotonic
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from rodshell.errors import InputError, OutOfTimeError
-
-if TYPE_CHECKING:
-    from rich.status import Status
+from rodshell.printed import Printed, say
 
 Progress = Callable[[str, str, float], None]
 
@@ -28,28 +26,25 @@ class Bar:
 
     def __init__(self) -> None:
         self._stage = ""
-        self._live: Status | None = None
+        self._live: Printed | None = None
 
     def __enter__(self) -> Self:
-        if sys.stderr.isatty():
-            from rich.console import Console  # here, so that the command line's help need not wait for it
-
-            self._live = Console(stderr=True).status("preparing")
-            self._live.start()
+        stream = Printed.of(sys.stderr)
+        self._live = stream if stream.isatty() else None
         return self
 
     def __exit__(self, *error: object) -> None:
         self._stage = ""
         if self._live is not None:
-            self._live.stop()
+            self._live.live("")
             self._live = None
 
     def __call__(self, stage: str, detail: str, residual: float) -> None:
         if self._live is not None:
             reached = f", residual {residual:.1e}" if residual else ""
-            self._live.update(f"{stage}: {detail}{reached}")
+            self._live.live(f"{stage}: {detail}{reached}")
         elif stage != self._stage:
-            print(f"rodshell: {stage}", file=sys.stderr)
+            say(stage)
         self._stage = stage
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
+from rodshell.printed import visible
 
 Kind = Literal[
     "length",
@@ -230,7 +231,7 @@ def wanted(kind: Kind) -> str:
 def shown(value: object) -> str:
     """A value as it is written in a case file, on one line of at most 80 characters."""
     if isinstance(value, str):
-        text = '"' + value.replace("\n", " ") + '"'
+        text = '"' + visible(value.replace("\n", " ")) + '"'
     elif isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, list | tuple):

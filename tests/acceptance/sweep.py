@@ -220,7 +220,7 @@ def fault_rows(folder: Path) -> Iterator[Row]:
     yield Row("a worker eats memory", "not said", float(found.failures != ((sentence, 1),)), 0, note=sentence)
     yield Row("a worker eats memory", "other designs lost", 1 - found.verdicts.get("not checked", 0), 0)
     yield from _disk_rows(folder)
-    yield from _second_rows(folder)
+    yield from second_rows(folder)
 
 
 class _Busy:
@@ -272,8 +272,9 @@ def _disk_rows(folder: Path) -> Iterator[Row]:
     yield Row("a full disk", "finished designs lost", lost + 200 - len(after), 0)
 
 
-def _second_rows(folder: Path) -> Iterator[Row]:
-    axes = SMALL + '"layout.spacing" = { from = "50 mm", to = "62 mm", count = 100 }'
+def second_rows(folder: Path, designs: int = 100) -> Iterator[Row]:
+    """A sweep into a folder into which another is writing."""
+    axes = SMALL + f'"layout.spacing" = {{ from = "50 mm", to = "62 mm", count = {designs} }}'
     file, out = write_sweep(folder / "two.toml", axes, 'until = "pop-up"'), folder / "two"
     process = _started(file, out)
     while len(recorded(out)) < 5:
@@ -284,7 +285,9 @@ def _second_rows(folder: Path) -> Iterator[Row]:
     except rs.OutputError as error:
         said = str(error)
     yield Row("a second sweep into a folder", "not refused", float("another sweep" not in said), 0, note=said)
-    yield Row("a second sweep into a folder", "designs of the first lost", process.wait() + 100 - len(table(out)), 0)
+    yield Row(
+        "a second sweep into a folder", "designs of the first lost", process.wait() + designs - len(table(out)), 0
+    )
 
 
 # Search and studies

@@ -17,6 +17,7 @@ from rodshell.output.drawings import drawing_set, sheet_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import BLOCK, MARGIN, MORE, ROW, laid_out, room, title_block
 from rodshell.output.options import PAPERS, DrawingStyle
+from rodshell.output.pdf import drawings_pdf
 from rodshell.results import Archive, Results
 from rodshell.results.wording import rounding_of
 from tests.acceptance.cases import ROD
@@ -161,6 +162,7 @@ def test_the_date_is_that_of_source_date_epoch_or_today(monkeypatch: pytest.Monk
             <= dict(title_block(sample_archive(3, 2), "").entries)["Date"]
             <= time.strftime("%Y-%m-%d", time.gmtime())
         )
+        assert drawings_pdf([], (210, 297), "no sheets").startswith(b"%PDF")
     assert os.environ["SOURCE_DATE_EPOCH"] == broken
 
 

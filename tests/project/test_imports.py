@@ -32,7 +32,7 @@ def of_numba(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
 
 def test_the_package_alone_imports_nothing(tmp_path: Path) -> None:
     assert not packages(imported("import rodshell", tmp_path)) & {
-        "numpy", "scipy", "numba", "pydantic", "click", "rich", *OF_FILES
+        "numpy", "scipy", "numba", "pydantic", "click", *OF_FILES
     }  # fmt: skip
 
 
@@ -40,7 +40,7 @@ def test_the_package_alone_imports_nothing(tmp_path: Path) -> None:
 def test_a_form_imports_no_writers_and_no_targets_that_it_does_not_use(tmp_path: Path, of_numba: set[str]) -> None:
     modules = imported(FORM, tmp_path) - of_numba
     assert (tmp_path / "out" / "cap" / "schedule" / "rods.csv").is_file()
-    assert not packages(modules) & {*OF_FILES, "rich", "scipy", "qdldl"}
+    assert not packages(modules) & {*OF_FILES, "scipy", "qdldl"}
     unused = {"rodshell.targets.freeform", "rodshell.targets.from_file", "rodshell.targets.heightfield"}
     unused |= {"rodshell.output.pictures", "rodshell.output.pdf", "rodshell.output.report", "rodshell.output.drawings"}
     unused |= {

@@ -144,7 +144,7 @@ TOO_MANY = {f"layout.{key}": {"from": 0.01, "to": 0.02, "count": 2000} for key i
         ({"axes": {"joint.kind": ["ball"]}, "run": {"worker": 2}}, "unknown key run.worker: did you mean workers?"),
         ({"axes": {"joint.kind": ["ball"]}, "run": {"workers": 0}}, "from 1 to 1024"),
         ({"axes": {"joint.kind": ["ball"]}, "run": {"engine": "ray"}}, 'must be "processes" or "dask"'),
-        ({"axes": {"joint.kind": ["ball"]}, "run": {"address": "tcp://x"}}, 'is for engine = "dask"'),
+        ({"axes": {"joint.kind": ["ball"]}, "run": {"address": "tcp://x"}}, "type --address ADDRESS"),
         ({"axes": {"joint.kind": ["ball"]}, "run": {"time_limit": "2 m"}}, "unit of"),
         ({"axes": {"joint.kind": ["ball"]}, "run": {"memory_limit": "-2 GB"}}, "larger than zero"),
         ({"axes": {"joint.kind": ["ball"]}, "columns": ["net.min_angle"]}, "did you mean net.min_angle_at?"),

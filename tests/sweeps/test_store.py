@@ -35,6 +35,25 @@ def test_a_job_is_known_by_its_case_and_not_by_how_it_was_written():
     assert identity(job) != identity(job, "pop-up")
 
 
+def test_texts_that_a_spreadsheet_would_run_have_an_apostrophe_in_front(tmp_path: Path):
+    with Store(tmp_path, writing=True) as store:
+        store.plan([(["=cmd|' /C calc'!A0", [0.1, -0.2]], "a")], notes=header_notes(["base", "layout.spacing"], ()))
+        store.record("a", FOUND, ROW)
+        Table(store).write()
+    with (tmp_path / CSV).open() as stream:
+        (row,) = csv.DictReader(stream)
+    assert (row["base"], row["layout.spacing"]) == ("'=cmd|' /C calc'!A0", "[0.1, -0.2]")
+
+
+def test_numbers_that_are_not_finite_are_said_and_not_kept(tmp_path: Path):
+    with Store(tmp_path, writing=True) as store:
+        store.plan([([1], "a")])
+        store.record("a", FOUND, {**ROW, "rms_pinned": float("nan")})
+        assert [(design.outcome, design.row) for design in store.finished()] == [
+            ("failed", {"status": "its result has numbers that are not finite"})
+        ]
+
+
 def test_a_job_is_known_by_what_is_in_its_files_and_not_by_their_names(tmp_path: Path):
     one, same, other = (tmp_path / name for name in ("one.obj", "same.obj", "other.obj"))
     for file, text in ((one, "v 0 0 0\n"), (same, "v 0 0 0\n"), (other, "v 0 0 1\n")):

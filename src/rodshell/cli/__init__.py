@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Sequence
 
 from rodshell.cli.interruption import Interrupted, Interruption, end_at_once
+from rodshell.printed import hold_closed_descriptors, printed_streams, say
 
 RARELY = 500_000  # objects made since Python last looked for garbage that holds itself
 
@@ -17,7 +18,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     0 found, 2 bad input, 3 not converged or out of time, 4 found but not buildable, 130 interrupted by Ctrl-C, 143 by
     SIGTERM.
     """
-    with Interruption() as interruption, warnings.catch_warnings():
+    with Interruption() as interruption, warnings.catch_warnings(), printed_streams():
         try:
             from rodshell.cli.app import app, print_warnings
 
@@ -30,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
                 return failed(error)
             kept = str(error) if isinstance(error, Interrupted) else ""
-            print("rodshell: interrupted" + (f": {kept}" if kept else ""), file=sys.stderr)
+            say("interrupted" + (f": {kept}" if kept else ""))
             return interruption.code
 
 
@@ -39,14 +40,20 @@ def entry() -> None:
 
     Cycles of garbage are rarely looked for: a form leaves a few hundred small objects in them, and no arrays. The BLAS
     has one thread, unless the environment says otherwise: large matrices are the work of our own threads, and those of
-    a BLAS take 0.1 s of processor time to wait for the small ones.
+    a BLAS take 0.1 s of processor time to wait for the small ones. No process that it starts looks for modules in the
+    current folder, which may be a stranger's.
     """
     end_at_once()
+    hold_closed_descriptors()
     gc.set_threshold(RARELY)
     for blas in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(blas, "1")
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # which it looks for in every installed package
-    code = main()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    os.environ["PYTHONSAFEPATH"] = "1"
+    with printed_streams():
+        try:
+            code = main()
+        except Exception:
+            sys.excepthook(*sys.exc_info())
+            code = 1
     os._exit(code)

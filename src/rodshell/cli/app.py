@@ -1,5 +1,6 @@
 """The commands. Only click is imported here, so that --help and --version answer at once."""
 
+import os
 import warnings
 from difflib import get_close_matches
 from importlib import import_module
@@ -9,6 +10,7 @@ import click
 
 from rodshell.cli.interruption import Interrupted
 from rodshell.errors import InputError, OutOfTimeError, OutputWarning, RodshellError
+from rodshell.printed import say
 
 COMMANDS = {
     "form": "Find the flat grid that pops up into a target.",
@@ -22,6 +24,9 @@ COMMANDS = {
     "warmup": "Compile all kernels in advance, once.",
     "paper": "Compute a figure of the paper again, with the errors.",
 }
+
+
+LESS_MEMORY = "give fewer rods or a larger layout.edge, or end other programs; ulimit -v says what a process may take"
 
 
 class LazyGroup(click.Group):
@@ -88,6 +93,11 @@ def app(ctx: click.Context) -> None:
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
+        return
+    try:
+        os.getcwd()
+    except OSError:
+        raise InputError("the current folder does not exist any more: change to another one") from None
 
 
 def print_warnings() -> None:
@@ -96,7 +106,7 @@ def print_warnings() -> None:
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
         if issubclass(category, OutputWarning):
-            click.echo(f"rodshell: warning: {message}", err=True)
+            say(f"warning: {message}")
         else:
             usual(message, category, *where, **more)
 
@@ -119,6 +129,10 @@ def failed(error: BaseException) -> int:
         return _fail(f"{error.format_message().rstrip('.')}: see {_command(error)} --help", 2)
     if isinstance(error, click.ClickException):
         return _fail(error.format_message(), 2)
+    if isinstance(error, MemoryError):
+        return _fail(f"out of memory{f' ({error})' if str(error) else ''}: {LESS_MEMORY}", 2)
+    if isinstance(error, OSError):
+        return _fail(f"{error.filename or 'the system'}: {error.strerror or error}", 2)
     raise error
 
 
@@ -128,5 +142,5 @@ def _command(error: click.UsageError) -> str:
 
 
 def _fail(message: str, code: int) -> int:
-    click.echo("rodshell: error: " + " ".join(message.split()), err=True)
+    say(f"error: {message}")
     return code

@@ -1,12 +1,12 @@
 """`rodshell export`: files of an earlier result, made again from its archive; and the JSON Schema of result.json."""
 
 import json
-from pathlib import Path
 
 import click
 
 from rodshell.cli.options import FORCE, QUIET, wanted_kinds
 from rodshell.cli.reporting import Progress
+from rodshell.validation import file_path
 
 
 def print_schema(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
@@ -14,7 +14,7 @@ def print_schema(context: click.Context, parameter: click.Parameter, wanted: boo
     if wanted:
         from rodshell.results.results import json_schema
 
-        click.echo(json.dumps(json_schema(), indent=1, ensure_ascii=False))
+        click.echo(json.dumps(json_schema(), indent=1))
         context.exit()
 
 
@@ -36,7 +36,7 @@ def command(folder: str, only: str | None, out: str | None, force: bool, quiet: 
     from rodshell.output import export
     from rodshell.results import read
 
-    where = Path(out or folder).expanduser()
+    where = file_path("--out", out or folder)
     with Progress(quiet=quiet) as progress:
         names = export(read(folder), where, wanted_kinds(only), force=force, progress=progress)
     if not quiet:

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import threading
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any, Self
 
@@ -19,7 +20,8 @@ def end_at_once() -> None:
 
 
 def _end(number: int, _: FrameType | None) -> None:
-    os.write(2, b"rodshell: interrupted\n")
+    with suppress(OSError):
+        os.write(2, b"rodshell: interrupted\n")
     os._exit(128 + number)
 
 

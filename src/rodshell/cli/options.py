@@ -142,6 +142,12 @@ FORCE = click.option(
     is_flag=True,
     help="Also replace files that rodshell did not write, or that were changed since.",
 )
+ADDRESS = click.option(
+    "--address",
+    metavar="ADDRESS",
+    help="Compute on a dask cluster: tcp://HOST:PORT or tls://HOST:PORT of its scheduler, or its scheduler file. What "
+    "answers there can run any program here.",
+)
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
 TIME_LIMIT = 'Time limit, such as "60 s", for everything but the files; what was found by then is written.'

@@ -21,10 +21,9 @@ from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
+from rodshell.printed import Printed, say
 
 if TYPE_CHECKING:
-    from rich.status import Status
-
     from rodshell.case import Case
     from rodshell.cli.options import RunOptions
     from rodshell.form import Form
@@ -53,18 +52,15 @@ class Progress:
         self._quiet = quiet
         self._begun = self._spoken = monotonic()
         self._stage, self._where = "", "preparing"
-        self._live: Status | None = None
+        self._live: Printed | None = None
         self._over = threading.Event()
         self._voice: threading.Thread | None = None
 
     def __enter__(self) -> Self:
         if self._quiet:
             return self
-        if sys.stderr.isatty():
-            from rich.console import Console
-
-            self._live = Console(stderr=True).status(self._where)
-            self._live.start()
+        stream = Printed.of(sys.stderr)
+        self._live = stream if stream.isatty() else None
         self._over.clear()
         self._voice = threading.Thread(target=self._speak, args=(TICK if self._live else SILENCE / 10,), daemon=True)
         self._voice.start()
@@ -78,7 +74,7 @@ class Progress:
             self._voice.join()
             self._voice = None
         if self._live is not None:
-            self._live.stop()
+            self._live.live("")
             self._live = None
 
     def __call__(self, stage: str, detail: str, residual: float) -> None:
@@ -94,15 +90,13 @@ class Progress:
         while not self._over.wait(every):
             where = f"{self._where}, {monotonic() - self._begun:.0f} s"
             if self._live is not None:
-                from rich.text import Text
-
-                self._live.update(Text(where))
+                self._live.live(where)
             elif monotonic() - self._spoken >= SILENCE:
                 self._say(where)
 
     def _say(self, words: str) -> None:
         self._spoken = monotonic()
-        click.echo(f"rodshell: {words}", err=True)
+        say(words)
 
 
 def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
@@ -120,7 +114,7 @@ def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
         return 0
     if not kernels_are_kept():
         if not quiet:
-            click.echo(f"rodshell: kernels are compiled again in this run, about a minute: {UNKEPT}", err=True)
+            say(f"kernels are compiled again in this run, about a minute: {UNKEPT}")
         return 0
     from rodshell.kernels.ahead import compile_kernels
 
@@ -206,7 +200,7 @@ def run_and_deliver(
         form = Job.of_case(case).run(
             progress=progress,
             time_limit=output.limit,
-            announce=None if output.quiet else _announce,
+            announce=None if output.quiet else say,
             frames_in=place.new,
         )
         refused = "" if form.known_loaded is None else form.known_loaded.refused
@@ -229,10 +223,6 @@ def _offer(form: "Form", progress: Progress) -> str:
     with progress:
         found = offer(form.stages, progress=progress)
     return "" if found is None else found.words
-
-
-def _announce(sentence: str) -> None:
-    click.echo(f"rodshell: {sentence}", err=True)
 
 
 def output_folder(
@@ -270,16 +260,16 @@ def deliver(
         click.echo(result.summary())
         click.echo(f"written to {folder}")
     if isinstance(result, Kept) and result.refused:
-        click.echo(f"rodshell: error: {result.refused}; the form is in {folder}, without its loads", err=True)
+        say(f"error: {result.refused}; the form is in {folder}, without its loads")
         return BAD_INPUT
     if result.status != "converged":
         late = result.status.startswith("out of time")
         said = result.status if late else f"NOT CONVERGED: {result.status}"
-        click.echo(f"rodshell: {said}; partial results are in {folder}", err=True)
+        say(f"{said}; partial results are in {folder}")
         return NOT_CONVERGED
     verdict = result.result().get("verdict")
     if verdict and verdict["level"] == "unbuildable":
-        click.echo(f"rodshell: NOT BUILDABLE: {verdict['reasons'][0]}; results are in {folder}", err=True)
+        say(f"NOT BUILDABLE: {verdict['reasons'][0]}; results are in {folder}")
         return UNBUILDABLE
     return FOUND
 
@@ -291,7 +281,7 @@ def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> P
     try:
         save(place)
         for name in place.kept:
-            click.echo(f"rodshell: kept {place.path / name}: it was changed since an earlier run wrote it", err=True)
+            say(f"kept {place.path / name}: it was changed since an earlier run wrote it")
         return place.path
     except KeyboardInterrupt:
         if not place.committed:
@@ -303,5 +293,5 @@ def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> P
         with open_folder(free) as other:
             shutil.copytree(place.new, other.new, dirs_exist_ok=True)
             other.commit()
-        click.echo(f"rodshell: written to {free} instead: {error}", err=True)
+        say(f"written to {free} instead: {error}")
         return free

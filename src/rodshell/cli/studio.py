@@ -62,6 +62,8 @@ def command(name: str, host: str, port: int, folder: str | None, time_limit: str
     click.echo(f"rodshell studio: {address} (Ctrl-C ends it)", err=True)
     if not no_browser:
         threading.Timer(1.0, webbrowser.open, [address]).start()
-    config = uvicorn.Config(studio_app(settings), log_level="warning", ws_max_size=4_000_000, lifespan="on")
+    config = uvicorn.Config(
+        studio_app(settings), log_level="warning", use_colors=False, ws_max_size=4_000_000, lifespan="on"
+    )
     uvicorn.Server(config).run(sockets=[listener])
     return 0

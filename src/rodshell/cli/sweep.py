@@ -1,11 +1,11 @@
 """`rodshell sweep`: many designs of one job."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from rodshell.cli.options import QUIET
+from rodshell.cli.options import ADDRESS, QUIET
 from rodshell.cli.reporting import FOUND, NOT_CONVERGED, Progress, compile_before_first
 
 if TYPE_CHECKING:
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 @click.option("--dry-run", is_flag=True, help="Check all designs and print how many there are; compute nothing.")
 @click.option("--report", is_flag=True, help="Also write report.html: charts of all designs, shapes of the best.")
 @click.option("--retry", is_flag=True, help="Run jobs again that a limit stopped, or whose process died.")
+@ADDRESS
 @QUIET
-def command(file: str, out: str | None, dry_run: bool, report: bool, retry: bool, quiet: bool) -> int:
+def command(file: str, out: str | None, dry_run: bool, quiet: bool, **how: Any) -> int:
     """Compute many designs: all combinations of the values of some keys, or samples of them.
 
     What is finished stays, whatever is interrupted: the same command continues, and a changed sweep computes only what
@@ -34,7 +35,7 @@ def command(file: str, out: str | None, dry_run: bool, report: bool, retry: bool
         return _dry_run(plan, folder)
     compile_before_first(quiet=quiet)
     with Progress(quiet=quiet) as progress:
-        found = sweep(file, folder, retry=retry, report=report, progress=progress)
+        found = sweep(plan, folder, progress=progress, **how)
     if not quiet:
         click.echo(found.summary())
         click.echo(f"written to {folder.absolute()}")

@@ -119,7 +119,7 @@ def _helper(every: bool) -> "Iterator[subprocess.Popen[bytes] | None]":
         return
     nothing = subprocess.DEVNULL
     with subprocess.Popen(
-        [sys.executable, "-m", __name__, *(["every"] if every else [])],
+        [sys.executable, "-P", "-m", __name__, *(["every"] if every else [])],
         stdin=subprocess.PIPE,
         stdout=nothing,
         stderr=nothing,

@@ -18,6 +18,10 @@ except ModuleNotFoundError as error:
         "no compiled kernels for this processor are installed, nor Numba, which would compile them: pip install numba"
     ) from error
 
+# Numba reads settings from a file in the current folder, such as where it keeps kernels, as pickles: whose is it?
+config._config_fname = ""
+config.reload_config()
+
 
 def dispatcher(function: Kernel, options: dict[str, object]) -> Kernel:
     """The kernel of a function, which is compiled at its first call.

@@ -18,6 +18,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, OutputError
+from rodshell.untrusted import read_text
 
 Judged = tuple[float, float]  # value, processor time [s]
 Evaluate = Callable[[Floats], Iterator[Judged]]
@@ -167,17 +168,18 @@ class StoredValues:
         ------
         InputError : it cannot be read, or does not hold the values of a search.
         """
+        if not file.exists():
+            return StoredValues(file)
         try:
-            content = json.loads(file.read_text(encoding="utf-8"))
+            content = json.loads(read_text(file))
             if (content["format"], content["version"]) != (FORMAT, VERSION):
                 raise ValueError(f"its format is not {FORMAT} {VERSION}")
             digests, values, seconds = (content[name] for name in ("digests", "values", "seconds"))
-            if not (len(digests) == len(values) == len(seconds) and np.isfinite(np.concatenate(values)).all()):
+            numbers = np.concatenate([*values, seconds])
+            if not (len(digests) == len(values) == len(seconds) and np.isfinite(numbers).all()):
                 raise ValueError("it holds broken generations")
             return StoredValues(file, digests, values, seconds)
-        except FileNotFoundError:
-            return StoredValues(file)
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise InputError(f"cannot continue the search in {file}: {error!r}; remove it to start again") from error
 
     def write(self) -> None:
@@ -194,6 +196,7 @@ class StoredValues:
         part = self.file.with_name(f".{self.file.name}.part")
         try:
             self.file.parent.mkdir(parents=True, exist_ok=True)
+            part.unlink(missing_ok=True)  # it might be a link
             part.write_text(json.dumps(content) + "\n", encoding="utf-8")
             os.replace(part, self.file)
         except OSError as error:

@@ -6,7 +6,7 @@ from math import degrees
 from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.loaded import DesignStrength
 from rodshell.results.own_weight import is_braced
-from rodshell.results.records import Bent, RodType
+from rodshell.results.records import Bent, RodType, printable
 from rodshell.results.results import Bending, Results
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import strength_name
@@ -56,7 +56,7 @@ def summary_text(results: Results) -> str:
     lines += [f"  dropped   {rod.id}: {rod.reason}" for rod in results.dropped[:MOST_DROPPED]]
     if len(results.dropped) > MOST_DROPPED:
         lines.append(f"            and {len(results.dropped) - MOST_DROPPED} more, named in result.json")
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def chosen(parts: Iterable[str]) -> str:

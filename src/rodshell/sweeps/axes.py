@@ -96,6 +96,8 @@ def read_axes(given: Mapping[str, Any], sample: Mapping[str, Any] | None, base: 
     """
     axes, spans = list[Axis | None](), list[Span]()
     for name, values in flat_keys(given):
+        if prod(len(axis.rows) for axis in axes if axis) > MOST:
+            break  # and no more are made
         if isinstance(values, Mapping):
             span = read_span(name, values, base, ("from", "to", "count", "scale"))
             if "count" in values:

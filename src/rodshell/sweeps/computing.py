@@ -15,8 +15,8 @@ from rodshell.sweeps.engines import Engine, opened_engine
 from rodshell.sweeps.identity import job_identity, program_version
 from rodshell.sweeps.plan import Plan
 from rodshell.sweeps.report import REPORT
-from rodshell.sweeps.store import ARCHIVES, FOUND, LOST, STORE, Store
-from rodshell.sweeps.table import CSV, PARQUET, Table, replaced, write_parquet
+from rodshell.sweeps.store import ARCHIVES, FOUND, LOST, STORE, Store, replaced
+from rodshell.sweeps.table import CSV, PARQUET, Table, write_parquet
 from rodshell.sweeps.watched import Reply
 
 COPY = "sweep.toml"
@@ -67,7 +67,7 @@ class Computation:
         InputError : a file of its case cannot be read.
         """
         name = job_identity(job, self._plan.settings.until)
-        return Wanted(name, job, self.store.folder / ARCHIVES / name if kept else None)
+        return Wanted(name, job, self.store.inside(f"{ARCHIVES}/{name}") if kept else None)
 
     def compute(self, wanted: Iterable[Wanted], stage: str, total: int) -> None:
         """Compute those that are not finished.
@@ -143,12 +143,15 @@ def _time_text(seconds: float) -> str:
 
 
 @contextmanager
-def opened_computation(plan: Plan, folder: Path, progress: Progress, *, retry: bool) -> Iterator[Computation]:
+def opened_computation(
+    plan: Plan, folder: Path, progress: Progress, *, retry: bool, address: str | None
+) -> Iterator[Computation]:
     """A computation into a folder, in which the table shows what is finished however this is left.
 
     Parameters
     ----------
-    plan : of the sweep or search; folder : for it; progress, retry : as of `Computation`.
+    plan : of the sweep or search; folder : for it; progress, retry : as of `Computation`; address : of a
+        scheduler.
 
     Raises
     ------
@@ -162,7 +165,7 @@ def opened_computation(plan: Plan, folder: Path, progress: Progress, *, retry: b
                 part.write_text(plan.origin.text, encoding="utf-8")
         table = Table(store)
         try:
-            with opened_engine(plan.settings) as engine:
+            with opened_engine(plan.settings, address) as engine:
                 yield Computation(plan, store, table, engine, progress, retry=retry)
         except RodshellError:
             with suppress(OutputError):

@@ -4,18 +4,23 @@ In both, a job runs in a process of `watched`, so that limits, crashes and resul
 which machine.
 """
 
+import json
 import logging
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from time import monotonic
+from pathlib import Path
+from time import monotonic, sleep
 from typing import Any
 
 from rodshell.errors import InputError
 from rodshell.sweeps.plan import Settings
-from rodshell.sweeps.watched import EngineError, Reply, Task, Workers, lost
+from rodshell.sweeps.watched import TICK, EngineError, Reply, Task, Workers, lost
+from rodshell.untrusted import PATIENCE, read_text
+from rodshell.validation import instance
 
 QUEUED = 2  # tasks for each worker: one that runs, one that waits
+HERE_ONLY = "127.0.0.1:0"  # where a local cluster shows its state: dask would have it seen from everywhere
 COUNTED = 5.0  # s between two looks at the size of a cluster
 HERE = Workers()  # of a process of dask
 
@@ -86,16 +91,23 @@ def run_here(task: Task, time_limit: float | None, memory_limit: float | None) -
 
 
 @contextmanager
-def opened_engine(settings: Settings) -> Iterator[Engine]:
+def opened_engine(settings: Settings, address: str | None = None) -> Iterator[Engine]:
     """The engine of a sweep; when it is left, jobs that still run are stopped.
+
+    Parameters
+    ----------
+    address : of a dask scheduler, or its scheduler file, which implies that engine; None: the scheduler that dask's own
+        settings name (DASK_SCHEDULER_ADDRESS), else a local one. It can run any program here.
 
     Raises
     ------
     InputError : dask is not installed, or not reached. EngineError : no process can be started.
     """
     with ExitStack() as stack:
-        if settings.engine == "dask":
-            yield stack.enter_context(_dask(settings))
+        if address is not None:
+            instance("address", address, str, 'text such as "tls://10.0.0.1:8786" or "scheduler.json"')
+        if settings.engine == "dask" or address is not None:
+            yield stack.enter_context(_dask(settings, address))
             return
         workers = Workers()
         executor = ThreadPoolExecutor(settings.workers, "rodshell-worker")
@@ -105,26 +117,40 @@ def opened_engine(settings: Settings) -> Iterator[Engine]:
 
 
 @contextmanager
-def _dask(settings: Settings) -> Iterator[Engine]:
+def _dask(settings: Settings, address: str | None) -> Iterator[Engine]:
     try:
+        import dask
         from distributed import Client, LocalCluster
     except ImportError:
-        raise InputError('run.engine = "dask" needs the package distributed: pip install "rodshell[cluster]"') from None
+        raise InputError('the engine dask needs the package distributed: pip install "rodshell[cluster]"') from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with ExitStack() as stack:
-        address = settings.address
-        if address is None:
+        given = dask.config.get("scheduler-address", None) if address is None else address
+        if given is None:
             HERE.open()
             cluster = LocalCluster(
-                n_workers=1, threads_per_worker=settings.workers, processes=False, dashboard_address=None,
-                memory_limit=0,
+                n_workers=1, threads_per_worker=settings.workers, processes=False, memory_limit=0,
+                dashboard_address=HERE_ONLY, worker_dashboard_address=HERE_ONLY, scheduler_kwargs={"dashboard": False},
             )  # fmt: skip
-            address = stack.enter_context(cluster)
+            place = stack.enter_context(cluster)
+        else:
+            place = _address_in(given) if given.endswith(".json") else given
         try:
-            place = {"scheduler_file": address} if isinstance(address, str) and address.endswith(".json") else {}
-            client = stack.enter_context(Client(None if place else address, timeout=10, **place))
+            client = stack.enter_context(Client(place, timeout=10))  # with TLS as dask's own settings say
         except (OSError, ValueError, TypeError) as error:
-            raise InputError(f'run.address = "{address}": no dask scheduler answers there: {error}') from None
-        if settings.address is None:
+            raise InputError(f"no dask scheduler answers at {given}: {error}") from None
+        if given is None:
             stack.callback(HERE.stop)
         yield DaskEngine(client, settings)
+
+
+def _address_in(file: str) -> str:
+    """The address in a scheduler file, which is waited for: the scheduler may be about to write it."""
+    end = monotonic() + PATIENCE
+    while True:
+        try:
+            return str(json.loads(read_text(Path(file)))["address"])
+        except (ValueError, LookupError, TypeError, RecursionError) as error:
+            if monotonic() > end:
+                raise InputError(f"{file} is not a scheduler file of dask: {error}") from None
+            sleep(TICK)

@@ -10,12 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import rodshell
+from rodshell.case.load import FILE_KEYS
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.units import shown
+from rodshell.untrusted import read_bytes
 from rodshell.version import __version__
 
 DIGITS = 32
+MOST = 1e9  # bytes of a file; readers of files are stricter
 
 
 def job_identity(job: Job, until: str) -> str:
@@ -31,9 +34,10 @@ def job_identity(job: Job, until: str) -> str:
     InputError : a file of the case cannot be read.
     """
     tables: dict[str, Any] = job.case.model_dump(exclude_none=True)
-    for key in ("file", "boundary"):
-        if key in tables["target"]:
-            tables["target"][key] = content_digest(Path(tables["target"][key]))
+    for table, keys in FILE_KEYS.items():
+        for key in keys:
+            if key in tables.get(table, ()):
+                tables[table][key] = content_digest(Path(tables[table][key]))
     content = json.dumps([program_version(), until, tables], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()[:DIGITS]
 
@@ -43,6 +47,8 @@ def content_digest(path: Path) -> str:
     try:
         stat = path.stat()
         return _digest(path.absolute(), stat.st_mtime_ns, stat.st_size)
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"target.file = {shown(str(path))} cannot be read: {error.strerror}") from None
     except (ValueError, AttributeError, TypeError):
@@ -51,12 +57,12 @@ def content_digest(path: Path) -> str:
 
 @cache
 def _digest(path: Path, _modified: int, _size: int) -> str:
-    content = path.read_bytes()
+    content = read_bytes(path, MOST)
     digest = hashlib.sha256(content)
     if path.suffix.lower() == ".gltf":
         for part in json.loads(content).get("buffers", ()):
             if not str(part.get("uri", "data:")).startswith("data:"):
-                digest.update((path.parent / part["uri"]).read_bytes())
+                digest.update(read_bytes(path.parent / part["uri"], MOST))
     return f"{path.suffix.lower()} {digest.hexdigest()}"
 
 

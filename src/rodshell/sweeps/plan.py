@@ -18,7 +18,8 @@ from rodshell.job import Job
 from rodshell.sweeps.axes import BASE, Axis, read_axes
 from rodshell.sweeps.columns import STANDARD, Column, read_columns
 from rodshell.units import parse_quantity, shown
-from rodshell.validation import choice, instance
+from rodshell.untrusted import read_text
+from rodshell.validation import choice, file_path
 
 EngineName = Literal["processes", "dask"]
 Keep = Literal["none", "best", "all"]
@@ -26,7 +27,7 @@ Until = Literal["pop-up", "fabrication"]
 Source = str | PathLike[str] | Mapping[str, Any]
 GENERATION = "generation"
 TABLES = ("base", "columns", "axes", "sample", "run")
-RUN = ("engine", "address", "workers", "keep", "best", "until", "time_limit", "memory_limit")
+RUN = ("engine", "workers", "keep", "best", "until", "time_limit", "memory_limit")
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,6 @@ class Settings:
     Parameters
     ----------
     engine : "processes" on this machine, or "dask".
-    address : of a dask scheduler, or its scheduler file; None: a local one.
     workers : number of jobs at the same time, on this machine.
     keep : which forms are kept as result folders.
     best : the column whose smallest value is the best form's.
@@ -45,7 +45,6 @@ class Settings:
     """
 
     engine: EngineName = "processes"
-    address: str | None = None
     workers: int = 1
     keep: Keep = "none"
     best: str = "rms_pinned"
@@ -186,7 +185,7 @@ def read_plan(source: Source) -> SweepPlan:
         raise InputError('[axes] is missing: give at least one key, such as "layout.spacing" = ["25 mm", "30 mm"]')
     keys = tuple(key for axis in axes for key in axis.keys)
     columns = read_columns(given.get("columns", ()), keys)
-    settings = read_settings(table(given, "run"), [column.name for column in columns], origin.folder)
+    settings = read_settings(table(given, "run"), [column.name for column in columns])
     return SweepPlan(origin, keys, columns, settings, axes)
 
 
@@ -210,18 +209,11 @@ def _opened(source: Source) -> tuple[str, str, Path, Mapping[str, Any]]:
     """Name, text, folder and content of a TOML file; of a mapping, which lies in the current folder."""
     if isinstance(source, Mapping):
         return "sweep", "", Path(), source
-    instance("the sweep", source, str | PathLike, "the path of a TOML file, or a mapping")
-    path = Path(source).expanduser()
+    path = file_path("the sweep", source)
+    text = read_text(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
         return path.stem, text, path.parent, tomllib.loads(text)
-    except FileNotFoundError:
-        raise InputError(f"there is no file named {shown(str(path))}: give a sweep file such as sweep.toml") from None
-    except OSError as reason:
-        raise InputError(f"{path} cannot be read: {reason.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not text in UTF-8: save it as UTF-8") from None
-    except tomllib.TOMLDecodeError as reason:
+    except (ValueError, RecursionError) as reason:
         raise InputError(f"{path} is not valid TOML: {reason}") from None
 
 
@@ -235,7 +227,7 @@ def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:
         if isinstance(source, Job):
             name, job = source.case.drawings.name or f"{source.case.target.kind} {number}", source
         else:
-            inside = isinstance(source, str) and source not in BUILT_IN and (folder / source).exists()
+            inside = isinstance(source, str) and source not in BUILT_IN and file_path(BASE, folder / source).exists()
             job = Job.load(folder / source if inside else source)
             name = source if isinstance(source, str) else job.case.drawings.name or f"{job.case.target.kind} {number}"
         if name in bases:
@@ -249,32 +241,29 @@ def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:
     return bases
 
 
-def read_settings(given: Mapping[str, Any], columns: Sequence[str], folder: Path) -> Settings:
+def read_settings(given: Mapping[str, Any], columns: Sequence[str]) -> Settings:
     """The table [run].
 
     Parameters
     ----------
-    given : the table; columns : names of columns in addition to those of every sweep; folder : of the sweep file.
+    given : the table; columns : names of columns in addition to those of every sweep.
 
     Raises
     ------
     InputError : an unknown key, or a value that cannot be used.
     """
+    if "address" in given:
+        raise InputError(
+            f"run.address = {shown(given['address'])}: a scheduler can run any program here, so that no file names it: "
+            "leave it out, and type --address ADDRESS where you trust what answers there"
+        )
     known("run", given, RUN)
     engine: EngineName = choice("run.engine", given.get("engine", "processes"), get_args(EngineName))
-    address = given.get("address")
-    if address is not None:
-        instance("run.address", address, str, 'text such as "tcp://10.0.0.1:8786" or "scheduler.json"')
-        if engine != "dask":
-            raise InputError(f'run.address = {shown(address)}: is for engine = "dask": leave it out, or change engine')
-        if address.endswith(".json"):
-            address = str(folder / address)
     workers = given.get("workers", 1)
     if type(workers) is not int or not 1 <= workers <= 1024:
         raise InputError(f"run.workers = {shown(workers)}: give a number of processes from 1 to 1024")
     return Settings(
         engine=engine,
-        address=address,
         workers=workers,
         keep=choice("run.keep", given.get("keep", "none"), get_args(Keep)),
         best=choice("run.best", given.get("best", "rms_pinned"), (*STANDARD[2:], *columns)),

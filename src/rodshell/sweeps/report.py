@@ -16,8 +16,8 @@ from rodshell.output.svg import inline
 from rodshell.results import read
 from rodshell.sweeps.columns import JOB
 from rodshell.sweeps.plan import GENERATION, Plan
-from rodshell.sweeps.store import ARCHIVES, Finished, Store
-from rodshell.sweeps.table import header_of, in_short, names_of, plain, replaced, table_rows
+from rodshell.sweeps.store import ARCHIVES, FOUND, Finished, Store, replaced
+from rodshell.sweeps.table import header_of, in_short, names_of, plain, table_rows
 
 REPORT = "report.html"
 SHAPES = 12  # pictures at most
@@ -96,13 +96,13 @@ def _data(store: Store, page: Page) -> dict[str, Any]:
     keys, columns = header_of(store)
     names = names_of(keys, columns)
     rows = list(table_rows(store, columns))
-    designs = [(design.job, page.counts(design)) for design in store.finished()]
+    designs = [(design.job if design.outcome == FOUND else None, page.counts(design)) for design in store.finished()]
     cells = {name: [plain(row[k]) for row in rows] for k, name in enumerate(names) if name != JOB}
     given = [row[: len(keys)] for row in rows]
     return {
         "keys": keys, "rows": cells, "first": list(page.first), "larger": list(page.larger),
         "usable": [k for k, (_, counts) in enumerate(designs) if counts],
-        "reports": [_report(store, job) for job, _ in designs],
+        "reports": [job and _report(store, job) for job, _ in designs],
         "studio": [_studio(page.plan, values) for values in given],
         "commands": [page.plan.command(values) for values in given],
     }  # fmt: skip

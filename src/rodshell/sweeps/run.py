@@ -1,5 +1,6 @@
 """A sweep: all designs of a plan, each computed once, into one folder."""
 
+import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -8,6 +9,7 @@ from pathlib import Path
 
 from rodshell.dataclass import dataclass
 from rodshell.progress import Progress, silent
+from rodshell.results.records import printable
 from rodshell.sweeps.columns import CONVERGED, is_usable
 from rodshell.sweeps.computing import Computation, Wanted, opened_computation
 from rodshell.sweeps.identity import job_identity
@@ -15,7 +17,7 @@ from rodshell.sweeps.plan import Source, SweepPlan, read_plan
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.store import FOUND, STORE, Store
 from rodshell.sweeps.table import header_notes, header_of, names_of, table_rows
-from rodshell.validation import instance
+from rodshell.validation import file_path
 
 BEST = "best"
 
@@ -55,7 +57,7 @@ class Swept:
             f"no form ({count} design{'s' if count != 1 else ''}): {sentence}"
             for sentence, count in self.failures[:MOST_FAILURES]
         ]
-        return "\n".join(lines)
+        return "\n".join(map(printable, lines))
 
 
 MOST_FAILURES = 5
@@ -63,11 +65,12 @@ NO_FORM, NOT_CHECKED = "no form", "not checked"
 
 
 def sweep(
-    source: Source,
+    source: Source | SweepPlan,
     out: str | PathLike[str],
     *,
     retry: bool = False,
     report: bool = False,
+    address: str | None = None,
     progress: Progress = silent,
 ) -> Swept:
     """Compute all designs of a sweep that are not finished yet, and write their table.
@@ -79,6 +82,7 @@ def sweep(
     out : folder of the sweep. What an earlier run has finished there is not computed again.
     retry : run jobs again that were stopped by a limit, or whose process died.
     report : also write report.html, and keep the results of the best designs, whose shapes it shows.
+    address : of a dask scheduler that you trust, or its scheduler file; default: as `opened_engine` says.
     progress : called as progress(stage, detail, 0.0).
 
     Returns
@@ -91,13 +95,12 @@ def sweep(
         folder cannot be written, or another sweep is writing there. KeyboardInterrupt : the table shows what is
         finished; the same call continues.
     """
-    plan = read_plan(source)
-    instance("out", out, str | PathLike, "the path of a folder")
-    folder = Path(out).expanduser()
+    plan = source if isinstance(source, SweepPlan) else read_plan(source)
+    folder = file_path("out", out)
     if report:
         require_plotly()
     check_designs(plan)
-    with opened_computation(plan, folder, progress, retry=retry) as computation:
+    with opened_computation(plan, folder, progress, retry=retry, address=address) as computation:
         store, until = computation.store, plan.settings.until
         designs = ((values, job_identity(job, until)) for values, job in plan.designs())
         store.plan(designs, notes=header_notes(plan.keys, plan.columns))
@@ -131,8 +134,8 @@ def planned(plan: SweepPlan, out: str | PathLike[str]) -> tuple[int, int]:
     plan : of the sweep; out : its folder, which may be missing.
     """
     jobs = {job_identity(job, plan.settings.until) for _, job in plan.designs()}
-    folder = Path(out).expanduser()
-    if not (folder / STORE).is_file():
+    folder = file_path("out", out)
+    if not os.path.lexists(folder / STORE):
         return len(jobs), 0
     with Store(folder, writing=False) as store:
         return len(jobs), sum(store.outcome(job) is not None for job in jobs)
@@ -143,7 +146,7 @@ def swept(store: Store, computed: int) -> Swept:
     verdicts, failures, lost = Counter[str](), Counter[str](), 0
     for design in store.finished():
         if design.outcome == FOUND:
-            verdicts[design.row["verdict"] or NOT_CHECKED] += 1
+            verdicts[design.row.get("verdict") or NOT_CHECKED] += 1
             lost += design.row["status"] != CONVERGED
         else:
             verdicts[NO_FORM] += 1
@@ -162,7 +165,7 @@ def _keep_best(plan: SweepPlan, computation: Computation) -> None:
     if best is None or (store.note(BEST) == best and (store.folder / BEST / "result.json").is_file()):
         return
     (wanted,) = computation.archived([best])
-    computation.compute([replace(wanted, archive=store.folder / BEST, again=True)], "best design", 1)
+    computation.compute([replace(wanted, archive=store.inside(BEST), again=True)], "best design", 1)
     store.take_note(BEST, best)
 
 

@@ -25,7 +25,7 @@ from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.search_plan import FAR, SearchPlan, read_search
 from rodshell.sweeps.store import FOUND, Finished, Store
 from rodshell.sweeps.table import header_notes, in_short, write_csv
-from rodshell.validation import instance
+from rodshell.validation import file_path
 
 FRONT = "front.csv"
 MOST_SHOWN = 10  # designs of the front in text
@@ -70,7 +70,13 @@ class Optimised:
 
 
 def optimise(
-    source: Source, out: str | PathLike[str], *, retry: bool = False, report: bool = False, progress: Progress = silent
+    source: Source | SearchPlan,
+    out: str | PathLike[str],
+    *,
+    retry: bool = False,
+    report: bool = False,
+    address: str | None = None,
+    progress: Progress = silent,
 ) -> Optimised:
     """Search for the values of some keys for which objectives are smallest.
 
@@ -82,6 +88,7 @@ def optimise(
     out : folder of the search. What an earlier run has finished there is not computed again.
     retry : run jobs again that were stopped by a limit, or whose process died.
     report : also write report.html, and keep the results of up to twelve designs of the front.
+    address : as of `sweep`.
     progress : called as progress(stage, detail, 0.0).
 
     Returns
@@ -93,14 +100,13 @@ def optimise(
     InputError : the search cannot be used, or pymoo is not installed. OutputError : the folder cannot be written, or is
         in use. KeyboardInterrupt : the same call continues.
     """
-    plan = read_search(source)
-    instance("out", out, str | PathLike, "the path of a folder")
-    folder = Path(out).expanduser()
+    plan = source if isinstance(source, SearchPlan) else read_search(source)
+    folder = file_path("out", out)
     if report:
         require_plotly()
     algorithm = _algorithm(plan)
     objectives = [objective.column for objective in plan.objectives]
-    with opened_computation(plan, folder, progress, retry=retry) as computation:
+    with opened_computation(plan, folder, progress, retry=retry, address=address) as computation:
         store = computation.store
         store.plan((), notes=header_notes(plan.keys, plan.columns))
         for generation in range(1, plan.generations + 1):

@@ -114,7 +114,7 @@ def read_search(source: Source) -> SearchPlan:
         raise InputError("run.best: a search has objectives, which say what is best: leave it out")
     known("search", search, ("population", "generations", "seed"))
     plan = SearchPlan(
-        origin, keys, columns, read_settings(run, [column.name for column in columns], origin.folder),
+        origin, keys, columns, read_settings(run, [column.name for column in columns]),
         variables, objectives, constraints,
         _whole(search, "population", 24, 4), _whole(search, "generations", 20, 1), _whole(search, "seed", 0, 0),
     )  # fmt: skip

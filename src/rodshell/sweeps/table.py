@@ -2,18 +2,19 @@
 
 import csv
 import json
-import os
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from rodshell.errors import InputError, OutputError
+from rodshell.errors import InputError
+from rodshell.output.schedules import safe_cell
+from rodshell.results.records import printable
 from rodshell.sweeps.columns import JOB, STANDARD, Column, read_column
-from rodshell.sweeps.store import STORE, Finished, Store
-from rodshell.validation import instance
+from rodshell.sweeps.store import Finished, Store, read_json, replaced
+from rodshell.validation import file_path
 
 if TYPE_CHECKING:
     import pyarrow
@@ -26,8 +27,12 @@ HEADER = "header"  # note of the store: {"keys", "columns"}
 
 def header_of(store: Store) -> tuple[list[str], list[Column]]:
     """The axes' keys of a sweep, and its own columns."""
-    noted = json.loads(store.note(HEADER) or '{"keys": [], "columns": []}')
-    return noted["keys"], [read_column(name) for name in noted["columns"]]
+    with store.errors():
+        noted = read_json(store.note(HEADER) or '{"keys": [], "columns": []}', dict)
+        keys, columns = (list(noted[name]) for name in ("keys", "columns"))
+        if not all(isinstance(name, str) for name in (*keys, *columns)):
+            raise ValueError("the names of its columns are not texts")
+        return keys, [read_column(name) for name in columns]
 
 
 def header_notes(keys: Sequence[str], columns: Sequence[Column]) -> dict[str, str]:
@@ -52,7 +57,11 @@ def table_rows(store: Store, columns: Sequence[Column]) -> Iterator[list[Any]]:
     ----------
     store : of the sweep; columns : in addition to those of every sweep.
     """
+    keys = header_of(store)[0]
     for design in store.finished():
+        with store.errors():
+            if len(design.keys) != len(keys):
+                raise ValueError(f"its design {design.position} has {len(design.keys)} values for {len(keys)} keys")
         yield [*design.keys, *(design.row.get(name) for name in STANDARD), *(_cell(design, c) for c in columns)]
 
 
@@ -105,31 +114,13 @@ def write_csv(file: Path, names: Sequence[str], rows: Iterable[Sequence[Any]]) -
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(names)
         for row in rows:
-            writer.writerow([str(value).lower() if isinstance(value, bool) else plain(value) for value in row])
+            writer.writerow(map(_csv_cell, row))
 
 
-@contextmanager
-def replaced(file: Path) -> Iterator[Path]:
-    """A path to write to, which then takes the place of a file of the sweep in one step.
-
-    Raises
-    ------
-    OutputError : it cannot be written.
-    """
-    part = file.with_name(f".{file.name}.part")
-    try:
-        yield part
-        os.replace(part, file)
-    except OSError as error:
-        if isinstance(error, OutputError):
-            raise
-        raise OutputError(
-            f"cannot write {file}: {error.strerror or error}; the finished designs are kept in {file.parent / STORE}: "
-            "make room, and start the same sweep again"
-        ) from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+def _csv_cell(value: Any) -> Any:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return safe_cell(value) if isinstance(value, str) else plain(value)
 
 
 def plain(value: Any) -> Any:
@@ -141,7 +132,7 @@ def in_short(value: Any) -> str:
     """A value in a sentence."""
     if value is None:
         return "–"
-    return f"{value:.4g}" if isinstance(value, float) else str(plain(value))
+    return f"{value:.4g}" if isinstance(value, float) else printable(str(plain(value)))
 
 
 def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pyarrow.Table":
@@ -161,8 +152,7 @@ def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pya
     ------
     InputError : pyarrow is not installed, or result.json has no such key. OutputError : there is no sweep.
     """
-    instance("folder", folder, str | PathLike, "the path of a sweep's folder")
-    with Store(Path(folder).expanduser(), writing=False) as store:
+    with Store(file_path("folder", folder), writing=False) as store:
         keys, columns_of_sweep = header_of(store)
         there = [column.name for column in columns_of_sweep]
         asked = [*columns_of_sweep, *(read_column(name) for name in columns if name not in there)]

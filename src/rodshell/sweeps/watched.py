@@ -107,7 +107,7 @@ class Worker:
         home = str(Path(rodshell.__file__).parents[1])
         path = os.pathsep.join([home, *filter(None, [os.environ.get("PYTHONPATH")])])
         process = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM],
+            [sys.executable, "-P", "-c", PROGRAM],  # modules of the current folder may be a stranger's
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, encoding="utf-8",
             env={**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": path},
             start_new_session=True,  # Ctrl-C of a terminal does not reach it

@@ -103,12 +103,17 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
     return TitleBlock(given.name or archive.name, entries, summary, verdict)
 
 
-def today() -> date:
-    """The date of writing in UTC; that of SOURCE_DATE_EPOCH, seconds since 1970, where it is set."""
+def source_date() -> datetime | None:
+    """The time in UTC that SOURCE_DATE_EPOCH gives in seconds since 1970; None where it gives none."""
     try:
-        return datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), UTC).date()
+        return datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), UTC)
     except (KeyError, ValueError, OverflowError, OSError):
-        return datetime.now(UTC).date()
+        return None
+
+
+def today() -> date:
+    """The date of writing in UTC, or that of `source_date`."""
+    return (source_date() or datetime.now(UTC)).date()
 
 
 def _section(section: Section | None) -> str:
