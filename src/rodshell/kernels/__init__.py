@@ -18,8 +18,7 @@ from importlib.util import module_from_spec
 from typing import Any
 
 from rodshell.errors import InputError
-
-Kernel = Callable[..., Any]
+from rodshell.kernels.table import Kernel
 
 PACKAGE = "rodshell."
 LEVELS = ("x86-64-v3", "generic")  # of processors, from the highest
@@ -46,7 +45,7 @@ def njit(**options: object) -> Callable[[Kernel], Kernel]:
         if COMPILED is None:
             from rodshell.kernels.jit import dispatcher
 
-            return dispatcher(function, options)
+            return dispatcher(function, name_of(function), options)
         kernel = COMPILED.get(name_of(function))
         return function if kernel is None else _taking_any_array(kernel)
 

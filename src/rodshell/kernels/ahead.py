@@ -17,9 +17,9 @@ from importlib import import_module
 from time import monotonic
 from typing import Any
 
-from rodshell.kernels import PACKAGE, Kernel
+from rodshell.kernels import PACKAGE
 from rodshell.kernels.jit import arguments_of, types_found_once
-from rodshell.kernels.table import KERNELS, OF_SOME_JOBS
+from rodshell.kernels.table import KERNELS, OF_SOME_JOBS, Kernel
 
 LONG_ENOUGH = 0.1  # share of the work after which the time that is left is estimated
 EACH = 300  # bytes of code that compile about as long as what Numba does for each kernel, however short

@@ -5,9 +5,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from rodshell.errors import RodshellError
-from rodshell.kernels import Kernel, name_of
 from rodshell.kernels.cache import kernels_are_kept
-from rodshell.kernels.table import KERNELS
+from rodshell.kernels.table import KERNELS, Kernel
 
 try:
     from numba import config, njit, types
@@ -23,15 +22,15 @@ config._config_fname = ""
 config.reload_config()
 
 
-def dispatcher(function: Kernel, options: dict[str, object]) -> Kernel:
-    """The kernel of a function, which is compiled at its first call.
+def dispatcher(function: Kernel, kernel_name: str, options: dict[str, object]) -> Kernel:
+    """The kernel of a function, which is compiled at its first call; `kernel_name` is its module and name.
 
     Divisions are those of NumPy, and floating-point numbers are rounded as written, unless it has an option for that.
     By Numba's defaults a kernel takes such options from the kernel that calls it first, and its bits would depend on
     the order of calls. Numba refuses to declare a kernel that is to be kept where no folder can be written. Those that
     only kernels call are not kept: they are part of these, and to write them takes a twentieth of the time.
     """
-    module, _, name = name_of(function).rpartition(".")
+    module, _, name = kernel_name.rpartition(".")
     from_python = name in KERNELS.get(module, {})
     kept = from_python and kernels_are_kept()
     of_its_own: dict[str, object] = {"error_model": "numpy", "fastmath": False, "cache": kept}

@@ -4,6 +4,11 @@ A type is a letter and a number of dimensions, in C order: f float64, i int64, b
 (n, m) of float64, f alone a number; ff is a pair of numbers. Kernels that only kernels call need no row.
 """
 
+from collections.abc import Callable
+from typing import Any
+
+Kernel = Callable[..., Any]
+
 # Kernels of joints, meshes, twist, warm starts and dynamics, which most forms do not call: modules, or single kernels
 OF_SOME_JOBS = {
     "contact.modified_mass", "geometry.curves._on_curve", "joints.relative_rotation", "joints.ties", "rods.bend_twist",

@@ -9,7 +9,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import rodshell
 from rodshell.case.load import FILE_KEYS
 from rodshell.errors import InputError
 from rodshell.job import Job
@@ -70,7 +69,7 @@ def _digest(path: Path, _modified: int, _size: int) -> str:
 def program_version() -> str:
     """The version, and twelve digits of SHA-256 of the sources, which may have changed since."""
     digest = hashlib.sha256()
-    home = Path(rodshell.__file__).parent
+    home = Path(__file__).parents[1]
     for file in sorted(home.rglob("*.py")):
         digest.update(f"{file.relative_to(home).as_posix()}\n".encode() + file.read_bytes())
     return f"{__version__}+{digest.hexdigest()[:12]}"

@@ -18,7 +18,6 @@ from typing import Any
 
 import psutil
 
-import rodshell
 from rodshell.errors import OutputError, RodshellError
 
 TICK = 0.1  # s between two looks at a process
@@ -104,7 +103,7 @@ class Worker:
         raise EngineError(f"a process for jobs cannot be started: {why}")
 
     def _spawned(self) -> "tuple[subprocess.Popen[str], SimpleQueue[str | None]]":
-        home = str(Path(rodshell.__file__).parents[1])
+        home = str(Path(__file__).parents[2])
         path = os.pathsep.join([home, *filter(None, [os.environ.get("PYTHONPATH")])])
         process = subprocess.Popen(
             [sys.executable, "-P", "-c", PROGRAM],  # modules of the current folder may be a stranger's
