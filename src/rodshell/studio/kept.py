@@ -41,13 +41,13 @@ def read_record(path: Path, kind: Any) -> Any:
     """
     if not path.is_file():  # a pipe would be waited for
         raise InputError(f"{path} is not a file")
+    content = read_bytes(path, RECORD)
     try:
-        content = read_bytes(path, RECORD)
-        return TypeAdapter(kind).validate_python(
-            json.loads(content, parse_constant=lambda _: None, parse_float=_finite)
-        )
-    except (ValidationError, ValueError, RecursionError) as reason:
-        raise InputError(f"{path} is damaged: {str(reason).splitlines()[0]}") from None
+        value = json.loads(content, parse_constant=lambda _: None, parse_float=_finite)
+        return TypeAdapter(kind).validate_python(value)
+    except (ValueError, RecursionError) as error:
+        reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
+        raise InputError(f"{path} is damaged: {reason}") from None
 
 
 def _finite(text: str) -> float | None:
