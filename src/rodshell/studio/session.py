@@ -192,8 +192,9 @@ class Session:
 
     def scene_of_variant(self, key: str) -> bytes | None:
         """The scene of a variant by its key."""
+        file = self.folder / f"{key}.scene"
         known = any(variant["scene"] == key for variant in self.state.variants)
-        return (self.folder / f"{key}.scene").read_bytes() if known else None
+        return file.read_bytes() if known and file.is_file() else None
 
     def _record(self, case: dict[str, Any]) -> None:
         self.room(len(json.dumps(case)))
