@@ -307,7 +307,7 @@ def test_a_page_whose_session_is_lost_begins_another(tmp_path: Path, new_studio:
     (tmp_path / "kept" / "sessions" / first / "session.json").write_text("[")
     put(page, SPACING, "80")
     with server(*options, "--port", address.rstrip("/").rpartition(":")[2]):
-        page.wait_for_function(f"localStorage.getItem('rodshell-session') !== '{first}'")
+        page.wait_for_function("first => localStorage.getItem('rodshell-session') !== first", arg=first)
         robot.checked()
         assert linked(page)["layout"]["spacing"] == 0.08
 
