@@ -211,13 +211,14 @@ def test_so_many_sessions_have_a_page_at_once(tmp_path: Path, monkeypatch: pytes
         assert first is not None
         assert second is not None
         assert third is not None
-        with first.listening(print), second.listening(print):
-            sessions.require_process(first)
-            with pytest.raises(
-                InputError, match=r"2 others use this server: try again later, or set RODSHELL_LIMITS=2"
-            ):
-                sessions.require_process(third)
-        sessions.require_process(third)
+        hearing = [sessions.hearing(one, print) for one in (first, second)]
+        with hearing[0], hearing[1]:
+            with sessions.hearing(first, repr):  # another tab
+                pass
+            with pytest.raises(InputError, match=r"2 others use this server: .*, or set RODSHELL_LIMITS=2"):
+                sessions.hearing(third, print)
+        with sessions.hearing(third, print):
+            pass
 
     asyncio.run(run())
 

@@ -55,6 +55,7 @@ def command(
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
+        listener.listen()  # who reads the address can use it
     except OSError as reason:
         raise InputError(
             f"port {port} of {host} cannot be used ({reason.strerror}): give --port 0 for a free one"

@@ -95,7 +95,7 @@ class Room:
         used = set[str]().union(*(names() for names in self.users))
         found = [*self._folder.glob("sessions/*/uploads"), *self._folder.glob("jobs/*/status.json")]
         ours = [path.parent for path in found if NAME.fullmatch(path.parent.name) and not path.parent.is_symlink()]
-        kept = sorted((_last_use(path), _size(path), path) for path in ours)
+        kept = sorted((path.stat().st_mtime, _size(path), path) for path in ours)
         total = float(sum(size for _, size, _ in kept))
         for _, size, path in kept:
             if total <= allowed:
@@ -104,13 +104,6 @@ class Room:
                 shutil.rmtree(path, ignore_errors=True)
                 total -= size - _size(path)
         return total
-
-
-def _last_use(path: Path) -> float:
-    try:
-        return path.lstat().st_mtime
-    except OSError:
-        return 0.0
 
 
 def _size(path: Path) -> int:

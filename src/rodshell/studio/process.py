@@ -33,6 +33,10 @@ class WorkerProcess:
         self._told = False  # that one waits
         self._watch: asyncio.TimerHandle | None = None
 
+    @property
+    def is_running(self) -> bool:
+        return self._process is not None
+
     def order(self, order: Order) -> None:
         """Send an order, or keep it until the process has ended the one before."""
         if order.kind == "files":

@@ -8,7 +8,7 @@ import asyncio
 import json
 import secrets
 from collections.abc import AsyncIterator
-from contextlib import AbstractContextManager, ExitStack, asynccontextmanager, suppress
+from contextlib import ExitStack, asynccontextmanager, suppress
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -234,22 +234,19 @@ def _session(request: Request | WebSocket) -> Session | None:
 
 async def _live(socket: WebSocket) -> None:
     """Orders of a page, and the news of its session."""
-    session = _session(socket)
-    news: asyncio.Queue[News] = asyncio.Queue()
-    with ExitStack() as stack, suppress(WebSocketDisconnect):  # the page has gone, perhaps in the middle of a message
-        try:
-            if session is not None:
-                stack.enter_context(_hearing(socket, session, news))
-        except InputError as reason:
-            await _close(socket, 4429, str(reason))
-            return
-        if session is None:
-            await _close(socket, 4404, "there is no such session")
-            return
-        await socket.accept()
+    await socket.accept()  # also of one that is closed at once: else the page does not hear why
+    session, news = _session(socket), asyncio.Queue[News]()
+    if session is None:
+        await socket.close(4404, "there is no such session")
+        return
+    try:
+        hearing = socket.app.state.sessions.hearing(session, news.put_nowait)
+    except InputError as reason:
+        await socket.close(4429, str(reason))
+        return
+    with hearing, ExitStack() as stack, suppress(WebSocketDisconnect):  # the page has gone in the middle of a message
         await _send(socket, {"kind": "session", "after": "connect", **vars(session.state)})
-        sender = asyncio.create_task(_send_news(socket, news))
-        stack.callback(sender.cancel)
+        stack.callback(asyncio.create_task(_send_news(socket, news)).cancel)
         while (received := await socket.receive())["type"] == "websocket.receive":
             message: dict[str, Any] = {}
             try:
@@ -264,23 +261,6 @@ async def _live(socket: WebSocket) -> None:
                 await _send(socket, {"kind": "session", "after": "step", **vars(session.state)})
             elif message.get("kind") == "case" and not message.get("live"):
                 await _send(socket, {"kind": "history", "at": session.state.at, "count": len(session.state.cases)})
-
-
-def _hearing(client: Request | WebSocket, session: Session, news: asyncio.Queue[News]) -> AbstractContextManager[None]:
-    """The session's news go into a queue.
-
-    Raises
-    ------
-    InputError : too many other sessions have a page.
-    """
-    client.app.state.sessions.require_process(session)
-    return session.listening(news.put_nowait)
-
-
-async def _close(socket: WebSocket, code: int, reason: str) -> None:
-    """Close with a code that reaches the page: that of a connection that was not accepted does not."""
-    await socket.accept()
-    await socket.close(code, reason)
 
 
 async def _send(socket: WebSocket, message: dict[str, Any]) -> None:
@@ -375,8 +355,8 @@ async def _files(request: Request) -> Response:
     session = _session(request)
     if session is None:
         return _missing("session")
-    news: asyncio.Queue[News] = asyncio.Queue()
-    with _hearing(request, session, news):
+    news = asyncio.Queue[News]()
+    with request.app.state.sessions.hearing(session, news.put_nowait):
         serial = -1 - secrets.randbelow(1 << 30)
         session.files(serial)
         while (item := await news.get()).serial != serial or item.kind not in ("files", "failed"):

@@ -11,7 +11,7 @@ import os
 import re
 import secrets
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import field, replace
 from functools import partial
 from pathlib import Path
@@ -28,7 +28,7 @@ from rodshell.studio.worker import News, Order
 from rodshell.untrusted import limit, raised
 
 ALONE = 60.0  # s without a page after which a session's process is ended
-SESSIONS = 50  # with a page, and so with a process, at once
+SESSIONS = 50  # with a page or a process at once
 MOST_CASES = 500  # of a session's history
 HISTORY = 10e6  # bytes of these cases
 VARIANTS = 100  # of a session
@@ -277,13 +277,18 @@ class Sessions:
             session.leave_later()
         return self._open.get(name)
 
-    def require_process(self, session: Session) -> None:
-        """InputError where too many other sessions have a page."""
-        others = sum(bool(other.listeners) for other in self._open.values() if other is not session)
-        if others >= limit(SESSIONS):
-            raise InputError(
-                f"{limit(SESSIONS):g} others use this server: try again later, {raised(SESSIONS, others + 1)}"
-            )
+    def hearing(self, session: Session, heard: Heard) -> AbstractContextManager[None]:
+        """Hear a session's news, as `Session.listening`.
+
+        Raises
+        ------
+        InputError : too many others have a page or a process.
+        """
+        others = [other for other in self._open.values() if other.listeners or other.worker.is_running]
+        count = len(others) - (session in others)
+        if count >= limit(SESSIONS):
+            raise InputError(f"{count} others use this server: try again later, {raised(SESSIONS, count + 1)}")
+        return session.listening(heard)
 
     def end(self) -> None:
         """End all processes."""
