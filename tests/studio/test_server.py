@@ -1,5 +1,6 @@
 """The studio: who is let in, what it reads and keeps, and that what it finds is what the command line finds."""
 
+import errno
 import json
 import time
 from collections.abc import Iterator
@@ -169,6 +170,27 @@ def test_uploads_are_few_kinds_and_not_too_large(tmp_path: Path) -> None:
         assert not list(tmp_path.rglob("uploads/.*"))
 
 
+def test_a_full_disk_is_answered_in_a_sentence(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = new_session(client)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    for answer in (
+        client.post(f"/api/sessions/{session}/uploads?name=a.obj", content=b"v"),
+        client.post("/api/jobs", json=DOME),
+    ):
+        assert answer.status_code == 507
+        assert answer.json()["sentence"] == "the server cannot keep or read this (No space left on device)"
+    with client.websocket_connect(f"/api/sessions/{session}/live") as socket:
+        socket.receive_json()
+        socket.send_json({"kind": "case", "serial": 1, "case": DOME})
+        assert "No space left" in socket.receive_json()["sentence"]
+        socket.send_json({"kind": "step", "by": 0})
+        assert [socket.receive_json()["kind"] for _ in range(2)] == ["history", "failed"]
+
+
 def test_names_of_uploads_are_plain() -> None:
     assert upload_name("C:\\roofs\\<b>roof</b>.OBJ") == "b_.OBJ"
     assert upload_name("../../roof 2.obj") == "roof 2.obj"
@@ -318,7 +340,7 @@ def test_a_session_keeps_no_case_that_cannot_be_sent_back(client: TestClient) ->
         assert socket.receive_json()["count"] == 0
 
 
-@pytest.mark.parametrize("number", ["NaN", "-Infinity"])
+@pytest.mark.parametrize("number", ["NaN", "-Infinity", "1e999"])
 def test_what_an_earlier_server_stored_with_numbers_that_are_no_json_is_served(tmp_path: Path, number: str) -> None:
     name, case = "a" * 24, f'{{"layout": {{"spacing": {number}}}, "target": {{"kind": "\\ud800"}}}}'
     for folder, file, text in (
