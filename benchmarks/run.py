@@ -30,6 +30,7 @@ from benchmarks import (  # noqa: E402
     sameness,
     scaling,
     startup,
+    studio,
     sweeps,
 )
 from benchmarks.rows import Row, Section, machine  # noqa: E402
@@ -42,6 +43,7 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "factorisation": factorisation.factorisation,
     "scaling": scaling.scaling,
     "slider": lambda quick: jobs.slider(6 if quick else 20),
+    "studio": studio.studio,
     "warm": lambda quick: jobs.warm(3 if quick else 9),
     "startup": lambda quick: startup.section(3 if quick else 7),
     "first": lambda _: first_run.section(),

@@ -71,3 +71,11 @@ def test_what_no_case_file_can_describe_has_no_link() -> None:
     case = rs.Job(target, layout, rs.Rod(rs.Circle(0.01), rs.Material(1e9, 1e3))).case
     with pytest.raises(InputError, match="the studio cannot hold"):
         studio_link(case)
+
+
+def test_a_case_that_the_studio_does_not_read_has_no_link(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = rs.Job.load({"drawings": {"project": 1_500_000 * "x"}}).case
+    with pytest.raises(InputError, match=r"has 1\.5 MB and the studio reads 1 MB at most: .*RODSHELL_LIMITS=2"):
+        studio_link(case)
+    monkeypatch.setenv("RODSHELL_LIMITS", "2")
+    assert studio_link(case)

@@ -117,7 +117,7 @@ def test_types_are_found_once_and_the_code_is_the_same() -> None:
         functions.BaseFunction.get_call_type = find
         try:
             with types_found_once() if options.pop("once") else nullcontext():
-                kernel: Any = dispatcher(total, options)
+                kernel: Any = dispatcher(total, "total", options)
                 kernel.compile(arguments_of("f1 i"))
             assert functions.BaseFunction.get_call_type is find
         finally:

@@ -1,6 +1,7 @@
 """The studio as somebody uses it who has a keyboard and a mouse, in Chromium."""
 
 import json
+import random
 import tomllib
 import zlib
 from base64 import urlsafe_b64decode, urlsafe_b64encode
@@ -222,6 +223,93 @@ def test_a_change_made_while_the_server_is_away_is_kept(tmp_path: Path, new_stud
         expect(page.locator(SPACING).first).to_have_value("80")
         assert linked(page)["layout"]["spacing"] == 0.08
         assert not page.is_disabled("#undo")
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_page_comes_in_by_its_token_and_stays_in_when_the_server_is_started_again(
+    tmp_path: Path, new_studio: Studio
+) -> None:
+    from playwright.sync_api import expect
+
+    from tests.acceptance.studio import server
+
+    (tmp_path / "case.toml").write_text(CASE)
+    options = (tmp_path / "sessions", str(tmp_path / "case.toml"))
+    page, robot = new_studio.page, new_studio.robot
+    with server(*options, token=True) as (address, _):
+        plain = address.partition("?")[0]
+        page.goto(plain)
+        expect(page.locator("#notice")).to_contain_text("needs its token: open the address that it printed")
+        page.goto(address)
+        robot.checked()
+        assert "token" not in page.url
+    page.wait_for_selector("#state.wrong")
+    put(page, SPACING, "80")
+    with server(*options, "--port", plain.rstrip("/").rpartition(":")[2], token=True) as (again, _):
+        assert again != address
+        robot.checked()
+        expect(page.locator(SPACING).first).to_have_value("80")
+        page.goto(
+            "data:text/html,<a href='" + plain + "'>from elsewhere</a>"
+        )  # a cookie for this site alone stays away
+        page.click("a")
+        robot.checked()
+        expect(page.locator(SPACING).first).to_have_value("80")
+        page.context.clear_cookies()
+        with server(tmp_path / "other", token=True) as (other, _):
+            page.goto(plain)
+            expect(page.locator("#notice")).to_contain_text("needs its token")
+            page.goto(other.partition("?")[0])
+            expect(page.locator("#notice")).to_contain_text("needs its token")
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_link_may_be_long_and_one_that_holds_too_much_says_so(studio: Studio) -> None:
+    from playwright.sync_api import expect
+
+    page, robot = studio.page, studio.robot
+    case = linked(page)
+    bomb = code('{"target": "' + 60_000_000 * "x" + '"}')
+    assert 50_000 < len(bomb) < 100_000
+    deep = code('{"target":' * 400_000 + "1" + "}" * 400_000)
+    for wrong in (bomb, deep, code(json.dumps({**case, "drawings": {"project": 1_500_000 * "x"}}))):
+        page.goto("about:blank")
+        page.goto(f"{studio.server.address}#case={wrong}")
+        expect(page.locator("#notice")).to_contain_text("holds more than the studio reads")
+        robot.checked()
+    text = random.Random(1).randbytes(240_000).hex()
+    studio.open({**case, "drawings": {"project": text}})
+    robot.checked()
+    assert linked(page)["drawings"]["project"] == text
+    put(page, SPACING, "90")
+    robot.checked()
+    studio.open(
+        {**case, "loads": [{"name": 240_000 * "x", "factors": 30 * [[[[[[[[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]]]]]]]}]}
+    )
+    expect(page.locator("#verdict.failed")).to_contain_text("at most 20 tables and lists within one another")
+    assert studio.errors() == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_page_whose_session_is_lost_begins_another(tmp_path: Path, new_studio: Studio) -> None:
+    from tests.acceptance.studio import server
+
+    (tmp_path / "case.toml").write_text(CASE)
+    options = (tmp_path / "kept", str(tmp_path / "case.toml"))
+    page, robot = new_studio.page, new_studio.robot
+    with server(*options) as (address, _):
+        page.goto(address)
+        robot.checked()
+        first = page.evaluate("localStorage.getItem('rodshell-session')")
+    (tmp_path / "kept" / "sessions" / first / "session.json").write_text("[")
+    put(page, SPACING, "80")
+    with server(*options, "--port", address.rstrip("/").rpartition(":")[2]):
+        page.wait_for_function("first => localStorage.getItem('rodshell-session') !== first", arg=first)
+        robot.checked()
+        assert linked(page)["layout"]["spacing"] == 0.08
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from rodshell.case.case import Case
 from rodshell.case.load_tables import AnyLoad, CombinationTable
 from rodshell.case.stage_tables import IDLE, PatchTable
-from rodshell.case.values import Table
+from rodshell.case.values import FileToRead, Table
 from rodshell.dataclass import dataclass
 from rodshell.units import shown
 from rodshell.validation import either, not_a_choice
@@ -47,6 +47,7 @@ class CaseKey:
     kinds : of the table that has the key, where not every kind has it.
     choices : the words that it may take, where it is a choice.
     any_value : whether it may take values other than these words.
+    reads_file : whether it names a file.
     """
 
     path: str
@@ -54,6 +55,7 @@ class CaseKey:
     kinds: tuple[str, ...] = ()
     choices: tuple[str, ...] = ()
     any_value: bool = True
+    reads_file: bool = False
 
     @property
     def table(self) -> str:
@@ -76,6 +78,15 @@ def case_keys() -> dict[str, CaseKey]:
             key = replace(known, kinds=kinds, choices=tuple(dict.fromkeys(choices)), any_value=any_value)
         keys[key.path] = key
     return keys
+
+
+def file_keys() -> dict[str, tuple[str, ...]]:
+    """The keys that name files to be read, by their table."""
+    found = dict[str, tuple[str, ...]]()
+    for key in case_keys().values():
+        if key.reads_file:
+            found[key.table] = (*found.get(key.table, ()), key.name)
+    return found
 
 
 @cache
@@ -112,7 +123,10 @@ def _keys_of(model: type[Table], prefix: str, kind: tuple[str, ...] = ()) -> Ite
                 yield from _keys_of(inner, path + ".", (_kind_of(inner),) if len(models) > 1 else ())
         else:
             words = field.description or f"kind of {prefix.rstrip('.')}"
-            yield CaseKey(path, words, kind, *_choices(field.annotation))
+            members = get_args(field.annotation)  # of `FileToRead | None`
+            marks = {*field.metadata, *(mark for member in members for mark in get_args(member)[1:])}
+            reads_file = not marks.isdisjoint(get_args(FileToRead)[1:])
+            yield CaseKey(path, words, kind, *_choices(field.annotation), reads_file)
 
 
 def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:

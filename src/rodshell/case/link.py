@@ -11,9 +11,12 @@ from rodshell.case.case import Case
 from rodshell.case.load import BY_SUFFIX, FILE_KEYS
 from rodshell.errors import InputError
 from rodshell.units import shown
+from rodshell.untrusted import limit, raised
 from rodshell.validation import instance
 
 ADDRESS = "http://127.0.0.1:8731/"  # of `rodshell studio` without options
+LARGEST = 1_000_000  # bytes of a case as JSON that the studio reads
+LARGEST_UPLOAD = 50e6  # bytes of a file that the studio reads
 UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
 SURFACES = {suffix: kind for suffix, kind in BY_SUFFIX.items() if suffix != ".gltf"}  # a .gltf names further files
 OUTLINES = (".dxf", ".obj")  # closed curves that end a surface
@@ -33,14 +36,24 @@ def studio_link(case: Case, *, address: str = ADDRESS) -> str:
 
     Raises
     ------
-    InputError : not a case; or one that holds an object that no case file can describe, or that is about a
-        table of rods.
+    InputError : not a case; one that is too large; one that holds an object that no case file can describe, or that is
+        about a table of rods.
     """
     instance("case", case, Case, "the case of a job: job.case")
     text = json.dumps(page_case(case)[0], separators=(",", ":"))
+    require_small(len(text))
     packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     packed = packer.compress(text.encode()) + packer.flush()
     return f"{address}#case={urlsafe_b64encode(packed).decode().rstrip('=')}"
+
+
+def require_small(size: int) -> None:
+    """InputError for a case of so many bytes as JSON that the studio does not read it."""
+    if size > limit(LARGEST):
+        raise InputError(
+            f"the case has {size / 1e6:.3g} MB and the studio reads {limit(LARGEST) / 1e6:.3g} MB at most: "
+            f"make it smaller, {raised(LARGEST, size)}"
+        )
 
 
 def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
@@ -83,7 +96,8 @@ def upload_name(name: str) -> str:
     ------
     InputError : not the name of a file that the studio reads.
     """
-    plain = re.sub(r"[^\w.() -]", "_", name.replace("\\", "/").rpartition("/")[2]).strip(". ")[-100:]
+    plain = re.sub(r"[^\w.() -]", "_", name.replace("\\", "/").rpartition("/")[2]).strip(". ")
+    plain = plain.encode("utf-8", "replace")[-100:].decode("utf-8", "ignore").strip(". ")  # of bytes, as systems count
     suffix = Path(plain).suffix.lower()
     if suffix == ".gltf":
         raise InputError(

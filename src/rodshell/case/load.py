@@ -3,7 +3,7 @@
 import re
 import tomllib
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from difflib import get_close_matches
 from os import PathLike
@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from rodshell.case.case import UNDESCRIBED, Case
-from rodshell.case.keys import BY_KIND, case_keys, case_tables, not_a_table, sentence, unknown_key
+from rodshell.case.keys import BY_KIND, case_keys, case_tables, file_keys, not_a_table, sentence, unknown_key
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
 from rodshell.units import shown
@@ -53,7 +53,7 @@ BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".t
 
 CASE_FILE = ".toml"
 FILES = f"a case ({CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
-FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
+FILE_KEYS = file_keys()
 
 TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
 """What a case about a table of rods has, in place of a target with its layout and drape."""
@@ -80,6 +80,7 @@ def load_case(
     overrides: Mapping[str, object] | None = None,
     *,
     otherwise: Mapping[str, Raw] | None = None,
+    files: Callable[[object], str] | None = None,
 ) -> Case:
     """The case of this name, in this file or with this content, with some keys changed.
 
@@ -90,6 +91,8 @@ def load_case(
     overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
         keeps those keys of its table that it has too.
     otherwise : tables that stand in for those that the case does not have.
+    files : for a case of somebody who may not name any file: gives the path for the value of each key that names one,
+        or raises InputError.
 
     Raises
     ------
@@ -107,7 +110,7 @@ def load_case(
     if str(source) in BUILT_IN and {"seams.lines", "seams.file"} & overrides.keys():
         for key in ("rods", "length"):  # of the whole; what seams cut has them from its patches
             raw.get("layout", {}).pop(key, None)
-    return _validated(raw, overrides)
+    return _validated(raw, overrides, files)
 
 
 def is_described(path: Path) -> bool:
@@ -163,7 +166,7 @@ def flattened(changes: Mapping[str, object]) -> dict[str, object]:
     return dict(leaves("", changes))
 
 
-def _validated(raw: Raw, overrides: dict[str, object]) -> Case:
+def _validated(raw: Raw, overrides: dict[str, object], files: Callable[[object], str] | None = None) -> Case:
     """The case of tables as they were read, with some keys changed."""
     _rename(raw, overrides)
     _read_loads(raw, overrides)
@@ -189,7 +192,7 @@ def _validated(raw: Raw, overrides: dict[str, object]) -> Case:
         table, _, key = path.rpartition(".")
         _table(raw, table)[key] = value
     try:
-        return Case.model_validate(raw)
+        return Case.model_validate(raw, context=files)
     except ValidationError as error:
         raise InputError(sentence(error, raw)) from None
 

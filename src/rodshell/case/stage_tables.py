@@ -4,7 +4,7 @@ from math import pi
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from rodshell.case.values import (
     Acceleration,
@@ -14,6 +14,8 @@ from rodshell.case.values import (
     Coordinate,
     Counts,
     Duration,
+    FileToRead,
+    FolderToWrite,
     IsoDate,
     Length,
     LengthOrAuto,
@@ -31,6 +33,7 @@ from rodshell.case.values import (
     Table,
     Unit,
     Whole,
+    file_to_read,
     polylines,
     unit,
     words,
@@ -107,7 +110,7 @@ class DrapeTable(Table):
     )
     friction: Share = Field(default=0.0, description="coefficient of friction between falling rods and target")
     drag: Share = Field(default=0.0, description="air drag: rate in 1/s at which falling rods lose velocity")
-    frames: str | None = Field(
+    frames: FolderToWrite | None = Field(
         default=None, description="subfolder of the result for the steps of a fall; default: none"
     )
 
@@ -218,7 +221,7 @@ class PatchTable(Table):
 
 class SeamsTable(Table):
     lines: Polylines = Field(default=(), description='cuts "x,y; x,y" through the whole target; "|" between two')
-    file: str | None = Field(default=None, description="OBJ or DXF file with such lines")
+    file: FileToRead | None = Field(default=None, description="OBJ or DXF file with such lines")
     unit: Unit = Field(default=1.0, description="unit of that file, such as mm")
     patches: tuple[PatchTable, ...] = Field(
         default=(), description="overrides for patches, by name; in a case file only"
@@ -226,7 +229,7 @@ class SeamsTable(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_now(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def _read_now(cls, given: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
         """The lines of the file become lines of the case, which then needs the file no longer."""
         if given.get("file") is None:
             return given
@@ -234,7 +237,7 @@ class SeamsTable(Table):
 
         rest = {key: value for key, value in given.items() if key not in ("file", "unit")}
         try:
-            drawn = read_lines(Path(given["file"]), unit(given.get("unit", 1.0)))
+            drawn = read_lines(Path(file_to_read(given["file"], info)), unit(given.get("unit", 1.0)))
         except InputError as reason:
             raise InputError(f"seams.file = {shown(given['file'])}: {reason}") from None
         return {**rest, "lines": [*polylines(given.get("lines", ())), *(line[:, :2].tolist() for line in drawn)]}

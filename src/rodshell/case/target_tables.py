@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
-from rodshell.case.values import Angles, Coordinate, Factor, Length, Point3, Size, Table, Unit
+from rodshell.case.values import Angles, Coordinate, Factor, FileToRead, Length, Point3, Size, Table, Unit
 
 if TYPE_CHECKING:
     from rodshell.targets import Target
@@ -92,9 +92,9 @@ class HeightFieldTable(Table):
 class PlacedTable(Table):
     """Keys of every target that comes from a file."""
 
-    file: str = Field(description="path of the file; in a case file from the case file's folder")
+    file: FileToRead = Field(description="path of the file; in a case file from the case file's folder")
     base: Coordinate | None = Field(default=None, description="z of the plane at which the shell ends")
-    boundary: str | None = Field(
+    boundary: FileToRead | None = Field(
         default=None, description="OBJ or DXF file with closed curves: the shell's edge, openings"
     )
     scale: Factor = Field(default=1.0, description="factor by which it is scaled about the origin")

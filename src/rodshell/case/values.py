@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from numbers import Integral
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr
+from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr, ValidationInfo
 
 from rodshell.dataclass import dataclass
 from rodshell.units import Kind, read_quantity, require_unit_of_all, wanted
@@ -277,6 +277,20 @@ def names(value: object) -> tuple[str, ...]:
     return tuple(dict.fromkeys(item.strip() for item in items))
 
 
+def file_to_read(value: Any, info: ValidationInfo) -> Any:
+    """The path of a file, which whoever loads the case may give or refuse: see `load_case`."""
+    return value if info.context is None else info.context(value)
+
+
+def folder_to_write(value: object, info: ValidationInfo) -> object:
+    """As it is, but refused in a case that may read only some files."""
+    if info.context is not None:
+        raise ValueError("nothing is written for a case from somebody else: leave it out")
+    return value
+
+
+FileToRead = Annotated[str, BeforeValidator(file_to_read)]
+FolderToWrite = Annotated[str, BeforeValidator(folder_to_write)]
 IsoDate = Annotated[str, BeforeValidator(iso_date)]
 Length = Annotated[float, BeforeValidator(positive("length"))]
 LengthOrAuto = Annotated[float | Auto, BeforeValidator(or_auto(positive("length")))]

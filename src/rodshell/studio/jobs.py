@@ -1,16 +1,31 @@
 """Jobs of the programming interface: a case goes in, a result folder comes out."""
 
-import json
+import logging
+import os
 import secrets
 from collections import deque
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import AfterValidator
 
 from rodshell.errors import InputError
-from rodshell.studio.session import NAME, WorkerProcess
+from rodshell.studio.kept import BLOCK, NAME, Room, read_record, write_record
+from rodshell.studio.process import WorkerProcess
 from rodshell.studio.worker import News, Order
+from rodshell.untrusted import limit, raised
 
-MOST_WAITING = 100
+WAITING = 100  # jobs that wait at once
+
+
+def _status(kept: dict[str, Any]) -> dict[str, Any]:
+    """What became of a job, as it is kept."""
+    if kept.get("status") not in ("queued", "running", "done", "failed") or not isinstance(kept.get("case"), dict):
+        raise ValueError("it does not say what became of a case")
+    return kept
+
+
+STATUS = Annotated[dict[str, Any], AfterValidator(_status)]
 
 
 class Jobs:
@@ -20,16 +35,24 @@ class Jobs:
     ----------
     folder : in which each job has a folder with status.json and, when it is done, result/.
     time_limit : of a job [s].
+    room : of the server's folder.
     """
 
-    def __init__(self, folder: Path, time_limit: float) -> None:
-        self.folder, self._time_limit = folder, time_limit
+    def __init__(self, folder: Path, time_limit: float, room: Room) -> None:
+        self.folder, self._time_limit, self._room = folder, time_limit, room
         self._queue: deque[tuple[str, dict[str, Any]]] = deque()
         self._running: tuple[str, int, dict[str, Any]] | None = None
         self._serial = 0
         self._worker = WorkerProcess(self._hear)
+        room.users.append(lambda: {name for name, *_ in self._queue} | ({self._running[0]} if self._running else set()))
         for path in folder.glob("*/status.json"):  # what an earlier server left unfinished
-            status = json.loads(path.read_text(encoding="utf-8"))
+            if not NAME.fullmatch(path.parent.name):
+                continue
+            try:
+                status = read_record(path, STATUS)
+            except InputError as reason:
+                logging.getLogger(__name__).warning("a job is lost: %s", reason)
+                continue
             if status["status"] in ("queued", "running"):
                 self._queue.append((path.parent.name, status["case"]))
 
@@ -37,31 +60,42 @@ class Jobs:
         """Run what an earlier server did not finish."""
         self._next()
 
-    def add(self, case: dict[str, Any]) -> str:
+    def add(self, case: dict[str, Any], size: int) -> str:
         """Queue a case; the id of its job.
+
+        Parameters
+        ----------
+        size : of the case [bytes].
 
         Raises
         ------
-        InputError : too many jobs wait.
+        InputError : too many jobs wait, or there is no room for another.
         """
-        if len(self._queue) >= MOST_WAITING:
-            raise InputError(f"{MOST_WAITING} jobs wait already: try again later")
+        if len(self._queue) >= limit(WAITING):
+            raise InputError(
+                f"{limit(WAITING):g} jobs wait already: try again later, {raised(WAITING, len(self._queue) + 1)}"
+            )
+        self._room.make(2 * BLOCK + size)
         name = secrets.token_urlsafe(18)
         (self.folder / name).mkdir(parents=True)
-        self._write(name, {"status": "queued", "case": case})
+        write_record(self.folder / name / "status.json", {"status": "queued", "case": case})
         self._queue.append((name, case))
         self._next()
         return name
 
     def get(self, name: str) -> dict[str, Any] | None:
         """Status of a job, its result.json and the names of its files when it is done; None: there is none."""
-        path = self.folder / name / "status.json"
-        if not NAME.fullmatch(name) or not path.is_file():
+        folder = self.folder / name
+        if not NAME.fullmatch(name) or not os.path.lexists(folder / "status.json"):
             return None
-        status: dict[str, Any] = _plain_json(path)
-        result = self.folder / name / "result"
+        result = folder / "result"
+        try:
+            status: dict[str, Any] = read_record(folder / "status.json", STATUS)
+            if status["status"] == "done":
+                status["result"] = read_record(result / "result.json", dict[str, Any])
+        except InputError:
+            return {"id": name, "status": "failed", "sentence": "what was kept of this job is damaged: send it again"}
         if status["status"] == "done":
-            status["result"] = _plain_json(result / "result.json")
             status["files"] = [
                 path.relative_to(result).as_posix() for path in sorted(result.rglob("*")) if path.is_file()
             ]
@@ -89,17 +123,17 @@ class Jobs:
         if self._running is None or news.serial != self._running[1] or news.kind not in ("done", "failed"):
             return
         name, _, case = self._running
-        sentence = {} if news.kind == "done" else {"sentence": news.facts["sentence"]}
-        self._write(name, {"status": news.kind, "case": case, **sentence})
+        status = {"status": news.kind, "case": case}
+        if news.kind == "failed":
+            status["sentence"] = news.facts["sentence"].replace(f"{self.folder / name}{os.sep}", "")
+        self._write(name, status)
         self._running = None
+        self._room.forget()
         self._next()
 
     def _write(self, name: str, status: dict[str, Any]) -> None:
-        new = self.folder / name / "status.json.new"
-        new.write_text(json.dumps(status), encoding="utf-8")
-        new.replace(self.folder / name / "status.json")
-
-
-def _plain_json(path: Path) -> Any:
-    """What a file holds; null in the place of NaN and infinities, which JSON does not have but cases once held."""
-    return json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda _: None)
+        """Keep what became of a job; where that cannot be written, the next server runs it again."""
+        try:
+            write_record(self.folder / name / "status.json", status)
+        except OSError as reason:
+            logging.getLogger(__name__).warning("what became of a job is not kept: %s", reason)

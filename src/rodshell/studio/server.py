@@ -1,43 +1,43 @@
 """The studio's server: pages, sessions over WebSockets, and jobs for programs.
 
-It answers requests and passes messages on; all computing is done in other processes. Whoever reaches it from another
-machine needs its token; whoever reaches it through another site's page is refused, by the Origin and Host headers.
+It answers requests and passes messages on; all computing is done in other processes. Whoever reaches it needs its
+token; whoever reaches it through another site's page is refused, by the Origin and Host headers.
 """
 
 import asyncio
-import hmac
 import json
 import secrets
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import ExitStack, asynccontextmanager, suppress
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
-from starlette.datastructures import Headers, QueryParams
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, HTTPConnection, Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rodshell.case.keys import case_keys
-from rodshell.case.link import OUTLINES, SURFACES, UPLOAD, upload_name
+from rodshell.case.link import LARGEST, LARGEST_UPLOAD, OUTLINES, SURFACES, UPLOAD, require_small, upload_name
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.output.viewer import viewer_script, viewer_style
 from rodshell.studio.jobs import Jobs
-from rodshell.studio.session import Session, Sessions, presets, with_uploads
+from rodshell.studio.kept import Room
+from rodshell.studio.session import Session, Sessions, presets
 from rodshell.studio.worker import News
+from rodshell.untrusted import limit, raised
 
-COOKIE = "rodshell-token"
 STATIC = files("rodshell.studio").joinpath("static")
 TYPES = {".js": "text/javascript", ".css": "text/css"}
 PAGES = ("studio.js", "studio.css", "lil-gui.js", "lil-gui.css")
-LARGEST_CASE = 1_000_000  # bytes of a case as JSON
 DEEPEST = 20  # tables and lists of a case within one another
 NO_CASE = "the body must be a case as JSON, with the tables of a case file"
+OTHER_PAGE = "the page and the server are of different versions: load the page again"
+NO_TOKEN = "this server needs its token: open the address that it printed when it was started"
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "font-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -60,18 +60,22 @@ class Settings:
     ----------
     folder : in which sessions and jobs are kept.
     hosts : names, with the port, by which it may be reached.
-    token : that requests must bring; "": none is needed, for a server that only its own machine reaches.
+    token : that requests must bring; "": none is needed. once : another one, for a single request: the address that a
+        browser was started with is seen by other users of the machine.
+    key : which pages that brought a token keep in a cookie, and need no token then; default: the token.
     first : the case with which a session begins, and the files that it names.
-    time_limit : of a job [s]; largest_upload : [bytes].
+    time_limit : of a job [s]; largest_upload : [bytes], before RODSHELL_LIMITS.
     """
 
     folder: Path
     hosts: tuple[str, ...]
     token: str = ""
+    once: str = ""
+    key: str = ""
     first: dict[str, Any] | None = None
     files: dict[str, bytes] | None = None
     time_limit: float = 120.0
-    largest_upload: int = 50_000_000
+    largest_upload: float = LARGEST_UPLOAD
 
 
 def studio_app(settings: Settings) -> ASGIApp:
@@ -82,8 +86,9 @@ def studio_app(settings: Settings) -> ASGIApp:
     settings : see there.
     """
     first = settings.first or presets()["pavilion"]
-    sessions = Sessions(settings.folder / "sessions", first, settings.files or {}, settings.time_limit)
-    jobs = Jobs(settings.folder / "jobs", settings.time_limit)
+    room = Room(settings.folder)
+    sessions = Sessions(settings.folder / "sessions", first, settings.files or {}, settings.time_limit, room)
+    jobs = Jobs(settings.folder / "jobs", settings.time_limit, room)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -107,7 +112,7 @@ def studio_app(settings: Settings) -> ASGIApp:
             Route("/api/jobs/{job}", _job),
             Route("/api/jobs/{job}/files/{path:path}", _job_file),
         ],
-        exception_handlers={InputError: _refused},
+        exception_handlers={InputError: _refused, OSError: _not_kept, ClientDisconnect: _refused},
         lifespan=lifespan,
     )
     app.state.sessions, app.state.jobs, app.state.settings = sessions, jobs, settings
@@ -118,65 +123,79 @@ class _Guard:
     """Lets in who may, and adds headers that keep a page from doing what it need not."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
-        self._app, self._settings = app, settings
+        self._app, self._settings, self._once = app, settings, settings.once
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        headers, token = Headers(scope=scope), QueryParams(scope["query_string"]).get("token", "")
-        why = self._refusal(scope, headers, token)
+        client = HTTPConnection(scope)
+        cookie = f"rodshell-{(scope.get('server') or ('', ''))[1]}"  # a browser sends the cookies of all ports to each
+        why = self._refusal(client, cookie)
         if why and scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 4403, "reason": why})
             return
         if why:
-            await JSONResponse({"sentence": why}, 403, headers=HEADERS)(scope, receive, send)
+            refused: Response = JSONResponse({"sentence": why}, 403)
+            if why == NO_TOKEN and scope["path"] == "/":  # reached by a link from elsewhere: the page has its cookie
+                refused = await _page(Request(scope), 403)
+            refused.headers.update(HEADERS)
+            await refused(scope, receive, send)
             return
 
         async def answer(message: Message) -> None:
             if message["type"] == "http.response.start":
                 more = dict(HEADERS)
-                if token:
-                    more["set-cookie"] = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
+                if self._settings.token and "token" in client.query_params:
+                    key = self._settings.key or self._settings.token
+                    more["set-cookie"] = f"{cookie}={key}; HttpOnly; SameSite=Strict; Path=/"
                 message["headers"] = [*message["headers"], *((k.encode(), v.encode()) for k, v in more.items())]
             await send(message)
 
         await self._app(scope, receive, answer)
 
-    def _refusal(self, scope: Scope, headers: Headers, token: str) -> str:
+    def _refusal(self, client: HTTPConnection, cookie: str) -> str:
         """Why a request is refused; "" where it is not."""
-        host, origin = headers.get("host", ""), headers.get("origin")
-        if self._settings.hosts and host not in self._settings.hosts:
+        host, origin, settings = client.headers.get("host", ""), client.headers.get("origin"), self._settings
+        if settings.hosts and host not in settings.hosts:
             return f"this server is not called {host[:80]!r}"
-        asks = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
+        asks = client.scope["type"] == "websocket" or client.scope["method"] not in ("GET", "HEAD")
         if origin is not None and asks and origin.partition("://")[2] != host:
             return "another site's page may not use this server"
-        if not self._settings.token or scope.get("path", "").startswith("/static/"):
+        if not settings.token or client.scope["path"].startswith("/static/"):
             return ""
-        given = (
-            token or Request(scope).cookies.get(COOKIE, "") if scope["type"] == "http" else token or _cookie(headers)
-        )
-        bearer = headers.get("authorization", "").removeprefix("Bearer ")
-        if any(hmac.compare_digest(some.encode(), self._settings.token.encode()) for some in (given, bearer)):
+        token = client.query_params.get("token", "")
+        if self._once and _same(token, self._once):
+            self._once = ""
             return ""
-        return "this server needs its token: open the address that it printed when it was started"
+        bearer = client.headers.get("authorization", "").removeprefix("Bearer ")
+        if _same(token, settings.token) or _same(bearer, settings.token):
+            return ""
+        return "" if _same(client.cookies.get(cookie, ""), settings.key or settings.token) else NO_TOKEN
 
 
-def _cookie(headers: Headers) -> str:
-    pairs = (part.strip().partition("=") for part in headers.get("cookie", "").split(";"))
-    return next((value for name, _, value in pairs if name == COOKIE), "")
+def _same(given: str, wanted: str) -> bool:
+    return secrets.compare_digest(given.encode("utf-8", "replace"), wanted.encode())
 
 
 async def _refused(_: Request, error: Exception) -> Response:
     return JSONResponse({"sentence": str(error)}, 400)
 
 
+def _why_not_kept(error: Exception) -> str:
+    return f"the server cannot keep or read this ({getattr(error, 'strerror', None) or type(error).__name__})"
+
+
+async def _not_kept(_: Request, error: Exception) -> Response:
+    return JSONResponse({"sentence": _why_not_kept(error)}, 507)
+
+
 def _missing(what: str) -> Response:
     return JSONResponse({"sentence": f"there is no such {what}"}, 404)
 
 
-async def _page(_: Request) -> Response:
-    return Response(STATIC.joinpath("studio.html").read_bytes(), media_type="text/html; charset=utf-8")
+async def _page(_: Request, status: int = 200) -> Response:
+    return Response(STATIC.joinpath("studio.html").read_bytes(), status, media_type="text/html; charset=utf-8")
 
 
 async def _static(request: Request) -> Response:
@@ -200,9 +219,8 @@ async def _start(request: Request) -> Response:
     """What the page needs once: the keys of a case, the built-in cases, kinds of files, and the case to begin with."""
     keys = [vars(key) for key in case_keys().values()]
     first = request.app.state.sessions.first
-    return JSONResponse(
-        {"keys": keys, "presets": presets(), "surfaces": SURFACES, "outlines": OUTLINES, "first": first}
-    )
+    files = {"surfaces": SURFACES, "outlines": OUTLINES}
+    return JSONResponse({"keys": keys, "presets": presets(), **files, "first": first, "largest": limit(LARGEST)})
 
 
 async def _new_session(request: Request) -> Response:
@@ -216,36 +234,42 @@ def _session(request: Request | WebSocket) -> Session | None:
 
 async def _live(socket: WebSocket) -> None:
     """Orders of a page, and the news of its session."""
-    session = _session(socket)
+    await socket.accept()  # also of one that is closed at once: else the page does not hear why
+    session, news = _session(socket), asyncio.Queue[News]()
     if session is None:
         await socket.close(4404, "there is no such session")
         return
-    await socket.accept()
-    news: asyncio.Queue[News] = asyncio.Queue()
-    session.listeners.add(news.put_nowait)
-    sender = None
     try:
+        hearing = socket.app.state.sessions.hearing(session, news.put_nowait)
+    except InputError as reason:
+        await socket.close(4429, str(reason))
+        return
+    with hearing, ExitStack() as stack, suppress(WebSocketDisconnect):  # the page has gone in the middle of a message
         await _send(socket, {"kind": "session", "after": "connect", **vars(session.state)})
-        sender = asyncio.create_task(_send_news(socket, news))
-        while True:
-            message = json.loads(await socket.receive_text())
-            if error := _obey(session, message):
-                await _send(socket, {"kind": "failed", "serial": message.get("serial", 0), "sentence": error})
+        stack.callback(asyncio.create_task(_send_news(socket, news)).cancel)
+        while (received := await socket.receive())["type"] == "websocket.receive":
+            message: dict[str, Any] = {}
+            try:
+                message = _message(received)
+                _refuse_unwritable(message)
+                _obey(session, message)
+            except InputError as reason:
+                serial = message.get("serial")
+                serial = serial if isinstance(serial, int) else 0
+                await _send(socket, {"kind": "failed", "serial": serial, "sentence": str(reason)})
             if message.get("kind") == "step":
                 await _send(socket, {"kind": "session", "after": "step", **vars(session.state)})
             elif message.get("kind") == "case" and not message.get("live"):
                 await _send(socket, {"kind": "history", "at": session.state.at, "count": len(session.state.cases)})
-    except (WebSocketDisconnect, json.JSONDecodeError, RecursionError):
-        pass
-    finally:
-        session.listeners.discard(news.put_nowait)
-        if sender:
-            sender.cancel()
 
 
 async def _send(socket: WebSocket, message: dict[str, Any]) -> None:
     """As ASCII: a case that an earlier version kept may hold half of a surrogate pair, which UTF-8 does not have."""
-    await socket.send_text(json.dumps(message, allow_nan=False))
+    try:
+        text = json.dumps(message, allow_nan=False)
+    except ValueError:  # a figure is not finite
+        text = json.dumps(json.loads(json.dumps(message), parse_constant=lambda _: None))
+    await socket.send_text(text)
 
 
 async def _send_news(socket: WebSocket, news: asyncio.Queue[News]) -> None:
@@ -260,30 +284,51 @@ async def _send_news(socket: WebSocket, news: asyncio.Queue[News]) -> None:
                 await socket.send_bytes(item.content)
 
 
-def _obey(session: Session, message: dict[str, Any]) -> str:
-    """What a page asks for; why not, in a sentence."""
+def _message(received: Message) -> dict[str, Any]:
+    """What a page sent.
+
+    Raises
+    ------
+    InputError : it is not a table as JSON, or too large.
+    """
+    text = received.get("text")
+    if text is None:
+        raise InputError("a message must be text, not bytes")
+    require_small(len(text))
     try:
-        _refuse_unwritable(message)
-        match message.get("kind"):
-            case "case":
-                session.show(int(message["serial"]), dict(message["case"]), live=bool(message.get("live")))
-            case "step":
-                session.step(int(message["by"]))
-            case "keep":
-                session.keep_variant(str(message["name"]))
-            case "drop":
-                session.drop_variant(str(message["name"]))
+        message = json.loads(text)
+    except (ValueError, RecursionError):
+        raise InputError("a message must be JSON") from None
+    if not isinstance(message, dict):
+        raise InputError(OTHER_PAGE)
+    return message
+
+
+def _obey(session: Session, message: dict[str, Any]) -> None:
+    """Do what a page asks for.
+
+    Raises
+    ------
+    InputError : it cannot be done, or is nothing that a page asks for.
+    """
+    try:
+        match message:
+            case {"kind": "case", "serial": int(serial), "case": dict(case)}:
+                session.show(serial, case, live=bool(message.get("live")))
+            case {"kind": "step", "by": int(by)}:
+                session.step(by)
+            case {"kind": "keep", "name": str(name)}:
+                session.keep_variant(name)
+            case {"kind": "drop", "name": str(name)}:
+                session.drop_variant(name)
             case _:
-                return "the page and the server are of different versions: load the page again"
-    except InputError as error:
-        return str(error)
-    except (KeyError, TypeError, ValueError):
-        return "the page and the server are of different versions: load the page again"
-    return ""
+                raise InputError(OTHER_PAGE)
+    except OSError as reason:
+        raise InputError(_why_not_kept(reason)) from None
 
 
 async def _upload(request: Request) -> Response:
-    session, largest = _session(request), request.app.state.settings.largest_upload
+    session, usual = _session(request), request.app.state.settings.largest_upload
     if session is None:
         return _missing("session")
     name = upload_name(request.query_params.get("name", ""))
@@ -292,8 +337,12 @@ async def _upload(request: Request) -> Response:
         with place.open("wb") as file:
             async for chunk in request.stream():
                 size += len(chunk)
-                if size > largest:
-                    raise InputError(f"{name} is larger than {largest / 1e6:g} MB: reduce it, or use the command line")
+                if size > limit(usual):
+                    raise InputError(
+                        f"{name} is larger than {limit(usual) / 1e6:g} MB: reduce it, or use the command line, "
+                        f"{raised(usual, size)}"
+                    )
+                session.room(len(chunk))
                 file.write(chunk)
         place.replace(session.uploads / name)
     finally:
@@ -306,15 +355,12 @@ async def _files(request: Request) -> Response:
     session = _session(request)
     if session is None:
         return _missing("session")
-    news: asyncio.Queue[News] = asyncio.Queue()
-    session.listeners.add(news.put_nowait)
-    try:
+    news = asyncio.Queue[News]()
+    with request.app.state.sessions.hearing(session, news.put_nowait):
         serial = -1 - secrets.randbelow(1 << 30)
         session.files(serial)
         while (item := await news.get()).serial != serial or item.kind not in ("files", "failed"):
             pass
-    finally:
-        session.listeners.discard(news.put_nowait)
     if item.kind == "failed":
         return JSONResponse(dict(item.facts), 400)
     headers = {"content-disposition": 'attachment; filename="gridshell.zip"'}
@@ -331,8 +377,7 @@ async def _new_job(request: Request) -> Response:
     body = b""
     async for chunk in request.stream():
         body += chunk
-        if len(body) > LARGEST_CASE:
-            raise InputError(f"a case may have {LARGEST_CASE / 1e6:g} MB at most")
+        require_small(len(body))
     try:
         case = json.loads(body)
     except (ValueError, RecursionError):
@@ -341,7 +386,7 @@ async def _new_job(request: Request) -> Response:
         raise InputError(NO_CASE)
     _refuse_unwritable(case)
     jobs: Jobs = request.app.state.jobs
-    return JSONResponse({"id": jobs.add(_without_files(case))}, 202)
+    return JSONResponse({"id": jobs.add(case, len(body))}, 202)
 
 
 def _refuse_unwritable(case: dict[str, Any]) -> None:
@@ -362,11 +407,6 @@ def _parts(value: Any) -> list[Any]:
     if isinstance(value, dict):
         return list(value.values())
     return value if isinstance(value, list) else []
-
-
-def _without_files(case: dict[str, Any]) -> dict[str, Any]:
-    """The case, if it names no files: those of the server are not to be read."""
-    return with_uploads(case, {})
 
 
 async def _job(request: Request) -> Response:

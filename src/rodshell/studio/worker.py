@@ -4,25 +4,32 @@ It takes orders from a pipe and sends back what it finds as it is found: first t
 popped-up shells, then checks and verdict. While somebody drags, each order starts from the form before; the last one,
 after the release, is run as the command line runs it, from nothing.
 
-A newer order ends an older one, which a word in the pipe asks for (None): at any iteration, but while somebody drags
-only once the grid of the older one was shown, so that every order that is begun is seen.
+A newer order ends an older one, which a word in the pipe asks for (None): before it is begun or at any iteration, but
+while somebody drags only once the grid of the older one was shown, so that every order that is begun is seen.
 """
 
+import os
 import resource
 import signal
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from io import BytesIO
-from multiprocessing.connection import Connection
+from multiprocessing import parent_process
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from time import monotonic, process_time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
+from rodshell.case.link import UPLOAD
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, RodshellError
+
+if TYPE_CHECKING:
+    from rodshell.job import Job
+    from rodshell.progress import Progress
 
 TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
 PAUSE = 0.1  # s between two messages of progress at least
@@ -38,7 +45,8 @@ class Order:
     serial : numbers the orders of a session.
     kind : "form": find the form of a case; "files": the last form's files as a ZIP archive; "job": find the form and
         write its folder.
-    case : tables as in a case file.
+    case : tables as in a case file, in which "upload:NAME" stands for a file.
+    uploads : folder of the files that it may name; "": it may name none.
     live : somebody drags: start from the form before, and leave refinement and checks out.
     time_limit : of form finding [s].
     folder : of the result of a "job".
@@ -50,6 +58,7 @@ class Order:
     live: bool = False
     time_limit: float = 120.0
     folder: str = ""
+    uploads: str = ""
 
 
 @dataclass(frozen=True)
@@ -84,7 +93,8 @@ def run_worker(connection: Connection, memory: int = MEMORY) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its workers
     resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     worker = _Worker(connection)
-    threading.Thread(target=_import_all, daemon=True).start()
+    for task in (_end_with_the_server, _import_all):
+        threading.Thread(target=task, daemon=True).start()
     while True:
         try:
             order = connection.recv()
@@ -94,10 +104,36 @@ def run_worker(connection: Connection, memory: int = MEMORY) -> None:
             worker.obey(order)
 
 
+def _end_with_the_server() -> None:
+    """Also where the server was killed while an order was being obeyed."""
+    if (server := parent_process()) is not None:
+        wait([server.sentinel])
+        os._exit(1)
+
+
 def _import_all() -> None:
     """What the first order needs, before it comes."""
     import rodshell.job
     import rodshell.studio.showing  # noqa: F401
+
+
+def job_of(order: Order) -> "Job":
+    """The job of an order's case, which reads no file of the server but uploads, whatever its keys are.
+
+    Raises
+    ------
+    InputError : the case names another file, or cannot be used.
+    """
+    from rodshell.case.load import load_case
+    from rodshell.job import Job
+
+    def uploaded(value: object) -> str:
+        name = value.removeprefix(UPLOAD) if isinstance(value, str) and value.startswith(UPLOAD) else ""
+        if not (name and order.uploads and name in os.listdir(order.uploads)):
+            raise InputError("the studio reads only files that were uploaded: upload it first")
+        return str(Path(order.uploads) / name)
+
+    return Job.of_case(load_case(dict(order.case), files=uploaded))
 
 
 class _Worker:
@@ -107,6 +143,9 @@ class _Worker:
         self._preview: Any = None
 
     def obey(self, order: Order) -> None:
+        if order.kind == "form" and self._connection.poll():
+            self._send(order, "left")
+            return
         self._send(order, "taken")
         start = process_time()
         try:
@@ -117,11 +156,7 @@ class _Worker:
             self._send(order, "failed", {"sentence": str(error)})
         except MemoryError:
             self._form = None
-            self._send(
-                order,
-                "failed",
-                {"sentence": TOO_LARGE},
-            )
+            self._send(order, "failed", {"sentence": TOO_LARGE})
         except Exception as error:
             self._send(
                 order,
@@ -132,23 +167,14 @@ class _Worker:
             self._send(order, "done", {"cpu": process_time() - start})
 
     def _find(self, order: Order) -> None:
-        from rodshell.job import Job
         from rodshell.studio.preview import Preview
         from rodshell.studio.showing import checked
 
         self._preview = show = self._preview or Preview()
-        job = Job.load(dict(order.case))
+        job = job_of(order)
         plain = job.changed(refine__vary="") if job.case.refine.vary else job
-        earlier, said, shown = self._form if order.live else None, monotonic() if order.live else 0.0, False
-
-        def progress(stage: str, detail: str, residual: float) -> None:
-            nonlocal said
-            if (shown or not order.live) and self._connection.poll():
-                raise _Superseded
-            if monotonic() > said + PAUSE:
-                said = monotonic()
-                self._send(order, "progress", {"stage": stage, "detail": detail})
-
+        earlier, shown = self._form if order.live else None, False
+        progress = self._progress(order, lambda: shown or not order.live)
         grid = plain.run(warm_start=earlier, progress=progress, time_limit=order.time_limit, until="drape")
         self._show(order, "drape", *show.of(grid))
         shown = True
@@ -161,6 +187,20 @@ class _Worker:
         if not order.live:
             self._form = form = form.finished(progress)
             self._show(order, "checks", *checked(form, job))
+
+    def _progress(self, order: Order, may_leave: Callable[[], bool]) -> "Progress":
+        """Progress that is sent now and then, and leaves the order for a newer one where it may."""
+        said = monotonic() if order.live else 0.0
+
+        def progress(stage: str, detail: str, residual: float) -> None:
+            nonlocal said
+            if may_leave() and self._connection.poll():
+                raise _Superseded
+            if monotonic() > said + PAUSE:
+                said = monotonic()
+                self._send(order, "progress", {"stage": stage, "detail": detail})
+
+        return progress
 
     def _show(self, order: Order, stage: str, facts: dict[str, Any], scene: bytes) -> None:
         self._send(order, "stage", {"stage": stage, **facts}, scene)
@@ -182,9 +222,8 @@ class _Worker:
 
     def _job(self, order: Order) -> None:
         """Find a form and write its folder, as `rodshell form` does."""
-        from rodshell.job import Job
-
-        Job.load(dict(order.case)).run(time_limit=order.time_limit).save(order.folder, force=True)
+        progress = self._progress(order, lambda: False)
+        job_of(order).run(progress=progress, time_limit=order.time_limit).save(order.folder, force=True)
 
     def _send(self, order: Order, kind: str, facts: Mapping[str, Any] | None = None, content: bytes = b"") -> None:
         self._connection.send(News(order.serial, kind, facts or {}, content))

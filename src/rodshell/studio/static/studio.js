@@ -26,13 +26,12 @@ const SLIDERS = [  // key, name, and how its range follows from its value
   ["target.scale", "Scale", "factor"],
 ];
 const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["rod.material.preset", "Material"], ["drape.method", "Drape"]];
-const IDLE = ["drape.frames", "target.file", "target.boundary", "seams.file"];  // not from a page
 const TIMEOUT = 1500;  // ms after which a lost connection is tried again
 const TABS = 1000, tab = Math.floor(TABS * Math.random());  // serials modulo TABS tell which tab sent a case
 const mine = number => number % TABS === tab;
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 const isTable = value => typeof value === "object" && value !== null && !Array.isArray(value);
-const NO_CASE = "The link in the address holds no case, or is damaged or cut off: copy it again. What is shown is another case.";
+const NO_CASE = "The link in the address holds no case, or is damaged or cut off, or holds more than the studio reads: copy it again. What is shown is another case.";
 
 let start, session, socket, viewer, gui, drawn, ready = false;  // ready: the server has said what it holds
 let base = {}, resolved = null, serial = TABS * Date.now(), taken = 0, waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
@@ -182,8 +181,10 @@ function wireTools() {
 
 function post() {
   if (!waiting || !ready || socket.readyState !== WebSocket.OPEN) return;
-  socket.send(JSON.stringify(waiting));
+  const text = JSON.stringify(waiting), size = new Blob([text]).size;
   waiting = null;
+  if (size <= start.largest) socket.send(text);
+  else failed(`The case has ${short(size / 1e6)} MB, and the studio reads ${short(start.largest / 1e6)} MB at most: make it smaller`);
 }
 
 function order(message) {
@@ -195,11 +196,13 @@ function connect() {
   socket = new WebSocket(`${scheme}://${location.host}/api/sessions/${session}/live`);
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : see(data));
-  socket.onclose = ({ code }) => {
+  socket.onclose = async ({ code, reason }) => {
     ready = false;
     if (code === 4404) { localStorage.removeItem("rodshell-session"); return open(); }
-    say("The server does not answer; trying again", true);
-    setTimeout(connect, TIMEOUT);
+    const answer = code === 4429 || await fetch("/api/version").catch(() => undefined);
+    if (answer?.ok === false) return say((await answer.json()).sentence, true);  // trying again would not help
+    say(reason || "The server does not answer; trying again", true);
+    setTimeout(connect, code === 4429 ? 10 * TIMEOUT : TIMEOUT);
   };
 }
 
@@ -359,7 +362,7 @@ let typing = false, stale = false;  // while somebody types or drags in a contro
 // The keys that the page has a field for: those of a case whose tables are of these kinds.
 function keysOfCase() {
   const kinds = { target: base.target?.kind || "hemisphere", "rod.section": base.rod?.section?.kind || "circle", joint: base.joint?.kind || "ball" };
-  return start.keys.filter(key => !IDLE.includes(key.path) && (!key.kinds.length || key.kinds.includes(kinds[key.path.replace(/\.[^.]*$/, "")])));
+  return start.keys.filter(key => !key.reads_file && key.path !== "drape.frames" && (!key.kinds.length || key.kinds.includes(kinds[key.path.replace(/\.[^.]*$/, "")])));
 }
 
 function buildControls() {
@@ -713,18 +716,25 @@ async function compare() {
 async function packed(text) {
   const stream = new Blob([text]).stream().pipeThrough(new CompressionStream("deflate-raw"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
-  return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
+  return btoa(Array.from(bytes, byte => String.fromCharCode(byte)).join("")).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
 }
 
 async function unpacked(code) {
   const bytes = Uint8Array.from(atob(code.replaceAll("-", "+").replaceAll("_", "/")), letter => letter.charCodeAt(0));
-  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"))).text();
+  const reader = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw")).getReader(), parts = [];
+  let size = 0;
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    parts.push(part.value);
+    size += part.value.length;
+    if (size > start.largest) throw new RangeError();
+  }
+  return new Blob(parts).text();
 }
 
 // The case in the address; null: there is none; undefined: it cannot be read.
 async function fromAddress() {
   const code = new URLSearchParams(location.hash.slice(1)).get("case");
-  const found = code === null ? null : await unpacked(code).then(JSON.parse).catch(() => undefined);
+  const found = code === null ? null : await unpacked(code).then(JSON.parse).then(clone).catch(() => undefined);  // clone: it may nest too deep to be written
   return code === null || isTable(found) ? found : undefined;
 }
 
@@ -833,9 +843,12 @@ function wire() {
 }
 
 viewer = createViewer(byId("view"));
-start = await (await fetch("/api/start")).json();
-await openLink();
-addEventListener("hashchange", openLink);
-wire();
-wireHandles();
-await open();
+const answer = await fetch("/api/start");
+if (answer.ok) {
+  start = await answer.json();
+  await openLink();
+  addEventListener("hashchange", openLink);
+  wire();
+  wireHandles();
+  await open();
+} else notice((await answer.json()).sentence);
