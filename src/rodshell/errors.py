@@ -33,6 +33,13 @@ class OutOfTimeError(RodshellError):
     exit_code = 3
 
 
+class OutOfMemoryError(RodshellError, MemoryError):
+    """A job needs more memory than it may have."""
+
+    def __init__(self) -> None:
+        super().__init__("out of memory: use a larger spacing, a longer edge, a smaller file, or more memory")
+
+
 class ConvergenceError(RodshellError):
     """A solver did not reach its tolerance.
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr
 
 from rodshell.dataclass import dataclass
-from rodshell.units import Kind, read_quantity, require_unit_of_all, wanted
+from rodshell.units import Kind, out_of_range, read_quantity, require_unit_of_all, shown, si, wanted
 
 Auto = Literal["auto"]
 Reader = Callable[[object], float]
@@ -76,6 +76,8 @@ def positive(kind: Kind) -> Reader:
         number = read_quantity(value, kind)
         if number <= 0:
             raise ValueError(f"must be larger than zero; give {wanted(kind)}")
+        if allowed := out_of_range(number, si(kind), size=True):
+            raise ValueError(f"must be {allowed}")
         return number
 
     return read
@@ -251,7 +253,7 @@ def words(choices: Sequence[str]) -> Callable[[object], tuple[str, ...]]:
             if word not in choices:
                 near = get_close_matches(word, choices, n=1)
                 hint = f": did you mean {near[0]}?" if near else ""
-                raise ValueError(f"{word} is not one of {', '.join(choices)}{hint}")
+                raise ValueError(f"{shown(word)} is not one of {', '.join(choices)}{hint}")
         if len(set(found)) < len(found):
             raise ValueError("give each word once")
         return found
