@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rodshell.errors import InputError
-from rodshell.units import RANGES, Kind, length_text, parse_quantity, places_text, shown, si
+from rodshell.units import _KINDS, RANGES, Kind, length_text, parse_quantity, places_text, shown
 from rodshell.validation import not_negative, number, positive
 
 ROOT = Path(__file__).parent.parent
@@ -151,7 +151,7 @@ def test_a_size_has_a_range_and_a_coordinate_may_be_of_round_off(unit: str) -> N
 
 @pytest.mark.parametrize("kind", get_args(Kind))
 def test_every_kind_of_quantity_has_the_range_of_its_unit(kind: Kind) -> None:
-    most = RANGES[si(kind)][1]
+    most = RANGES[_KINDS[kind].si][1]
     if kind != "angle":  # which is reduced to one turn
         assert parse_quantity(most, kind, "key") == most
     with pytest.raises(InputError, match=r"key = .*: must be at most"):

@@ -178,8 +178,8 @@ def parse_quantity(value: object, kind: Kind, key: str) -> float:
         raise InputError(f"{key} = {shown(value)}: {reason}") from None
 
 
-def read_quantity(value: object, kind: Kind) -> float:
-    """As `parse_quantity`, but raises ValueError with the reason only: the caller adds the key.
+def read_quantity(value: object, kind: Kind, *, size: bool = False) -> float:
+    """As `parse_quantity`, but raises ValueError with the reason only: the caller adds the key. A `size` is positive.
 
     An angle of more than a full turn needs a unit, and is reduced to one turn.
     """
@@ -195,7 +195,9 @@ def read_quantity(value: object, kind: Kind) -> float:
         raise ValueError(f"not a number; give {units.wanted}")
     if not isfinite(number):
         raise ValueError(f"not finite; give {units.wanted}")
-    if allowed := out_of_range(number, units.si):
+    if size and number <= 0:
+        raise ValueError(f"must be larger than zero; give {units.wanted}")
+    if allowed := out_of_range(number, units.si, size=size):
         raise ValueError(f"must be {allowed}")
     if kind == "angle" and abs(number) > FULL_TURN:
         if not _unit_of(value):
@@ -271,11 +273,6 @@ def _mistyped(unit: str, names: Iterable[str]) -> list[str]:
     """
     alike = (name for name in reversed(list(names)) if len(name) == len(unit) > 1 and name[0] == unit[0])
     return [name for name in alike if sum(a != b for a, b in zip(name, unit, strict=True)) == 1]
-
-
-def si(kind: Kind) -> str:
-    """The SI unit of this kind, as it is written without spaces; "" of plain numbers."""
-    return _KINDS[kind].si
 
 
 def wanted(kind: Kind) -> str:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr
 
 from rodshell.dataclass import dataclass
-from rodshell.units import Kind, out_of_range, read_quantity, require_unit_of_all, shown, si, wanted
+from rodshell.units import Kind, read_quantity, require_unit_of_all, shown, wanted
 
 Auto = Literal["auto"]
 Reader = Callable[[object], float]
@@ -72,15 +72,7 @@ def quantity(kind: Kind) -> Reader:
 
 
 def positive(kind: Kind) -> Reader:
-    def read(value: object) -> float:
-        number = read_quantity(value, kind)
-        if number <= 0:
-            raise ValueError(f"must be larger than zero; give {wanted(kind)}")
-        if allowed := out_of_range(number, si(kind), size=True):
-            raise ValueError(f"must be {allowed}")
-        return number
-
-    return read
+    return lambda value: read_quantity(value, kind, size=True)
 
 
 def or_auto(reader: Callable[[object], T]) -> Callable[[object], T | str]:

@@ -241,6 +241,7 @@ def simulate(
     interruptible = flag("interruptible", interruptible)
     if not until > start:
         raise InputError(f"the motion must end after it starts, not {until - start} s later")
+    positive("the duration of the motion", until - start, "s")
     count = max(1, ceil((until - start) / step - 1e-9))
     samples = 1 + count // every
     if (size := samples * 2 * state.nbytes) > limit(RECORD):
