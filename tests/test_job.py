@@ -134,7 +134,9 @@ def test_rods_are_left_out_by_name() -> None:
     whole, rest = (each.run(until="drape") for each in (job.changed(layout__left_out=[]), job))
     names = [rod.name for rod in whole.footprint.rods]
     assert [rod.name for rod in rest.footprint.rods] == [name for name in names if name not in ("U02", "V03")]
-    with pytest.raises(InputError, match=r"layout.left_out: there is no rod U99: the rods are U01, U02, "):
+    with pytest.raises(
+        InputError, match=r'layout.left_out: there is no rod "U99": the rods are U01 to U11 and V01 to V11$'
+    ):
         job.changed(layout__left_out="U02, U99").run(until="drape")
     with pytest.raises(InputError, match=r"layout.left_out = 3: give names"):
         job.changed(layout__left_out=3)
@@ -557,3 +559,33 @@ def test_a_form_is_shown_by_the_name_of_its_case(earlier: rs.Form) -> None:
 def test_the_ready_progress_says_the_stages(capsys: pytest.CaptureFixture[str]) -> None:
     dome(pop_up__ends="pinned").run(progress=rs.bar, until="pop-up")
     assert capsys.readouterr().err.splitlines() == [f"rodshell: {stage}" for stage in ("net", "drape", "pop-up")]
+
+
+def test_a_progress_that_cannot_be_called_is_refused_before_any_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rodshell.job.Run", None)
+    for progress in (None, 1.0, "bar", [], int, lambda: None, np.zeros(3)):
+        with pytest.raises(InputError, match="progress must be a function of stage, detail and residual"):
+            rs.Job.load("hemisphere").run(progress=progress)  # type: ignore[arg-type]
+
+
+def test_a_job_without_memory_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def too_large(run: object) -> None:
+        np.empty(2**55)
+
+    monkeypatch.setattr("rodshell.run.Run.form", too_large)
+    with pytest.raises(rs.RodshellError, match="out of memory .Unable to allocate.*: give fewer rods"):
+        rs.Job.load("hemisphere").run()
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"layout.rods": "4000x4000"}, "a grid of 8000 rods; at most 5000 are joined: .*, or set RODSHELL_LIMITS=2"),
+        ({"layout.spacing": "1 um", "layout.edge": "auto"}, "the net needs more than 6\\d+ x 6\\d+ lines, .*, or set"),
+        ({"layout.edge": "1 um"}, "the net would have 7\\d+ x 7\\d+ nodes, .*, or set RODSHELL_LIMITS="),
+    ],
+)
+def test_what_would_fill_the_memory_is_counted_before_it_is_made(keys: dict[str, object], said: str) -> None:
+    whole = {"layout.rods": "auto", "layout.length": "auto"}
+    with pytest.raises(InputError, match=said):
+        rs.Job.load("hemisphere", whole | keys).run(until="drape")

@@ -84,12 +84,17 @@ def test_what_a_shell_and_a_rod_show_is_what_matters() -> None:
     assert repr(ALONE) == "ElasticRod(11 nodes, 1 m, clamped at start)"
     assert repr(ALONE.stretch) == "Stretch(blocks=(10, 2), rest_lengths=(10,), stiffness=(10,), multipliers=(10,))"
     assert repr(rs.Pin(eccentricity=0.01)) == "Pin(eccentricity=0.01)"
+    assert repr(rs.Pin(eccentricity=np.float64(0.05))) == repr(rs.Pin(eccentricity=np.array(0.05)))
+    assert repr(rs.Pin(eccentricity=np.array(0.05))) == "Pin(eccentricity=0.05)"
     assert repr(RUBBER) == "Material(youngs_modulus=1000000.0, density=1000.0)"
 
 
 GIVEN = {"EA": 1.0, "EI1": 1.0, "EI2": 1.0, "GJ": 1.0}
 WRONG = [
     (lambda: rs.Circle("1 mm"), 'section radius must be a number in m, not "1 mm"'),
+    (lambda: rs.Circle(1e-300), "section radius must be at least 1e-09 m, not 1e-300 m"),
+    (lambda: rs.Material(1e300, 1e3), r"Young's modulus must be at most 1e\+15 Pa, not 1e\+300 Pa"),
+    (lambda: rs.Material(1e6, 1e-300), "density must be at least 1e-06 kg/m3, not 1e-300 kg/m3"),
     (lambda: rs.Circle(None), "section radius must be a number in m, not None"),
     (lambda: rs.Tube(0.02, "3 mm"), 'section thickness must be a number in m, not "3 mm"'),
     (lambda: rs.Tube(0.01, 0.02), "tube thickness 0.02 m is larger than its radius 0.01 m"),
@@ -98,7 +103,10 @@ WRONG = [
     (lambda: rs.GivenSection(**GIVEN | {"GJ": "1"}), 'GJ must be a number in N m2, not "1"'),
     (lambda: rs.GivenSection(**GIVEN, mass=-1.0), "mass must be 0 or more, not -1.0 kg/m"),
     (lambda: rs.GivenSection(**GIVEN, fibre_distances=0.1), "fibre_distances must be two lengths .*, not 0.1"),
-    (lambda: rs.GivenSection(**GIVEN, fibre_distances=(0.1, "x")), 'fibre distance must be a number in m, not "x"'),
+    (
+        lambda: rs.GivenSection(**GIVEN, fibre_distances=(0.1, "x")),
+        "fibre_distances must be two lengths .*, not",
+    ),
     (lambda: rs.Material("stiff", 1e3), 'Young\'s modulus must be a number in Pa, not "stiff"'),
     (lambda: rs.Material(1e6, 1e3, "0.3"), 'Poisson\'s ratio must be a number, not "0.3"'),
     (lambda: rs.Material(1e6, 1e3, name="larsh"), 'there is no material "larsh"'),
@@ -111,7 +119,7 @@ WRONG = [
     (lambda: rs.Rigid(rest_angle="90 deg"), 'rest angle must be a number in rad, not "90 deg"'),
     (lambda: rs.Spring("stiff"), 'shear stiffness must be a number in N m/rad, not "stiff"'),
     (lambda: rs.Linker(rod=CIRCLE), "the rod of a linker must be a rodshell Rod, not a Circle"),
-    (lambda: rs.Linker(corners="2"), "2 or 4 of its corners, not in '2'"),
+    (lambda: rs.Linker(corners="2"), '2 or 4 of its corners, not in "2"'),
     (lambda: rs.ImplicitPenalty("1e6"), 'the penalty stiffness C1 must be a number in N/m, not "1e6"'),
     (lambda: rs.Shell.of(ROD, MESH), "mesh must be a rodshell GridMesh, not a Rod"),
     (lambda: rs.Shell.of(MESH, CIRCLE), "rod must be a rodshell Rod, not a Circle"),

@@ -1,13 +1,20 @@
 """Quantities with units become SI numbers, or one sentence that says what would do."""
 
 import math
+import re
+from fractions import Fraction
+from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rodshell.errors import InputError
-from rodshell.units import Kind, length_text, parse_quantity, places_text
+from rodshell.units import _KINDS, RANGES, Kind, length_text, parse_quantity, places_text, shown
+from rodshell.validation import not_negative, number, positive
+
+ROOT = Path(__file__).parent.parent
 
 
 @pytest.mark.parametrize(
@@ -125,3 +132,40 @@ def test_degrees_without_their_unit_are_no_radians(value: object, written: str) 
 )
 def test_places_on_a_way_are_named_or_counted(shares: list[float], words: str) -> None:
     assert places_text(shares) == words
+
+
+@pytest.mark.parametrize("unit", RANGES)
+def test_a_size_has_a_range_and_a_coordinate_may_be_of_round_off(unit: str) -> None:
+    least, most = RANGES[unit]
+    for size in (least, most):
+        assert positive("size", size, unit) == number("size", size, unit) == not_negative("size", size, unit) == size
+    assert number("coordinate", -1e-300, unit) == -1e-300
+    assert not_negative("size", 0, unit) == 0.0
+    for check, size, said in (
+        (positive, 0.99 * least, "at least"), (positive, 1.01 * most, "at most"), (number, 1.01 * most, "at most"),
+        (number, -1.01 * most, "at least"), (not_negative, 1.01 * most, "at most"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=f"size must be {said} .*, not "):
+            check("size", size, unit)
+
+
+@pytest.mark.parametrize("kind", get_args(Kind))
+def test_every_kind_of_quantity_has_the_range_of_its_unit(kind: Kind) -> None:
+    most = RANGES[_KINDS[kind].si][1]
+    if kind != "angle":  # which is reduced to one turn
+        assert parse_quantity(most, kind, "key") == most
+    with pytest.raises(InputError, match=r"key = .*: must be at most"):
+        parse_quantity(1.01 * most, kind, "key")
+
+
+def test_the_ranges_are_those_of_the_documentation() -> None:
+    rows = re.findall(r"\| `?([^|`]*)`? \| ([\d.e+-]+) \| ([\d.e+-]+) \|", (ROOT / "docs" / "limits.md").read_text())
+    said = {unit.replace(" ", "").replace("(none)", ""): (float(low), float(high)) for unit, low, high in rows}
+    assert said == RANGES
+
+
+def test_what_is_shown_is_short_however_long_or_deep_the_value_is() -> None:
+    itself: list[object] = []
+    itself.append(itself)
+    for value in ("x" * 10**6, [1] * 10**6, itself, {"a" * 1000: 1}, 10**5000, Fraction(10**5000, 3)):
+        assert len(shown(value)) <= 80

@@ -33,6 +33,21 @@ class OutOfTimeError(RodshellError):
     exit_code = 3
 
 
+class OutOfMemoryError(RodshellError, MemoryError):
+    """A job needs more memory than it may have.
+
+    Parameters
+    ----------
+    why : what the system said, if anything.
+    """
+
+    def __init__(self, why: object = "") -> None:
+        said = f" ({why})" if str(why) else ""
+        super().__init__(
+            f"out of memory{said}: give fewer rods, a longer edge, or a smaller file; or end other programs"
+        )
+
+
 class ConvergenceError(RodshellError):
     """A solver did not reach its tolerance.
 

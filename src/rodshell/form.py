@@ -28,7 +28,7 @@ from rodshell.layout.cells import Pattern
 from rodshell.loads.strength import net_factors
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
@@ -251,6 +251,7 @@ class Form:
     def finished(self, progress: Progress = silent) -> "Form":
         """This form, its checks and fabrication made now; a progress may end the checks early. Under loads that do not
         fit the form it is not checked: `loaded.refused` says why."""
+        require_progress(progress)
         checks = self.known_checks
         if checks is None or checks.stopped:
             checks = self._checked(progress)
@@ -435,4 +436,5 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
 
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
+    require_progress(progress)
     return check_shells(form.stages, loads, limits=form.options.limits(form.rod, loads.strength), progress=progress)

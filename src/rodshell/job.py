@@ -17,7 +17,7 @@ from rodshell.case.case import built
 from rodshell.case.from_objects import case_of, case_of_rod_ends
 from rodshell.case.load import changed_case, flattened, is_described, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
-from rodshell.errors import InputError
+from rodshell.errors import InputError, OutOfMemoryError
 from rodshell.form import Form
 from rodshell.formfinding import Bound, Method
 from rodshell.formfinding.methods import require_method
@@ -115,7 +115,8 @@ class Job:
             rotate = number("rotate", rotate, "rad")
         if options is not None:
             instance("options", options, OutputOptions)
-        for name, patch in mapping("patches", patches or {}, 'settings by the names of patches, such as "A"').items():
+        patches = {} if patches is None else patches
+        for name, patch in mapping("patches", patches, 'settings by the names of patches, such as "A"').items():
             instance("the name of each patch", name, str, "text")
             instance(f"patches {name}", patch, PatchLayout)
         case = case_of(
@@ -123,7 +124,7 @@ class Job:
             joint=joint or Ball(), method=method, anchor=anchor, rotate=rotate,
             objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
             seams=listed("seams", seams, "a list of lines, each of points x, y in m"),
-            patches=patches or {}, options=options or OutputOptions(),
+            patches=patches, options=options or OutputOptions(),
         )  # fmt: skip
         self._set(case, target, inputs_of(case))
 
@@ -267,21 +268,23 @@ class Job:
         choice("until", until, ("drape", "pop-up", "fabrication"))
         if time_limit is not None:
             time_limit = positive("time_limit", time_limit, "s", infinite=True)
-        limit = limited(progress, time_limit)
         run = Run(
             self._case,
             self._target,
             self._inputs,
             warm_start,
-            limit,
+            limited(progress, time_limit),
             announce,
-            Path(frames_in),
+            file_path("frames_in", frames_in),
             pops_up=until != "drape",
         )
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
-        with entered:
-            form = run.table_form() if self._case.of_table else run.form()
-            return form.finished(run.progress) if until == "fabrication" else form
+        try:
+            with entered:
+                form = run.table_form() if self._case.of_table else run.form()
+                return form.finished(run.progress) if until == "fabrication" else form
+        except MemoryError as error:
+            raise error if isinstance(error, OutOfMemoryError) else OutOfMemoryError(error) from None
 
     def __repr__(self) -> str:
         case = self._case

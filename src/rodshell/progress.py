@@ -10,8 +10,14 @@ from typing import Self
 
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.printed import Printed, say
+from rodshell.validation import function_of
 
 Progress = Callable[[str, str, float], None]
+
+
+def require_progress(progress: object) -> None:
+    """InputError for what cannot be called with stage, detail and residual; asked before any work begins."""
+    function_of("progress", progress, "a function of stage, detail and residual such as rodshell.bar", "", "", 0.0)
 
 
 def silent(stage: str, detail: str, residual: float) -> None:
@@ -68,5 +74,11 @@ class TimeLimit:
 
 
 def limited(progress: Progress, seconds: float | None) -> Progress:
-    """`progress` with a time limit of `seconds` [s] from now; None: no limit."""
+    """`progress` with a time limit of `seconds` [s] from now; None: no limit.
+
+    Raises
+    ------
+    InputError : it cannot be called.
+    """
+    require_progress(progress)
     return progress if seconds is None else TimeLimit(progress, seconds)

@@ -4,7 +4,7 @@ Only input and messages use this: inside, everything is in SI units.
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from difflib import get_close_matches
 from math import floor, fmod, inf, isfinite, log10, tau
@@ -49,9 +49,13 @@ class _Units:
     factors: dict[str, Decimal]
 
     @property
+    def si(self) -> str:
+        """The SI unit; "" of a plain number."""
+        return next(iter(self.factors), "")
+
+    @property
     def wanted(self) -> str:
-        si = next(iter(self.factors), "")
-        return f"{self.name} such as {self.example}" + (f", or a plain number in {si}" if si else "")
+        return f"{self.name} such as {self.example}" + (f", or a plain number in {self.si}" if self.si else "")
 
 
 def _factors(*groups: str) -> dict[str, Decimal]:
@@ -60,6 +64,7 @@ def _factors(*groups: str) -> dict[str, Decimal]:
     return {spelling: Decimal(factor) for factor, *spellings in rows for spelling in spellings}
 
 
+LONGEST = 80  # characters of a value in a message
 FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is probably in degrees, its unit forgotten
 _DEGREE = Decimal("3.14159265358979323846264338327950288") / 180
 
@@ -125,6 +130,31 @@ _KINDS: dict[Kind, _Units] = {
     "number": _Units("a plain number", "0.5", {}),
 }
 
+RANGES: dict[str, tuple[float, float]] = {
+    "m": (1e-9, 1e6),
+    "m3": (1e-27, 1e18),
+    "rad": (1e-9, 1e6),
+    "s": (1e-12, 1e9),
+    "kg": (1e-18, 1e9),
+    "kg/m": (1e-18, 1e9),
+    "kgm": (1e-30, 1e9),
+    "kg/m2": (1e-9, 1e9),
+    "kg/m3": (1e-6, 1e6),
+    "m/s2": (1e-9, 1e6),
+    "N": (1e-18, 1e18),
+    "N/m": (1e-12, 1e15),
+    "N/m2": (1e-9, 1e12),
+    "Nm": (1e-30, 1e18),
+    "Nm/rad": (1e-30, 1e18),
+    "Nm2": (1e-30, 1e18),
+    "Pa": (1.0, 1e15),
+    "K": (1e-9, 1e6),
+    "B": (1.0, 1e18),
+    "": (1e-12, 1e12),
+}
+"""The least and the most that a size of each SI unit may be, from rods of micrometres to what nobody builds: powers and
+quotients of such numbers stay numbers. Only what must be positive has a least size: a coordinate may be 1e-17 m."""
+
 NUMBER = (float, Real)  # floats first: to ask an abstract class takes ten times as long
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
@@ -149,14 +179,14 @@ def parse_quantity(value: object, kind: Kind, key: str) -> float:
         raise InputError(f"{key} = {shown(value)}: {reason}") from None
 
 
-def read_quantity(value: object, kind: Kind) -> float:
-    """As `parse_quantity`, but raises ValueError with the reason only: the caller adds the key.
+def read_quantity(value: object, kind: Kind, *, size: bool = False) -> float:
+    """As `parse_quantity`, but raises ValueError with the reason only: the caller adds the key. A `size` is positive.
 
     An angle of more than a full turn needs a unit, and is reduced to one turn.
     """
     units = _KINDS[kind]
     if isinstance(value, str):
-        match = _QUANTITY.fullmatch(value)
+        match = _matched(value)
         if match is None:
             raise ValueError(f"not a finite number; give {units.wanted}")
         number = _scaled(match[1], read_unit(match[2], kind) if match[2] else Decimal(1))
@@ -166,6 +196,10 @@ def read_quantity(value: object, kind: Kind) -> float:
         raise ValueError(f"not a number; give {units.wanted}")
     if not isfinite(number):
         raise ValueError(f"not finite; give {units.wanted}")
+    if size and number <= 0:
+        raise ValueError(f"must be larger than zero; give {units.wanted}")
+    if allowed := out_of_range(number, units.si, size=size):
+        raise ValueError(f"must be {allowed}")
     if kind == "angle" and abs(number) > FULL_TURN:
         if not _unit_of(value):
             raise ValueError(f'a plain number is in radians, and this is more than a full turn; write "{number:g} deg"')
@@ -173,9 +207,23 @@ def read_quantity(value: object, kind: Kind) -> float:
     return number
 
 
+def out_of_range(number: float, unit: str, *, size: bool = False) -> str:
+    """What a number in an SI unit may be, where it is something else (see `RANGES`): "at most 1e+06 m"; else "".
+
+    Parameters
+    ----------
+    size : whether it must be positive, so that it may also be too small.
+    """
+    least, most = RANGES.get(unit.replace(" ", ""), RANGES[""])
+    low = least if size else -most
+    if low <= number <= most:
+        return ""
+    return f"at most {most:g} {unit}".rstrip() if number > most else f"at least {low:g} {unit}".rstrip()
+
+
 def require_unit_of_all(values: Iterable[object]) -> None:
     """Raise ValueError where only some values of one text have a unit, as in "30, 40 mm"; 0 needs none."""
-    texts = [text.strip() for text in values if isinstance(text, str) and _QUANTITY.fullmatch(text)]
+    texts = [text.strip() for text in values if isinstance(text, str) and _matched(text)]
     bare = [text for text in texts if not _unit_of(text) and float(text) != 0]
     full = [text for text in texts if _unit_of(text)]
     if bare and full:
@@ -188,8 +236,13 @@ def require_unit_of_all(values: Iterable[object]) -> None:
 
 def _unit_of(value: object) -> str:
     """The unit in a text; empty without one."""
-    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+    match = _matched(value)
     return match[2] if match else ""
+
+
+def _matched(value: object) -> re.Match[str] | None:
+    """Number and unit of a text; None of anything else, and of a text longer than any quantity."""
+    return _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= LONGEST else None
 
 
 def read_unit(text: str, kind: Kind) -> Decimal:
@@ -230,17 +283,37 @@ def wanted(kind: Kind) -> str:
 
 def shown(value: object) -> str:
     """A value as it is written in a case file, on one line of at most 80 characters."""
+    text = ""
+    for part in _parts(value):
+        text += part
+        if len(text) > LONGEST:  # the rest, which may be endless, is not looked at
+            return text[: LONGEST - 3] + "..."
+    return text
+
+
+def _parts(value: object) -> Iterator[str]:
+    """What `shown` shows, piece by piece."""
     if isinstance(value, str):
-        text = '"' + visible(value.replace("\n", " ")) + '"'
+        yield '"' + visible(value[: LONGEST + 1].replace("\n", " ")) + '"'
     elif isinstance(value, bool):
-        text = str(value).lower()
+        yield str(value).lower()
     elif isinstance(value, list | tuple):
-        text = "[" + ", ".join(shown(item) for item in value) + "]"
+        yield "["
+        for n, item in enumerate(value):
+            yield ", " if n else ""
+            yield from _parts(item)
+        yield "]"
     elif isinstance(value, dict):
-        text = "{ " + ", ".join(f"{key} = {shown(item)}" for key, item in value.items()) + " }"
+        yield "{ "
+        for n, (key, item) in enumerate(value.items()):
+            yield f"{', ' if n else ''}{key} = "
+            yield from _parts(item)
+        yield " }"
     else:
-        text = str(value)
-    return text if len(text) <= 80 else text[:77] + "..."
+        try:
+            yield str(value).replace("\n", " ")
+        except ValueError:  # Python writes no integer of more than 4,300 digits
+            yield "a number of thousands of digits"
 
 
 def rounded_down(length: float) -> float:

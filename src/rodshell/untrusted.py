@@ -17,7 +17,7 @@ from rodshell.units import shown
 
 FACTOR = "RODSHELL_LIMITS"
 PATIENCE = 30.0  # s until a pipe must have given all its content
-TEXT = 20e6  # bytes of a text that people write: a case, a sweep, a table of rods
+TEXT = 20e6  # bytes of a text, such as a table of rods
 CHUNK = 1 << 20  # bytes
 
 

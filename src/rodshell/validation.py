@@ -4,19 +4,20 @@ Every check raises InputError with one sentence, which calls the argument by its
 """
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+import reprlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
+from inspect import signature
 from math import inf, isfinite
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
-from reprlib import repr as short
 from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rodshell.errors import InputError
-from rodshell.units import NUMBER, as_float, shown
+from rodshell.units import NUMBER, as_float, out_of_range, shown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
     from rodshell.arrays import Floats
 
+MOST = 10**12  # of a count
+LARGEST = 1e18  # of the numbers in an array, whatever their unit: see `units.RANGES`
 Choice = TypeVar("Choice", bound=str)
 _Scalar = TypeVar("_Scalar", bound="np.generic")
 
@@ -46,7 +49,7 @@ def instance(name: str, value: object, kind: type | UnionType, wanted: str = "")
 def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
     """Return `value` if it is one of the words in `choices`; the message suggests the closest of them."""
     for word in choices:
-        if value == word:
+        if isinstance(value, str) and value == word:  # an array is compared with none
             return word
     raise InputError(not_a_choice(name, value, choices))
 
@@ -80,38 +83,51 @@ def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice
 
 
 def number(name: str, value: object, unit: str = "") -> float:
-    """Return `value`, a finite number, as a float; `unit` is named in the message ("" for a plain number)."""
+    """Return `value`, a finite number in the range of its SI unit (`units.RANGES`), as a float; the message names both.
+
+    Parameters
+    ----------
+    unit : "" for a plain number.
+    """
     real = _real(name, value, unit)
-    if not isfinite(real):
-        raise InputError(f"{name} must be finite, not {described(value)}{unit and ' ' + unit}")
-    return real
+    wanted = out_of_range(real, unit) if isfinite(real) else "finite"
+    return _allowed(name, value, unit, real, wanted)
 
 
 def positive(name: str, value: object, unit: str = "", *, infinite: bool = False) -> float:
     """Return `value`, a number above 0, as a float; infinity only where it is allowed; see `number`."""
     real = _real(name, value, unit)
-    if not 0 < real <= inf or (real == inf and not infinite):
-        raise InputError(f"{name} must be positive, not {described(value)}{unit and ' ' + unit}")
-    return real
+    if real == inf and infinite:
+        return real
+    wanted = out_of_range(real, unit, size=True) if 0 < real < inf else "positive"
+    return _allowed(name, value, unit, real, wanted)
 
 
 def not_negative(name: str, value: object, unit: str = "", *, infinite: bool = False) -> float:
     """Return `value`, a number of 0 or more, as a float; infinity only where it is allowed; see `number`."""
     real = _real(name, value, unit)
-    if not 0 <= real <= inf or (real == inf and not infinite):
-        raise InputError(f"{name} must be 0 or more, not {described(value)}{unit and ' ' + unit}")
+    if real == inf and infinite:
+        return real
+    wanted = out_of_range(real, unit) if 0 <= real < inf else "0 or more"
+    return _allowed(name, value, unit, real, wanted)
+
+
+def _allowed(name: str, value: object, unit: str, real: float, wanted: str) -> float:
+    """Return `real`, unless it is `wanted` to be otherwise."""
+    if wanted:
+        raise InputError(f"{name} must be {wanted}, not {described(value)}{unit and ' ' + unit}")
     return real
 
 
-def whole(name: str, value: object, least: int, most: int | None = None) -> int:
-    """Return `value`, a whole number from `least` to `most` (None: no limit), as an int."""
+def whole(name: str, value: object, least: int, most: int = MOST) -> int:
+    """Return `value`, a whole number from `least` to `most`, as an int."""
+    value = _plain(value)
     if isinstance(value, Integral) and not isinstance(value, bool):
         given = int(value)
-        if least <= given and (most is None or given <= most):
+        if least <= given <= most:
             return given
-    wanted = f"of {least} or more" if most is None else f"{least} to {most}"
-    separator = " " if most is None else ", "
-    raise InputError(f"{name} must be a whole number{separator}{wanted}, not {described(value)}")
+    wanted = f" of {least} or more" if most == MOST else f", {least} to {most}"
+    raise InputError(f"{name} must be a whole number{wanted}, not {described(value)}")
 
 
 def flag(name: str, value: object) -> bool:
@@ -162,8 +178,8 @@ def mapping(name: str, value: object, wanted: str) -> Mapping[Any, Any]:
     return value
 
 
-def numbers(name: str, value: object, wanted: str, count: int) -> tuple[float, ...]:
-    """Return `value` as a tuple of finite floats.
+def numbers(name: str, value: object, wanted: str, count: int, unit: str = "") -> tuple[float, ...]:
+    """Return `value` as a tuple of finite floats in the range of their SI unit; see `number`.
 
     Parameters
     ----------
@@ -171,11 +187,13 @@ def numbers(name: str, value: object, wanted: str, count: int) -> tuple[float, .
     value : a sequence or an array.
     wanted : what it must be, in words, such as "two finite numbers x, y in m".
     count : how many numbers.
+    unit : of each; "" for plain numbers.
     """
-    given: Any = value if hasattr(value, "__len__") and not isinstance(value, str | bytes | dict) else ()
+    single = not hasattr(value, "__len__") or isinstance(value, str | bytes | dict) or getattr(value, "ndim", 1) == 0
+    given: Any = () if single else value
     if len(given) != count or not all(_is_finite(item) for item in given):
         raise InputError(f"{name} must be {wanted}, not {short(value)}")
-    return tuple(float(item) for item in given)
+    return tuple(number(name, item, unit) for item in given)
 
 
 def _real(name: str, value: object, unit: str) -> float:
@@ -192,8 +210,17 @@ def _plain(value: Any) -> Any:
 
 def point(name: str, value: object) -> tuple[float, float]:
     """Return a pair of finite numbers [m] as floats."""
-    x, y = numbers(name, value, "two finite numbers x, y in m", 2)
+    x, y = numbers(name, value, "two finite numbers x, y in m", 2, "m")
     return x, y
+
+
+def function_of(name: str, value: object, wanted: str, *example: object, **named: object) -> None:
+    """Refuse what cannot be called with arguments as in this example; `wanted` is what it must be, in words."""
+    try:
+        signature(value).bind(*example, **named)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        found = "one of other arguments" if callable(value) else described(value)
+        raise InputError(f"{name} must be {wanted}, not {found}") from None
 
 
 def is_auto(value: object) -> bool:
@@ -243,11 +270,13 @@ def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
         array = np.asarray(given, dtype=float)
         if array.shape != shape:
             array = np.broadcast_to(array, shape)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         wanted = "one number" if not shape else f"numbers of the shape {shape}"
         raise InputError(f"{name} must be {wanted}, not {short(given)}") from None
-    if not np.isfinite(array).all():
-        raise InputError(f"{name} must be finite, not {short(given)}")
+    if not (allowed := np.abs(array) <= LARGEST).all():
+        where = np.argwhere(~allowed)[0].tolist()
+        wanted = f"at most {LARGEST:g}" if np.isfinite(value := array[tuple(where)]) else "finite"
+        raise InputError(f"{name} must be {wanted}, not {value}{f' at {where}' if where else ''}")
     return array
 
 
@@ -269,7 +298,7 @@ def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None
         if result.size and result.dtype.kind not in ("iu" if whole else "fiu"):  # np.asarray([]) is an array of floats
             raise TypeError
         result = result.astype(kind, copy=False)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         what = "integers" if whole else "numbers"
         raise InputError(f"{name} must be {what} of the shape ({wanted}), not {short(given)}") from None
     if result.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, result.shape, strict=True)):
@@ -281,7 +310,11 @@ def vector(name: str, given: "ArrayLike") -> "Floats":
     """Return `given` as an array (3,) of finite numbers."""
     import numpy as np
 
-    if np.shape(given) != (3,):
+    try:
+        shape = np.shape(given)
+    except ValueError:  # rows of several lengths, or without end
+        shape = ()
+    if shape != (3,):
         raise InputError(f"{name} must be three numbers (x, y, z), not {short(given)}")
     return finite(name, given, 3)
 
@@ -308,6 +341,34 @@ def described(value: object) -> str:
         return shown(value)
     name = type(value).__name__
     return "None" if value is None else f"a{'n' * (name[0] in 'AEIOUaeiou')} {name}"
+
+
+def short(value: object) -> str:
+    """A value as Python shows it, on one line and shortened."""
+    try:
+        text = reprlib.repr(value)
+    except ValueError:
+        text = shown(value)  # of thousands of digits
+    return " ".join(text.split())
+
+
+def keep(record: Any, check: Callable[..., object], unit: str, *names: str, what: str = "{}", **options: Any) -> None:
+    """Check numbers of a frozen dataclass in its `__post_init__`, and keep them as Python's floats.
+
+    Parameters
+    ----------
+    record : the dataclass; a field with the default None may be None.
+    check : `number`, `positive` or `not_negative`.
+    unit : of the numbers.
+    names : of the fields.
+    what : what messages call a field, with {} for its name.
+    options : of `check`.
+    """
+    optional = {field.name for field in fields(record) if field.default is None}
+    for name in names:
+        value = getattr(record, name)
+        if value is not None or name not in optional:
+            object.__setattr__(record, name, check(what.format(name), value, unit, **options))
 
 
 def brief(record: Any) -> str:

@@ -5,6 +5,7 @@ from math import cos, pi, tau
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rodshell.case import BUILT_IN, Case, case_keys, load_case
@@ -525,3 +526,18 @@ def test_each_key_has_one_line_of_help() -> None:
     for key in case_keys().values():
         assert key.help
         assert len(key.help) < 70, key
+
+
+def test_strengths_and_stabilities_without_loads_are_written_too(load: Any) -> None:
+    keys = {"strength.permanent": "20 MPa", "stability.modes": 2, "locked_joints.shear": 5}
+    case = load_case("hemisphere", keys)
+    assert load(case.to_toml()) == case
+    assert "[strength]" not in load_case("hemisphere").to_toml()
+
+
+def test_arrays_do_in_place_of_lists() -> None:
+    given = {"layout.spacing": np.array([0.03, 0.04]), "layout.edge": np.float64(0.002)}
+    same = {"layout.spacing": [0.03, 0.04], "layout.edge": 0.002}
+    assert load_case("hemisphere", given) == load_case("hemisphere", same)
+    with pytest.raises(InputError, match=r"target.kind must be .*, not a list"):
+        load_case({"target": {"kind": np.zeros(3)}})

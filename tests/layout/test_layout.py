@@ -538,3 +538,9 @@ def test_a_rod_that_is_no_line_is_refused(rod, said):
 
 def test_no_rods_make_an_empty_grid():
     assert len(FlatGrid.of([]).rods) == 0
+
+
+def test_a_mesh_of_too_many_edges_is_counted_before_it_is_made():
+    cross = straight_rods([[(-1.0, 0.0), (1.0, 0.0)], [(0.0, -1.0), (0.0, 1.0)]])
+    with pytest.raises(InputError, match=r"the grid would have 40\d+ edges of 0.0001 mm: .* such as 20 mm, or set"):
+        mesh_grid(cross, 1e-7)

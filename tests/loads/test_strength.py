@@ -234,7 +234,7 @@ def test_a_strength_of_rods_without_fibres_is_refused_in_one_sentence() -> None:
     ("make", "message"),
     [
         (lambda: rs.Strength(short=-1.0), "must be"),
-        (lambda: rs.Strength(service_class=4), "the service class must be 1, 2 or 3, not 4"),
+        (lambda: rs.Strength(service_class=4), "the service class must be a whole number, 1 to 3, not 4"),
         (lambda: Limits.of(TUBE, rs.Strength(service_class=2)), "only the strengths of timber presets depend on it"),
         (lambda: net_section(TIMBER.section, 0.05), "leaves nothing of the rod"),
         (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={"a": {"b": 1.0}}, durations={"c": "long"}), '"c"'),

@@ -822,12 +822,14 @@ def test_too_many_nodes_are_refused_before_any_is_marched_and_the_remedy_does(mo
             chebyshev_net(ROOF, GridLayout.orthogonal(spacing=0.5, edge=0.005))
     said = str(caught.value)
     assert re.search(r"have 3\d\d\d x 2\d\d\d nodes, with edges of 5 mm on a target 12 m wide: check its unit", said)
-    assert said.endswith('set layout.edge = "auto" (83.3 mm here)')
+    assert said.endswith('set layout.edge = "auto" (83.3 mm here), or set RODSHELL_LIMITS=2 to allow it')
     net = chebyshev_net(ROOF, GridLayout.orthogonal(spacing=0.5, edge="auto"))
     assert net.layout.edge == pytest.approx(0.0833, rel=1e-3)
 
 
 def test_too_many_lines_ask_for_the_unit_and_name_a_spacing_that_does() -> None:
-    with pytest.raises(InputError, match=r"30 mm apart on a target 400 m wide: check its unit, or .* such as 25 m$"):
+    with pytest.raises(
+        InputError, match=r"30 mm apart on a target 400 m wide: check its unit, use .* such as 25 m, or set"
+    ):
         chebyshev_net(Hemisphere(200.0), GridLayout.orthogonal(spacing=0.03))
     assert len(chebyshev_net(Hemisphere(200.0), GridLayout.orthogonal(spacing=25.0)).rods) > 30

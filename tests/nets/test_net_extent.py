@@ -203,7 +203,7 @@ def test_a_line_is_continued_from_the_nodes_that_hang_together_with_its_origin()
 )
 def test_from_line_to_line_there_are_an_even_number_of_equal_steps_and_at_least_six(edge, steps):
     lines = np.array([-1.0, 0.0, 0.25, 2.25])
-    nodes = net_extent._subdivided(lines, edge)
+    nodes = net_extent._divided(lines, net_extent._steps(lines, edge))
     expected = [
         low + (high - low) * k / n for low, high, n in zip(lines, lines[1:], steps, strict=False) for k in range(n)
     ]

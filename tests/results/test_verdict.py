@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from rodshell.errors import InputError
 from rodshell.results import Results, Verdict
 from rodshell.results.summary import summary_text
 from rodshell.results.verdict import facts, verdict, verdict_of
@@ -531,3 +532,11 @@ def test_dips_are_no_cause_where_joints_hold_the_net() -> None:
 def test_guiding_is_no_part_of_what_is_known_of_the_strength() -> None:
     (said,) = [fact for fact in facts(changed(("deployment.guided", [0.77, 1.0]))) if "strength" in fact]
     assert said.endswith("the stress while the shell is guided from 77 % to 100 % is not known.")
+
+
+def test_a_verdict_or_a_result_of_wrong_values_is_refused_in_a_sentence():
+    with pytest.raises(InputError, match=r"Verdict: level cannot be 'fine': Input should be 'good'") as caught:
+        Verdict(level="fine", reasons=("It stands.",))
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match=r"Results: status cannot be 3: it must be a text"):
+        Results(status=3)

@@ -540,7 +540,7 @@ def test_what_is_not_finite_is_refused_loudly():
     rod = straight(5)
     bad = rod.state()
     bad[2, 1] = np.nan
-    with pytest.raises(rs.InputError, match=r"state is nan at \[2, 1\]"):
+    with pytest.raises(rs.InputError, match=r"the state must be finite, not nan at \[2, 1\]"):
         rs.simulate(rs.Motion.of(rod), bad, until=1.0, step=0.1)
 
     def wind(time, state, velocity):
@@ -559,10 +559,21 @@ def implicit_on(block):
     [
         ({"step": 0.0}, "step must be positive"),
         ({"until": -1.0}, "must end after it starts"),
-        ({"until": np.nan}, "must end after it starts"),
-        ({"every": 0}, "not every 0"),
-        ({"halvings": -1}, "halved"),
-        ({"velocity": np.zeros((2, 3))}, "velocity has the shape"),
+        ({"until": np.nan}, "until must be finite"),
+        ({"until": "1 s"}, 'until must be a number in s, not "1 s"'),
+        (
+            {"step": 1e-9},
+            r"1000000001 samples of this motion take .* GB: use a larger step, .*, or set RODSHELL_LIMITS=",
+        ),
+        ({"velocity": "x"}, "the velocity must be numbers of the shape"),
+        ({"progress": 3}, "progress must be a function of a sample, not 3"),
+        ({"stop": lambda: True}, "stop must be a function of a sample, not one of other arguments"),
+        ({"stepper": np.zeros(3)}, "stepper.take must be a function of motion, state, velocity, time and step"),
+        ({"stream": 5}, "stream must be the path of a file, not 5"),
+        ({"interruptible": "no"}, 'interruptible must be True or False, not "no"'),
+        ({"every": 0}, "every must be a whole number of 1 or more, not 0"),
+        ({"halvings": -1}, "halvings must be a whole number, 0 to 50, not -1"),
+        ({"velocity": np.zeros((2, 3))}, "velocity must have the shape"),
         ({"forces": (rs.PointLoads.on(99, 1.0),)}, "block 99"),
         ({"forces": (implicit_on(99),)}, "block 99"),
         ({"forces": (rs.Damping(coefficients=np.ones((2, 2))),)}, "damping coefficients"),

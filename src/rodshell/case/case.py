@@ -115,8 +115,10 @@ class Case(Table):
                     f"no case file can describe {held.what} ({name}): keep the Python that makes it, or save the form"
                 )
             notes += [f"# {held.note}\n"] if held.note else []
-        idle = {"locked_joints", "stability", "strength"} if not self.loads else set[str]()
-        idle |= {"bracing"} if self.bracing.kind == "none" else set()
+        idle = {"bracing"} if self.bracing.kind == "none" else set[str]()
+        if not self.loads:
+            unset = {"locked_joints": LockedJointsTable(), "stability": StabilityTable(), "strength": StrengthTable()}
+            idle |= {name for name, table in unset.items() if getattr(self, name) == table}
         return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True, exclude=idle))
 
     def text(self) -> str:

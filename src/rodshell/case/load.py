@@ -17,7 +17,8 @@ from rodshell.case.keys import BY_KIND, case_keys, case_tables, file_keys, not_a
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
 from rodshell.units import shown
-from rodshell.validation import instance
+from rodshell.untrusted import limit, raised, read_text
+from rodshell.validation import file_path, instance
 
 Raw = dict[str, Any]
 
@@ -68,7 +69,15 @@ UNDESCRIBED_BEFORE = (
 )
 """The one comment that earlier versions kept in place of a case with `UNDESCRIBED`."""
 
-NOT_A_WORD = "the keys of a case are words such as target.radius, not {!r}"
+TEXT = 2e6  # bytes of a case; tomllib takes about 1 us and 50 bytes for each
+DEEPEST = 10  # tables and lists within each other: points of a line of a load in a row take seven
+LONGEST_KEY = 200  # characters
+MOST_KEYS = 1000  # of one table
+TOO_DEEP = f"tables or lists are within each other more than {DEEPEST} deep: a case has none such"
+MANY_DOTS = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""")
+"""A dotted key of more than a hundred tables, for which tomllib takes memory by the square of their number."""
+
+NOT_A_WORD = "the keys of a case are words such as target.radius, not {}"
 
 
 class RenamedKeyWarning(FutureWarning):
@@ -99,7 +108,7 @@ def load_case(
     InputError : no such case or file, not TOML, an unknown key, a value that cannot be used, the case of an object that
         no case file can describe; in one sentence.
     """
-    overrides = dict(overrides or {})
+    overrides = dict(_plain(overrides or {}))
     raw = _raw_of(source)
     if UNDESCRIBED in raw:
         what = raw[UNDESCRIBED]
@@ -107,7 +116,11 @@ def load_case(
             f"this case cannot be run again: no case file can describe {what}: keep the Python that makes it"
         )
     raw = {**deepcopy(dict(otherwise or {})), **raw}
-    if str(source) in BUILT_IN and {"seams.lines", "seams.file"} & overrides.keys():
+    if (
+        isinstance(source, str | PathLike)
+        and str(source) in BUILT_IN
+        and {"seams.lines", "seams.file"} & overrides.keys()
+    ):
         for key in ("rods", "length"):  # of the whole; what seams cut has them from its patches
             raw.get("layout", {}).pop(key, None)
     return _validated(raw, overrides, files)
@@ -136,7 +149,7 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
                 "another object"
             )
     tables = case.model_dump(exclude_none=True, exclude=set(held))
-    changed = _validated(tables, dict(overrides))
+    changed = _validated(tables, _plain(dict(overrides)))
     return changed.model_copy(update={name: getattr(case, name) for name in held})
 
 
@@ -156,7 +169,7 @@ def flattened(changes: Mapping[str, object]) -> dict[str, object]:
     def leaves(prefix: str, table: Mapping[str, object]) -> Iterator[tuple[str, object]]:
         for name, value in table.items():
             if not isinstance(name, str):
-                raise InputError(NOT_A_WORD.format(name))
+                raise InputError(NOT_A_WORD.format(shown(name)))
             path = prefix + name.replace("__", ".")
             if isinstance(value, Mapping) and path in case_tables():
                 yield from leaves(f"{path}.", value)
@@ -222,11 +235,11 @@ def _read_loads(raw: Raw, overrides: dict[str, object]) -> None:
     name = overrides.get("loads")
     if not isinstance(name, str | PathLike):
         return
-    wanted = "give a TOML file with [[loads]] and [[combinations]]"
-    if not Path(name).is_file():
+    path, wanted = file_path("loads", name), "give a TOML file with [[loads]] and [[combinations]]"
+    if not path.exists():
         raise InputError(f"loads = {shown(str(name))}: there is no such file: {wanted}")
     del overrides["loads"]
-    given = _raw_of(Path(name))
+    given = _read(path)
     for key in given:
         if key not in LOAD_TABLES:
             raise InputError(f"{name} has {shown(key)}, which no file of loads has: it has {', '.join(LOAD_TABLES)}")
@@ -281,15 +294,16 @@ def _raw_of(source: "str | PathLike[str] | Mapping[str, object] | None") -> Raw:
     if source is None:
         return {}
     if isinstance(source, Mapping):
-        return _nested(source)
+        return _nested(_plain(source))
     instance("the case", source, str | PathLike, "the name of a built-in case, a path, text, or a mapping")
-    name, path = str(source), Path(source)
+    name = str(source)
     if not name.strip():
         raise InputError(f"the name of the case is empty: give a case file, a surface, or one of {', '.join(BUILT_IN)}")
     if name in BUILT_IN:
         return {"target": {"kind": name}, **deepcopy(BUILT_IN[name])}
-    if isinstance(source, str) and ("\n" in source or ("=" in source and not path.exists())):
+    if isinstance(source, str) and ("\n" in source or ("=" in source and not _is_path(source))):
         return _parsed("the text", source)
+    path = file_path("the case", source)
     if kind := BY_SUFFIX.get(path.suffix.lower()):
         return {"target": {"kind": kind, "file": name}}
     if path.is_dir():
@@ -298,20 +312,25 @@ def _raw_of(source: "str | PathLike[str] | Mapping[str, object] | None") -> Raw:
         near = get_close_matches(name, BUILT_IN, n=1)
         hint = f"did you mean {near[0]}?" if near else f"give a case file, a surface, or one of {', '.join(BUILT_IN)}"
         raise InputError(f"there is no case and no file named {shown(name)}: {hint}")
+    return _from_its_folder(path, _read(path))
+
+
+def _is_path(text: str) -> bool:
+    """Whether there is such a file or folder."""
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as reason:
-        raise InputError(f"{name} cannot be read: {reason.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(_unknown_type(path) or f"{name} is not text in UTF-8: save it as UTF-8") from None
-    return _from_its_folder(path, _parsed(name, text, _unknown_type(path)))
+        return file_path("the case", text).exists()
+    except InputError:
+        return False
+
+
+def _read(path: Path) -> Raw:
+    """The tables of a case file."""
+    wrong_type = _unknown_type(path)
+    return _parsed(str(path), read_text(path, TEXT, instead=wrong_type or "save it as UTF-8"), wrong_type)
 
 
 def _parsed(name: str, text: str, wrong_type: str = "") -> Raw:
-    try:
-        raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as reason:
-        raise InputError(wrong_type or f"{name} is not valid TOML: {reason}") from None
+    raw: Raw = _plain(toml_of(name, text, wrong_type))
     if not raw:
         for comment in UNDESCRIBED_BEFORE:
             if found := comment.fullmatch(text.strip()):
@@ -319,12 +338,61 @@ def _parsed(name: str, text: str, wrong_type: str = "") -> Raw:
     return raw
 
 
+def toml_of(name: str, text: str, wrong_type: str = "") -> dict[str, Any]:
+    """The tables of a text; `tomllib` is given none that it would take minutes or gigabytes for.
+
+    Parameters
+    ----------
+    name : of the text, for messages.
+    wrong_type : what is wrong with a file of this name, if anything.
+
+    Raises
+    ------
+    InputError : it is too large, or no TOML.
+    """
+    if len(text) > limit(TEXT):
+        raise InputError(f"{name} has more than {limit(TEXT) / 1e6:g} MB: shorten it, {raised(TEXT, len(text))}")
+    if MANY_DOTS.search(text):
+        raise InputError(f"{name} has a key of more than a hundred tables: the keys of a case have three at most")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as reason:
+        raise InputError(f"{name}: {wrong_type}" if wrong_type else f"{name} is not valid TOML: {reason}") from None
+    except ValueError:  # of Python's int
+        raise InputError(f"{name} has an integer of thousands of digits: write numbers such as 0.2 or 1e6") from None
+    except RecursionError:
+        raise InputError(TOO_DEEP) from None
+
+
+def _plain(value: Any, depth: int = 0) -> Any:
+    """A value as TOML gives it, NumPy's arrays as lists.
+
+    Raises
+    ------
+    InputError : tables and lists within each other, or keys, beyond what any case has: they would cost minutes.
+    """
+    if depth > DEEPEST:
+        raise InputError(TOO_DEEP)
+    if hasattr(value, "dtype") and not isinstance(value, type):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        items = (_plain(item, depth + 1) for item in value)
+        return tuple(items) if isinstance(value, tuple) else [*items]
+    if not isinstance(value, Mapping):
+        return value
+    if len(value) > MOST_KEYS:
+        raise InputError(f"a table has {len(value)} keys; at most {MOST_KEYS} are read: leave some out")
+    if long := next((key for key in value if isinstance(key, str) and len(key) > LONGEST_KEY), None):
+        raise InputError(f"unknown key {shown(long)}: it has {len(long)} characters")
+    return {key: _plain(item, depth + 1) for key, item in value.items()}
+
+
 def _nested(mapping: Mapping[str, object]) -> Raw:
     """A mapping as TOML gives it: tables in tables, where a key may also have dots."""
     raw: Raw = {}
     for path, value in mapping.items():
         if not isinstance(path, str):
-            raise InputError(NOT_A_WORD.format(path))
+            raise InputError(NOT_A_WORD.format(shown(path)))
         table, _, name = path.rpartition(".")
         inner = _table(raw, table) if table else raw
         if not isinstance(inner, dict):
@@ -332,7 +400,7 @@ def _nested(mapping: Mapping[str, object]) -> Raw:
         if isinstance(value, Mapping):
             inner[name] = {**inner.get(name, {}), **_nested(value)}
         else:
-            inner[name] = deepcopy(value)
+            inner[name] = value
     return raw
 
 
@@ -340,7 +408,7 @@ def _unknown_type(path: Path) -> str:
     """What is wrong with a file that holds no case, if its name does not say that it does."""
     if path.suffix.lower() in ("", CASE_FILE):
         return ""
-    return f"{path}: unknown file type {path.suffix}; use {FILES}"
+    return f"unknown file type {path.suffix}; use {FILES}"
 
 
 def _wanted_in(folder: Path) -> str:

@@ -1,7 +1,7 @@
 """The tables of a case's stages: layout, drape, pop-up, seams, checks, fabrication and drawings."""
 
 from math import pi
-from pathlib import Path, PureWindowsPath
+from pathlib import PureWindowsPath
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
@@ -40,6 +40,7 @@ from rodshell.case.values import (
 )
 from rodshell.errors import InputError
 from rodshell.units import rounded_down, shown
+from rodshell.validation import file_path
 
 if TYPE_CHECKING:
     from rodshell.formfinding.methods import Method
@@ -237,7 +238,7 @@ class SeamsTable(Table):
 
         rest = {key: value for key, value in given.items() if key not in ("file", "unit")}
         try:
-            drawn = read_lines(Path(file_to_read(given["file"], info)), unit(given.get("unit", 1.0)))
+            drawn = read_lines(file_path("the file", file_to_read(given["file"], info)), unit(given.get("unit", 1.0)))
         except InputError as reason:
             raise InputError(f"seams.file = {shown(given['file'])}: {reason}") from None
         return {**rest, "lines": [*polylines(given.get("lines", ())), *(line[:, :2].tolist() for line in drawn)]}

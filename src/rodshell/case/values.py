@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr, ValidationInfo
 
 from rodshell.dataclass import dataclass
-from rodshell.units import Kind, read_quantity, require_unit_of_all, wanted
+from rodshell.units import Kind, read_quantity, require_unit_of_all, shown, wanted
 
 Auto = Literal["auto"]
 Reader = Callable[[object], float]
@@ -72,13 +72,7 @@ def quantity(kind: Kind) -> Reader:
 
 
 def positive(kind: Kind) -> Reader:
-    def read(value: object) -> float:
-        number = read_quantity(value, kind)
-        if number <= 0:
-            raise ValueError(f"must be larger than zero; give {wanted(kind)}")
-        return number
-
-    return read
+    return lambda value: read_quantity(value, kind, size=True)
 
 
 def or_auto(reader: Callable[[object], T]) -> Callable[[object], T | str]:
@@ -251,7 +245,7 @@ def words(choices: Sequence[str]) -> Callable[[object], tuple[str, ...]]:
             if word not in choices:
                 near = get_close_matches(word, choices, n=1)
                 hint = f": did you mean {near[0]}?" if near else ""
-                raise ValueError(f"{word} is not one of {', '.join(choices)}{hint}")
+                raise ValueError(f"{shown(word)} is not one of {', '.join(choices)}{hint}")
         if len(set(found)) < len(found):
             raise ValueError("give each word once")
         return found

@@ -19,7 +19,7 @@ from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.model.shell import UP
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.load_path import MOST_FACTORIZATIONS
@@ -192,7 +192,8 @@ def check(
         instance(f"the shell with {ends} ends", shape, PopUp, "what rodshell.pop_up returned")
     instance("rod", rod, Rod)
     whole("stages", stages, 0, MOST_STAGES)
-    positive("shear_weight", shear_weight)
+    shear_weight = positive("shear_weight", shear_weight)
+    require_progress(progress)
     done = {ends: _settled(shape) for ends, shape in popped.items() if shape.report.converged}
     checks = Checks(
         bending={

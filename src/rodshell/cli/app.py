@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from rodshell.cli.interruption import Interrupted
-from rodshell.errors import InputError, OutOfTimeError, OutputWarning, RodshellError
+from rodshell.errors import InputError, OutOfMemoryError, OutOfTimeError, OutputWarning, RodshellError
 from rodshell.printed import say
 
 COMMANDS = {
@@ -24,9 +24,6 @@ COMMANDS = {
     "warmup": "Compile all kernels in advance, once.",
     "paper": "Compute a figure of the paper again, with the errors.",
 }
-
-
-LESS_MEMORY = "give fewer rods or a larger layout.edge, or end other programs; ulimit -v says what a process may take"
 
 
 class LazyGroup(click.Group):
@@ -130,7 +127,7 @@ def failed(error: BaseException) -> int:
     if isinstance(error, click.ClickException):
         return _fail(error.format_message(), 2)
     if isinstance(error, MemoryError):
-        return _fail(f"out of memory{f' ({error})' if str(error) else ''}: {LESS_MEMORY}", 2)
+        return _fail(str(OutOfMemoryError(error)), 2)
     if isinstance(error, OSError):
         return _fail(f"{error.filename or 'the system'}: {error.strerror or error}", 2)
     raise error

@@ -14,7 +14,7 @@ from rodshell.layout.flatgrid import layers
 from rodshell.rods.section import Rod
 from rodshell.rods.varied import varied
 from rodshell.units import length_text
-from rodshell.validation import array, flag, instance, not_negative, number, positive
+from rodshell.validation import array, flag, instance, keep, not_negative, number, positive
 
 SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
 
@@ -46,10 +46,9 @@ class Fabrication:
     kerf: float = 0.0
 
     def __post_init__(self) -> None:
-        not_negative("the end allowance", self.end_allowance, "m")
-        not_negative("the kerf", self.kerf, "m")
-        if self.stock_length is not None:
-            positive("the stock length", self.stock_length, "m")
+        keep(self, not_negative, "m", "end_allowance", what="the end allowance")
+        keep(self, not_negative, "m", "kerf", what="the {}")
+        keep(self, positive, "m", "stock_length", what="the stock length")
         if self.stock_length is None and self.kerf > 0:
             raise InputError(
                 f"the kerf of {self.kerf} m is lost where stock is cut: give its stock_length, or leave the kerf out"

@@ -9,7 +9,7 @@ from rodshell.formfinding.gravity_drape import gravity_drape
 from rodshell.formfinding.methods import Bound, Draped, Gravity, Method, require_method
 from rodshell.joints import Joint, require_joint
 from rodshell.layout import GridLayout
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.validation import instance, point
@@ -50,6 +50,7 @@ def drape(
     NetLimitError : no net covers the target from this anchor and heading.
     StabilityError : the fall's time step is beyond the stability limit of explicit ties.
     """
+    require_progress(progress)
     for name, value, kind in (("layout", layout, GridLayout), ("rod", rod, Rod), ("target", target, Target)):
         instance(name, value, kind)
     require_method(method)

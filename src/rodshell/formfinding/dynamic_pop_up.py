@@ -18,14 +18,14 @@ from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.frames import dot
 from rodshell.joints import Coupling, Joint, SharedDofs, require_joint
 from rodshell.model import Shell
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion
 from rodshell.solve.linear_stability import step_limit
 from rodshell.solve.newton_matrix import narrow_or_dissected
 from rodshell.solve.problem import Damping, Supports
 from rodshell.solve.simulate import Sample, simulate
-from rodshell.validation import instance, not_negative, positive
+from rodshell.validation import instance, keep, not_negative, numbers, positive
 
 BALANCED = 1e-3  # of EI over the square of the shell's half-width: out-of-balance force on a node
 STILL = 1e-6  # of the elastic energy: kinetic energy
@@ -58,13 +58,11 @@ class DynamicPopUpSettings:
     drags: tuple[float, float] = (20.0, 3.0)
 
     def __post_init__(self) -> None:
-        for name in ("time_step", "moving_time", "duration"):
-            positive(f"the pop-up's {name}", getattr(self, name), "s")
+        keep(self, positive, "s", "time_step", "moving_time", "duration", what="the pop-up's {}")
         require_coupling("the pop-up's coupling", self.coupling)
-        if not (isinstance(self.drags, Sequence) and len(self.drags) == 2):
-            raise InputError(f"the pop-up's drags must be two numbers in 1/s, not {self.drags!r}")
-        for drag in self.drags:
-            not_negative("the pop-up's drag", drag, "1/s")
+        given = numbers("the pop-up's drags", self.drags, "two numbers in 1/s", 2)
+        drags = tuple(not_negative("the pop-up's drag", drag, "1/s") for drag in given)
+        object.__setattr__(self, "drags", drags)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +112,7 @@ def dynamic_pop_up(
     if isinstance(joint, Sequence):
         raise InputError("joint must be one rodshell joint for all crossings, not a sequence of joints")
     instance("settings", settings, DynamicPopUpSettings)
+    require_progress(progress)
     if joint and joint.eccentricity and not footprint.mesh.layered:
         footprint, boundary = in_layers(footprint, boundary, joint.eccentricity)
     mesh = footprint.mesh

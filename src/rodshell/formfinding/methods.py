@@ -6,7 +6,6 @@ Fall      the paper's method: the grid falls on the target in time and comes to 
 """
 
 from dataclasses import field
-from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
@@ -24,7 +23,7 @@ from rodshell.nets import ChebyshevNet
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
-from rodshell.validation import choice, instance, not_negative, positive
+from rodshell.validation import choice, described, instance, keep, not_negative, positive, whole
 
 if TYPE_CHECKING:
     from rodshell.formfinding.rest import Rest
@@ -61,7 +60,7 @@ class Gravity:
     name: ClassVar[MethodName] = "gravity"
 
     def __post_init__(self) -> None:
-        positive("the acceleration of gravity", self.acceleration, "m/s2")
+        keep(self, positive, "m/s2", "acceleration", what="the {} of gravity")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,18 +102,14 @@ class Fall:
     name: ClassVar[MethodName] = "paper"
 
     def __post_init__(self) -> None:
-        positive("the acceleration of gravity", self.acceleration, "m/s2")
-        positive("the fall's height", self.height, "m")
-        for name in ("time_step", "duration"):
-            value = getattr(self, name)
-            if value is not None:
-                positive(f"the fall's {name}", value, "s")
-        not_negative("the fall's friction", self.friction)
-        not_negative("the fall's drag", self.drag, "1/s")
+        keep(self, positive, "m/s2", "acceleration", what="the {} of gravity")
+        keep(self, positive, "m", "height", what="the fall's {}")
+        keep(self, positive, "s", "time_step", "duration", what="the fall's {}")
+        keep(self, not_negative, "", "friction", what="the fall's {}")
+        keep(self, not_negative, "1/s", "drag", what="the fall's {}")
         require_coupling("the fall's coupling", self.coupling)
         choice("the fall's stopped", self.stopped, STOPPED)
-        if isinstance(self.every, bool) or not isinstance(self.every, Integral) or self.every < 1:
-            raise InputError(f"the fall's every must be a number of steps, 1 or more, not {self.every!r}")
+        whole("the fall's every", self.every, 1)
         if self.stream is not None:
             instance("the fall's stream", self.stream, str | Path, "the path of a folder")
         instance("the fall's settle", self.settle, bool, "True or False")
@@ -132,8 +127,8 @@ def require_method(value: object) -> None:
     InputError : `value` is a word, a class, or anything else.
     """
     if not isinstance(value, Bound | Gravity | Fall):
-        what = f"the class {value.__name__} itself" if isinstance(value, type) else repr(value)
-        raise InputError(f"method must be rodshell.Bound(), rodshell.Gravity() or rodshell.Fall(), not {what}")
+        methods = "rodshell.Bound(), rodshell.Gravity() or rodshell.Fall()"
+        raise InputError(f"method must be {methods}, not {described(value)}")
 
 
 def require_coupling(name: str, value: object) -> None:

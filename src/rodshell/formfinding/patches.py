@@ -28,7 +28,7 @@ from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.units import shown
-from rodshell.validation import choices_of, number, numbers, point, positive
+from rodshell.validation import choices_of, keep, number, numbers, point, positive
 
 MANY = 0.1  # of the rods: a larger share left out gives a warning
 ASTRAY = 0.005  # of the size: rod ends that are moved further give a warning
@@ -53,12 +53,11 @@ class PatchLayout:
 
     def __post_init__(self) -> None:
         if self.anchor is not None:
-            point("a patch's anchor", self.anchor)
-        if self.rotate is not None:
-            number("a patch's rotate", self.rotate, "rad")
+            object.__setattr__(self, "anchor", point("a patch's anchor", self.anchor))
+        keep(self, number, "rad", "rotate", what="a patch's {}")
         if self.spacing is not None:
-            for distance in numbers("a patch's spacing", self.spacing, "two lengths in m", 2):
-                positive("a patch's spacing", distance, "m")
+            given = numbers("a patch's spacing", self.spacing, "two lengths in m", 2, "m")
+            object.__setattr__(self, "spacing", tuple(positive("a patch's spacing", each, "m") for each in given))
 
 
 @dataclass(frozen=True, eq=False)

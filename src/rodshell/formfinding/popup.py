@@ -25,7 +25,7 @@ from rodshell.layout import GridMesh
 from rodshell.layout.transfer import transferred_edges, transferred_nodes
 from rodshell.model import Shell
 from rodshell.model.shell import UP
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
@@ -156,6 +156,7 @@ def pop_up(
     instance("boundary", boundary, Boundary)
     instance("rod", rod, Rod)
     require_joint(joint)
+    require_progress(progress)
     if most_factorizations is not None:
         whole("most_factorizations", most_factorizations, 1)
     joint = joint or Ball()

@@ -13,7 +13,7 @@ from rodshell.formfinding.pipeline import find_stages
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.net_ends import inside_nodes
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.validation import choice, instance, is_auto, number, point, some
@@ -99,6 +99,7 @@ def search(
     instance("layout", layout, GridLayout)
     instance("rod", rod, Rod)
     choice("objective", objective, get_args(Objective))
+    require_progress(progress)
     points, turns = _spread_anchors(target), HEADINGS
     if not is_auto(anchors):
         given = some("anchors", anchors, 'points x, y in m, or "auto"')

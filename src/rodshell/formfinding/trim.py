@@ -11,7 +11,7 @@ from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
-from rodshell.validation import array, instance, whole
+from rodshell.validation import array, finite, instance, whole
 
 NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
 FEWEST_JOINTS = 3  # a rod with fewer swings about the line through its joints
@@ -39,7 +39,8 @@ class Boundary:
             given = getattr(self, name)
             if given is not None or name in ("points", "tangents"):
                 rows = len(self.points) if name == "tangents" else None
-                object.__setattr__(self, name, array(f"the boundary's {name}", given, np.float64, rows, 3))
+                found = array(f"the boundary's {name}", given, np.float64, rows, 3)
+                object.__setattr__(self, name, finite(f"the boundary's {name}", found, *found.shape))
 
     def __repr__(self) -> str:
         return f"<Boundary: ends of {len(self.points) // 2} rods>"

@@ -16,6 +16,7 @@ each two. Where a joint is free, its stiffness is exactly zero.
 
 from collections.abc import Sequence
 from math import inf, pi
+from numbers import Integral
 from typing import Literal, Protocol
 
 import numpy as np
@@ -27,7 +28,7 @@ from rodshell.errors import InputError
 from rodshell.joints.crossings import RodNodes, stencils
 from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.rods.section import Rod
-from rodshell.validation import brief, described, instance, not_negative, number
+from rodshell.validation import brief, described, instance, keep, not_negative, number
 
 
 class Joint(Protocol):
@@ -82,7 +83,7 @@ class Ball:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        _check_mass(self.mass)
+        _check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,8 +107,7 @@ class Pin:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        _check_eccentricity(self.eccentricity)
-        _check_mass(self.mass)
+        _check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,9 +131,7 @@ class Rigid:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        _check_rest_angle(self.rest_angle)
-        _check_eccentricity(self.eccentricity)
-        _check_mass(self.mass)
+        _check(self)
 
 
 @dataclass(frozen=True)
@@ -168,16 +166,14 @@ class Spring:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        for name in ("shear", "out_of_plane", "twist"):
-            not_negative(f"the joint's {name} stiffness", getattr(self, name), "N m/rad", infinite=True)
-        _check_rest_angle(self.rest_angle)
-        _check_eccentricity(self.eccentricity)
+        stiffnesses = ("shear", "out_of_plane", "twist")
+        keep(self, not_negative, "N m/rad", *stiffnesses, what="the joint's {} stiffness", infinite=True)
+        _check(self)
         if self.eccentricity and not self.out_of_plane + self.twist > 0:
             raise InputError(
                 "an eccentric spring without out-of-plane and twist stiffness lets its rods roll over each other: give "
                 'it one of them, or use a pin (kind = "pin"), which is rigid in both'
             )
-        _check_mass(self.mass)
 
     @property
     def turns_frames(self) -> bool:
@@ -220,11 +216,11 @@ class Linker:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        _check_mass(self.mass)
+        _check(self)
         if self.rod is not None:
             instance("the rod of a linker", self.rod, Rod)
-        if self.corners not in (2, 4):
-            raise InputError(f"a joint has linkers in 2 or 4 of its corners, not in {self.corners!r}")
+        if not isinstance(self.corners, Integral) or self.corners not in (2, 4):
+            raise InputError(f"a joint has linkers in 2 or 4 of its corners, not in {described(self.corners)}")
 
 
 def require_joint(joint: object) -> None:
@@ -238,7 +234,7 @@ def require_joint(joint: object) -> None:
     ------
     InputError : it is something else, such as the name of a kind, or the class itself.
     """
-    several = isinstance(joint, Sequence) and not isinstance(joint, str)
+    several = isinstance(joint, Sequence) and not isinstance(joint, str)  # and no array or generator
     for value in joint if several else (joint,):  # type: ignore[attr-defined]
         if value is not None and (isinstance(value, type) or not hasattr(value, "turns_frames")):
             raise InputError(f"joint must be a rodshell joint such as rodshell.Pin(), not {described(value)}")
@@ -256,19 +252,14 @@ def joint_parameters(joint: Joint) -> dict[str, object]:
 Elastic = Ball | Pin | Rigid | Spring
 
 
-def _check_eccentricity(value: float) -> None:
-    not_negative("the joint's eccentricity", value, "m")
-
-
-def _check_mass(value: float) -> None:
-    not_negative("the joint's mass", value, "kg")
-
-
-def _check_rest_angle(value: float | None) -> None:
-    if value is not None:
-        number("the joint's rest angle", value, "rad")
-        if not -pi <= value <= pi:
-            raise InputError(f"the joint's rest angle must lie between -pi and pi, not {value} rad")
+def _check(joint: Joint) -> None:
+    """Check what joints have in common, where this one has it."""
+    values = vars(joint)
+    keep(joint, not_negative, "kg", "mass", what="the joint's {}")
+    keep(joint, not_negative, "m", *values.keys() & {"eccentricity"}, what="the joint's {}")
+    keep(joint, number, "rad", *values.keys() & {"rest_angle"}, what="the joint's rest angle")
+    if not -pi <= (values.get("rest_angle") or 0.0) <= pi:
+        raise InputError(f"the joint's rest angle must lie between -pi and pi, not {values['rest_angle']} rad")
 
 
 FIRM = 1e8  # times the half edges next to it: the stiffness of a rigid direction of a joint

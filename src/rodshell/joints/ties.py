@@ -34,7 +34,7 @@ from rodshell.kernels import njit
 from rodshell.layout.flatgrid import sides
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.rods.section import Rod
-from rodshell.validation import brief, positive
+from rodshell.validation import brief, keep, positive
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,8 @@ class _Penalty:
     C2: float | None = None
 
     def __post_init__(self) -> None:
-        for name, unit in (("C1", "N/m"), ("C2", "N m/rad")):
-            if getattr(self, name) is not None:
-                positive(f"the penalty stiffness {name}", getattr(self, name), unit)
+        keep(self, positive, "N/m", "C1", what="the penalty stiffness {}")
+        keep(self, positive, "N m/rad", "C2", what="the penalty stiffness {}")
 
     def with_defaults(self, rod: Rod, edge: float) -> Self:
         """The same with the defaults for a rod filled in.

@@ -17,11 +17,12 @@ from importlib.machinery import ExtensionFileLoader, ModuleSpec
 from importlib.util import module_from_spec
 from typing import Any
 
-from rodshell.errors import InputError
+from rodshell.errors import InputError, OutOfMemoryError
 from rodshell.kernels.table import Kernel
 
 PACKAGE = "rodshell."
 LEVELS = ("x86-64-v3", "generic")  # of processors, from the highest
+NO_MEMORY = "exceptions must derive from BaseException"  # what compiled kernels make of Numba's MemoryError
 UNCHOSEN = ("", "compiled")  # values of RODSHELL_KERNELS: nothing was set, or what counts when a wheel is built
 
 
@@ -60,12 +61,14 @@ def _taking_any_array(kernel: Kernel) -> Kernel:
     def call(*given: Any) -> Any:
         try:
             return kernel(*given)
-        except TypeError:
+        except TypeError as error:
+            if str(error) == NO_MEMORY:
+                raise OutOfMemoryError from None
             taken = [_plain(value) for value in given]
             changed = [k for k, value in enumerate(given) if taken[k] is not value]
             if not changed:
                 raise
-            result = kernel(*taken)
+            result = call(*taken)
             for k in changed:
                 if given[k].flags.writeable:
                     given[k][...] = taken[k]

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
-from reprlib import repr as short
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -14,10 +13,12 @@ from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout.profile import Profile
-from rodshell.validation import finite, instance, listed, number, texts
+from rodshell.untrusted import limit, raised
+from rodshell.validation import LARGEST, finite, instance, listed, number, short, texts
 
 Family = Literal["u", "v", "free"]
 
+MOST_RODS = 5000  # of a grid, of which all pairs are looked at; they take 0.4 GB
 PARALLEL = 1e-9  # sine of the angle between lines that do not cross
 
 
@@ -192,6 +193,7 @@ class FlatGrid:
             behind its start.
         """
         rods = listed("rods", rods, "a list of rodshell.FlatRod")
+        refuse_too_many(len(rods))
         for rod in rods:
             instance("each of the rods", rod, FlatRod)
         number("margin", margin, "m")
@@ -275,12 +277,13 @@ def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> Fla
     """
     try:
         points = np.asarray(ends, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"rod ends must be numbers of the shape (rods, 2, 2), not {short(ends)}") from None
     if points.ndim != 3 or points.shape[1:] != (2, 2) or len(points) == 0:
         raise InputError(f"rod ends must have the shape (rods, 2, 2), not {points.shape}")
-    if not np.isfinite(points).all():
-        raise InputError(f"rod {int(np.argwhere(~np.isfinite(points))[0, 0]) + 1} has an end that is not finite")
+    if not (near := np.abs(points) < LARGEST).all():
+        raise InputError(f"rod {int(np.argwhere(~near)[0, 0]) + 1} has an end that is not finite, or too far away")
+    refuse_too_many(len(points))
     digits = len(str(len(points)))
     labels = [f"R{k + 1:0{max(digits, 2)}d}" for k in range(len(points))]
     if names is not None:
@@ -304,6 +307,15 @@ def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> Fla
             "give rods that cross between their ends, or remove them"
         )
     return grid
+
+
+def refuse_too_many(rods: int) -> None:
+    """Refuse more rods than there should be pairs of them in memory."""
+    if rods > limit(MOST_RODS):
+        raise InputError(
+            f"a grid of {rods} rods; at most {limit(MOST_RODS):.0f} are joined: check its unit, use a larger spacing, "
+            f"{raised(MOST_RODS, rods)}"
+        )
 
 
 def _refuse_overlaps(rods: Sequence[FlatRod]) -> None:

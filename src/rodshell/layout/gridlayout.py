@@ -3,7 +3,6 @@
 from dataclasses import fields
 from math import degrees, pi
 from numbers import Real
-from reprlib import repr as short
 from typing import Literal
 
 import numpy as np
@@ -11,9 +10,9 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
-from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod
+from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod, refuse_too_many
 from rodshell.units import NUMBER
-from rodshell.validation import instance, is_auto, number, numbers, positive, texts
+from rodshell.validation import instance, is_auto, number, numbers, positive, short, texts
 
 Auto = Literal["auto"]
 
@@ -225,6 +224,7 @@ def _counts(rods: object) -> tuple[int, int]:
     first, second = numbers("layout rods", rods, sentence, 2)
     if not (first.is_integer() and second.is_integer() and min(first, second) >= 2):
         raise InputError(f"layout rods must be {sentence}, not {short(rods)}")
+    refuse_too_many(int(first + second))
     return int(first), int(second)
 
 

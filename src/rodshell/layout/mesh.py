@@ -17,8 +17,11 @@ from rodshell.geometry.curves import on_curve
 from rodshell.kernels import njit
 from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, sides, whole_rods
 from rodshell.layout.profile import Profile
+from rodshell.units import length_text
+from rodshell.untrusted import limit, raised
 from rodshell.validation import finite, instance, listed, positive
 
+MOST_NODES = 4_000_000  # of a net or a mesh
 CROWDED = 0.01  # of the usual edge: nodes closer to an end are left out: round-off in forces grows as the inverse cube
 
 
@@ -269,7 +272,7 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
     InputError : a value is of the wrong kind; the edge is not positive; not as many marks as rods.
     """
     instance("grid", grid, FlatGrid)
-    positive("edge", edge, "m", infinite=True)
+    edge = positive("edge", edge, "m", infinite=True)
     if marks is not None:
         marks = [listed("marks", row, "a list for each rod") for row in listed("marks", marks, "a list for each rod")]
         if len(marks) != len(grid.rods):
@@ -277,6 +280,11 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
     first, s, nodes, count, joint_nodes = _fixed_points(grid, [()] * len(grid.rods) if marks is None else marks)
     lines = np.array([(*rod.origin, *rod.direction) for rod in grid.rods])
     edges = edge_counts(np.diff(s), edge)
+    if edges.sum() > limit(MOST_NODES):
+        raise InputError(
+            f"the grid would have {edges.sum()} edges of {length_text(edge)}: check its unit, use a longer edge, such "
+            f"as {length_text(float(np.diff(grid.ends).max()) / 100)}, {raised(MOST_NODES, edges.sum())}"
+        )
     flat, rod_nodes, rod_start, stations = _divided(lines, first, s, nodes, edges, count)
     return GridMesh(grid, flat, rod_nodes, rod_start, stations, joint_nodes)
 

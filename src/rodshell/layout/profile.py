@@ -90,7 +90,7 @@ class Profile:
         InputError : the share is not between 0 and 1.
         """
         if not 0.0 < number("the share of a rod's length that is double", share) < 1.0:
-            raise InputError(f"the share of a rod's length that is double must lie between 0 and 1, not {share!r}")
+            raise InputError(f"the share of a rod's length that is double must lie between 0 and 1, not {share}")
         first, last = 0.5 * (1.0 - share), 0.5 * (1.0 + share)
         return Profile((0.0, first, first, last, last, 1.0), (1.0, 1.0, 2.0, 2.0, 1.0, 1.0), "laths")
 

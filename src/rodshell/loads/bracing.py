@@ -16,7 +16,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.targets import Target
 from rodshell.units import percent_text
-from rodshell.validation import brief, choice, instance, not_negative
+from rodshell.validation import brief, choice, instance, keep, not_negative
 
 AcrossOpenings = Literal["refuse", "leave out"]
 EndsAt = Literal["joints", "supports"]
@@ -51,7 +51,7 @@ class Cables:
     def __post_init__(self) -> None:
         instance("the bracing's rod", self.rod, Rod)
         Pattern.of(self.pattern)
-        not_negative("the prestrain", self.prestrain)
+        keep(self, not_negative, "", "prestrain", what="the {}")
         choice("ends_at", self.ends_at, get_args(EndsAt))
         choice("across_openings", self.across_openings, get_args(AcrossOpenings))
 

@@ -11,7 +11,7 @@ from rodshell.loads.locked_joints import LockedJoints
 from rodshell.loads.strength import Strength
 from rodshell.rods.design_strength import DURATIONS, Duration
 from rodshell.units import shown
-from rodshell.validation import brief, choice, described, instance, mapping, not_negative, positive
+from rodshell.validation import brief, choice, described, instance, mapping, not_negative, positive, whole
 
 Bracing = Cables | Laths
 LASTING: dict[type, Duration] = {
@@ -39,8 +39,7 @@ class Stability:
     def __post_init__(self) -> None:
         if self.imperfection is not None:
             self.amplitude(1.0)
-        if isinstance(self.modes, bool) or not isinstance(self.modes, int) or self.modes < 1:
-            raise InputError(f"the number of modes must be 1 or more, not {self.modes!r}")
+        whole("the number of modes", self.modes, 1, 1000)
 
     def amplitude(self, span: float) -> float | None:
         """Largest displacement of the geometry with imperfections [m]; None: the perfect geometry alone.

@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.loads.tributary import Tributary
 from rodshell.targets.heightfield import Formula, parse_formula
 from rodshell.units import length_text, shown
-from rodshell.validation import brief, choice, listed, not_negative, number, numbers, positive, texts
+from rodshell.validation import brief, choice, keep, listed, not_negative, number, numbers, point, positive, texts
 
 GRAVITY = 9.81  # [m/s2]
 Distribution = Literal["uniform", "half", "drifted"]
@@ -82,7 +82,7 @@ class SelfWeight:
     cladding: float = 0.0
 
     def __post_init__(self) -> None:
-        not_negative("the cladding", self.cladding, "kg/m2")
+        keep(self, not_negative, "kg/m2", "cladding", what="the {}")
 
     def forces(self, nodes: LoadedNodes) -> Floats:
         """(n, 3) [N].
@@ -114,9 +114,9 @@ class Snow:
     direction: float = 0.0
 
     def __post_init__(self) -> None:
-        not_negative("the snow", self.value, "N/m2")
+        keep(self, not_negative, "N/m2", "value", what="the snow")
+        keep(self, number, "rad", "direction", what="the snow's {}")
         choice("the snow's distribution", self.distribution, get_args(Distribution))
-        number("the snow's direction", self.direction)
 
     def forces(self, nodes: LoadedNodes) -> Floats:
         """(n, 3) [N]."""
@@ -149,12 +149,12 @@ class Wind:
     direction: float = 0.0
 
     def __post_init__(self) -> None:
-        not_negative("the wind", self.value, "N/m2")
-        number("the wind's direction", self.direction)
+        keep(self, not_negative, "N/m2", "value", what="the wind")
+        keep(self, number, "rad", "direction", what="the wind's {}")
         if isinstance(self.coefficient, str):
             parse_formula(self.coefficient)
         else:
-            number("the wind's coefficient", self.coefficient)
+            keep(self, number, "", "coefficient", what="the wind's {}")
             self._require_usual(np.array([self.coefficient], dtype=float), "")
 
     def _require_usual(self, coefficients: Floats, where: str) -> None:
@@ -206,8 +206,9 @@ class PointLoad:
     force: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        numbers("the point of a load", self.at, "two finite numbers x, y in m", 2)
-        numbers("the force of a point load", self.force, "three finite numbers in N", 3)
+        force = numbers("the force of a point load", self.force, "three finite numbers in N", 3, "N")
+        object.__setattr__(self, "at", point("the point of a load", self.at))
+        object.__setattr__(self, "force", force)
 
     def forces(self, nodes: LoadedNodes) -> Floats:
         """(n, 3) [N].
@@ -235,12 +236,12 @@ class LineLoad:
     force: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "line", listed("the line of a load", self.line, "points x, y in m"))
-        if len(self.line) < 2:
+        line = listed("the line of a load", self.line, "points x, y in m")
+        if len(line) < 2:
             raise InputError("a line load needs two points or more")
-        for point in self.line:
-            numbers("a point of a line load", point, "two finite numbers x, y in m", 2)
-        numbers("the force of a line load", self.force, "three finite numbers in N/m", 3)
+        force = numbers("the force of a line load", self.force, "three finite numbers in N/m", 3, "N/m")
+        object.__setattr__(self, "line", tuple(point("a point of a line load", place) for place in line))
+        object.__setattr__(self, "force", force)
 
     def forces(self, nodes: LoadedNodes) -> Floats:
         """(n, 3) [N].
@@ -277,7 +278,8 @@ class Settlement:
         object.__setattr__(self, "supports", texts("the supports of a settlement", self.supports, wanted))
         if not self.supports:
             raise InputError('a settlement needs supports: give rod ends such as "U03.1"')
-        numbers("the movement of supports", self.move, "three finite numbers in m", 3)
+        move = numbers("the movement of supports", self.move, "three finite numbers in m", 3, "m")
+        object.__setattr__(self, "move", move)
 
 
 @dataclass(frozen=True)
@@ -294,8 +296,8 @@ class Temperature:
     expansion: float
 
     def __post_init__(self) -> None:
-        number("the change of temperature", self.change, "K")
-        positive("the thermal expansion", self.expansion, "1/K")
+        keep(self, number, "K", "change", what="the {} of temperature")
+        keep(self, positive, "1/K", "expansion", what="the thermal {}")
 
     @property
     def strain(self) -> float:

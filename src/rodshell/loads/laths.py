@@ -29,7 +29,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_stable
 from rodshell.solve.problem import Supports
 from rodshell.targets import Target
-from rodshell.validation import brief, choice, instance, not_negative
+from rodshell.validation import brief, choice, instance, keep, not_negative
 
 FINEST = 8  # edges from joint to joint, at most as many as the grid's rods have
 SAMPLES = 32  # of a lath's curve from joint to joint, for its length
@@ -58,7 +58,7 @@ class Laths:
         if self.rod is not None:
             instance("the bracing's rod", self.rod, Rod)
         Pattern.of(self.pattern)
-        not_negative("the bracing's eccentricity", self.eccentricity, "m")
+        keep(self, not_negative, "m", "eccentricity", what="the bracing's {}")
         choice("across_openings", self.across_openings, ("refuse", "leave out"))
 
     def brace(self, structure: Structure, target: Target) -> Structure:

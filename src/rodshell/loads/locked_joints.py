@@ -19,7 +19,7 @@ from rodshell.joints.joint import elastic_joints
 from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.loads.structure import Structure
 from rodshell.model.rod_sections import RodSections
-from rodshell.validation import brief, not_negative, positive
+from rodshell.validation import brief, keep, not_negative, positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,11 +43,10 @@ class LockedJoints:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        not_negative("the shear stiffness of locked joints", self.shear, "N m/rad", infinite=True)
+        keep(self, not_negative, "N m/rad", "shear", what="the {} stiffness of locked joints", infinite=True)
+        keep(self, positive, "N m", "slip", what="the moment at which locked joints {}")
         if self.shear == 0:
             raise InputError("locked joints without shear stiffness are free: give one, or leave locked_joints out")
-        if self.slip is not None:
-            positive("the moment at which locked joints slip", self.slip, "N m")
 
     def require_pins(self, joint: Joint) -> None:
         """Raise InputError where joints of a kind cannot be locked.

@@ -36,7 +36,7 @@ from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.rods.design_strength import DESIGN, DURATIONS, Duration
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Section, Tube
-from rodshell.validation import brief, not_negative, positive
+from rodshell.validation import brief, keep, not_negative, positive, whole
 
 By = Literal["bending", "shear", "slip", "permanent", "slip_unloaded"]
 
@@ -68,13 +68,12 @@ class Strength:
     effective_length: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in (*DURATIONS, "erection", "slip"):
-            if (value := getattr(self, name)) is not None:
-                positive(f"the strength ({name})", value, "N" if name == "slip" else "Pa")
-        if self.service_class not in (None, 1, 2, 3):
-            raise InputError(f"the service class must be 1, 2 or 3, not {self.service_class!r}")
-        not_negative("the diameter of holes", self.hole, "m")
-        positive("the effective length", self.effective_length)
+        keep(self, positive, "Pa", *DURATIONS, "erection", what="the strength ({})")
+        keep(self, positive, "N", "slip", what="the strength ({})")
+        if self.service_class is not None:
+            whole("the service class", self.service_class, 1, 3)
+        keep(self, not_negative, "m", "hole", what="the diameter of holes")
+        keep(self, positive, "", "effective_length", what="the effective length")
 
     @property
     def given(self) -> dict[Duration, float]:

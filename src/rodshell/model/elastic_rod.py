@@ -25,7 +25,7 @@ from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
-from rodshell.validation import brief, described, direction, finite, vector
+from rodshell.validation import brief, described, direction, finite, flag, short, vector
 
 Natural = Literal["straight", "rest"] | ArrayLike
 _ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
@@ -121,6 +121,7 @@ class ElasticRod:
         ------
         InputError : an argument is of the wrong kind or shape, or they exclude each other.
         """
+        closed, twist = flag("closed", closed), flag("twist", twist)
         line = RodLine.of(rest, closed=closed, clamped=clamped)
         rods = line.rods(rod)
         stiffness = np.array([(*section.bend_stiffnesses, section.twist_stiffness) for section in rods])
@@ -381,5 +382,5 @@ def _bend_twist(
     elif natural == "rest":
         elements = elements.relaxed(state)
     elif natural != "straight":
-        raise InputError(f'natural is "straight", "rest" or curvatures [1/m], not {natural!r}')
+        raise InputError(f'natural is "straight", "rest" or curvatures [1/m], not {short(natural)}')
     return replace(elements, natural_twist=elements.natural_twist + twist_rate * bends.lengths)

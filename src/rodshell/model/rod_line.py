@@ -11,7 +11,7 @@ from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, cross, directors_along, dot, parallel_transport, signed_angle
 from rodshell.rods.section import Rod
-from rodshell.validation import brief, described, direction, finite, instance
+from rodshell.validation import brief, described, direction, finite, instance, short
 
 End = Literal["start", "end"]
 Rods = Rod | Sequence[Rod] | Callable[[float], Rod]
@@ -248,7 +248,7 @@ def _clamps(clamped: Clamps, tangents: Floats, lengths: Floats, closed: bool) ->
     result: dict[End, Floats] = {}
     for end, tangent in wanted.items():
         if end not in ("start", "end"):
-            raise InputError(f'a rod is clamped at its "start" or "end", not {end!r}')
+            raise InputError(f'a rod is clamped at its "start" or "end", not {short(end)}')
         (t0, t1), (l0, l1) = (x[:2] if end == "start" else x[-1:-3:-1] for x in (tangents, lengths))
         if tangent is None:
             tangent = t0 + (t0 - t1) * l0 / (l0 + l1)  # extrapolated from the two last edges, to second order

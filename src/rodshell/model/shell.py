@@ -43,7 +43,7 @@ from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, Stretch, with_frames
 from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.section import Rod
-from rodshell.validation import instance
+from rodshell.validation import flag, instance
 
 UP = (0.0, 0.0, 1.0)
 OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
@@ -127,6 +127,7 @@ class Shell:
         require_joint(joint)
         if coupling is not None:
             instance("coupling", coupling, Coupling, COUPLING)
+        clamped, twist = flag("clamped", clamped), None if twist is None else flag("twist", twist)
         return _Builder(mesh, rod, joint, coupling or SharedDofs(), clamped, twist).shell()
 
     @property
@@ -277,7 +278,9 @@ class _Builder:
         for item in rod if isinstance(rod, Sequence) else (rod,):
             instance("rod", item, Rod)
         self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
-        self.joints, self.joint_of = _kinds(_per_item(joint or Ball(), len(mesh.grid.crossings), "crossings"))
+        self.joints, self.joint_of = _kinds(
+            _per_item(Ball() if joint is None else joint, len(mesh.grid.crossings), "crossings")
+        )
         if isinstance(joint, Sequence):
             refuse_mixtures(mesh.joint_nodes, joint)
         eccentricity = max((item.eccentricity for item in self.joints), default=0.0)

@@ -7,6 +7,7 @@ net: they are kept as virtual rods.
 """
 
 from collections.abc import Sequence
+from itertools import groupby
 from math import cos, degrees, pi, sin
 from string import ascii_lowercase
 
@@ -24,7 +25,7 @@ from rodshell.nets.compass import ON_SURFACE, Axes, axes
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
 from rodshell.targets import Target
-from rodshell.units import length_text
+from rodshell.units import length_text, shown
 from rodshell.validation import instance, number, point
 
 SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
@@ -394,7 +395,9 @@ def _require_names(layout: GridLayout, names: list[str]) -> None:
     """Refuse to leave out rods that are not there."""
     for name in layout.left_out:
         if name not in names:
-            raise InputError(f"layout.left_out: there is no rod {name}: the rods are {', '.join(names)}")
+            families = (list(family) for _, family in groupby(names, key=lambda known: known[0]))
+            known = " and ".join(f"{family[0]} to {family[-1]}" for family in families)
+            raise InputError(f"layout.left_out: there is no rod {shown(name)}: the rods are {known}")
 
 
 def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:

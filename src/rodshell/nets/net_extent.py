@@ -7,19 +7,20 @@ same net in longer steps; the first of these nets has only a few long steps.
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout import GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import auto_edge
-from rodshell.layout.mesh import edge_counts
+from rodshell.layout.mesh import MOST_NODES, edge_counts
 from rodshell.nets.compass import ON_SURFACE, Axes, Heights, Net, fill_quadrants, lay_axes
 from rodshell.nets.net_ends import inside_nodes
 from rodshell.nets.net_refinement import CONVERGED, march_near
 from rodshell.targets import Target
 from rodshell.units import length_text
+from rodshell.untrusted import limit, raised
 
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 STRIDE = 0.2  # of the target's size: steps of the first march
@@ -27,7 +28,6 @@ STRIDES = 10  # steps of the first march, from the anchor each way
 ROUGH = 5e-2  # of a step: tolerance of the first march, which leaves its square
 FAIR = 1e-2  # of the size: last motion of the march that finds the lines, see `march_near`
 FEWEST_STEPS = 6  # from each line to the next
-MOST_NODES = 4_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -205,16 +205,16 @@ def find_lines(
     near = near or _stride(target, start, heights)
     reach = np.minimum(near.reach(1) + spare, 4 * target.size)
     for _ in range(12):
-        u, v = (
-            np.arange(-np.ceil(reach[2 * k] / step[k]), np.ceil(reach[2 * k + 1] / step[k]) + 1) * step[k]
-            for k in (0, 1)
-        )
-        if len(u) * len(v) > MOST_NODES / 10:
+        steps = np.ceil(reach / step.repeat(2)).reshape(2, 2)
+        counts = steps.sum(axis=1) + 1
+        if counts.prod() > limit(MOST_NODES) / 10:
+            counted = " x ".join(f"{count // parts:.0f}" for count in counts)
             raise InputError(
-                f"the net needs more than {len(u) // parts} x {len(v) // parts} lines, "
-                f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
-                f"unit, or use {_coarser(target)}"
+                f"the net needs more than {counted} lines, {length_text(min(layout.spacing))} apart on a target "
+                f"{length_text(2 * target.size)} wide: check its unit, use {_coarser(target)}, "
+                f"{raised(MOST_NODES, 10 * counts.prod())}"
             )
+        u, v = (np.arange(-steps[k, 0], steps[k, 1] + 1) * step[k] for k in (0, 1))
         near = march_covering(target, u, v, start, margin, near, heights=heights, converged=FAIR)
         if not near.inside.any():
             raise InputError("no node of the net is inside the target: move the anchor away from the rim")
@@ -223,9 +223,9 @@ def find_lines(
             break
         reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
     u, v = _lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3])
-    lines = LatticeLines(u, v, (_subdivided(u, layout.edge), _subdivided(v, layout.edge)))
-    _refuse_too_many(target, layout, lines)
-    return lines, near
+    across, along = _steps(u, layout.edge), _steps(v, layout.edge)
+    _refuse_too_many(target, layout, int(across.sum()) + 1, int(along.sum()) + 1)
+    return LatticeLines(u, v, (_divided(u, across), _divided(v, along))), near
 
 
 def _across(layout: GridLayout) -> Floats:
@@ -285,16 +285,15 @@ def march_lines(
     return march_covering(target, u, v, start, MARGIN * _across(layout), *near, heights=heights)
 
 
-def _refuse_too_many(target: Target, layout: GridLayout, lines: LatticeLines) -> None:
+def _refuse_too_many(target: Target, layout: GridLayout, across: int, along: int) -> None:
     """Refuse a finer march with more nodes than the memory should hold."""
-    counts = [len(nodes) for nodes in lines.nodes]
-    if counts[0] * counts[1] > MOST_NODES:
+    if across * along > limit(MOST_NODES):
         auto = auto_edge(layout.spacing)
         fine = layout.edge < 0.99 * auto
         remedy = f'set layout.edge = "auto" ({length_text(auto)} here)' if fine else f"use {_coarser(target)}"
         raise InputError(
-            f"the net would have {counts[0]} x {counts[1]} nodes, with edges of {length_text(layout.edge)} on a target "
-            f"{length_text(2 * target.size)} wide: check its unit, or {remedy}"
+            f"the net would have {across} x {along} nodes, with edges of {length_text(layout.edge)} on a target "
+            f"{length_text(2 * target.size)} wide: check its unit, {remedy}, {raised(MOST_NODES, across * along)}"
         )
 
 
@@ -302,26 +301,21 @@ def _coarser(target: Target) -> str:
     return f"a larger spacing, such as {length_text(target.size / 8)}"
 
 
-def _subdivided(offsets: Floats, edge: float) -> Floats:
-    """Material coordinates of nodes: from line to line an even number of at least six steps, as many as edges if
-    these are enough."""
-    return np.asarray(_divided(offsets, edge_counts(np.diff(offsets), edge)))
+def _steps(offsets: Floats, edge: float) -> Ints:
+    """Steps from line to line: an even number of at least six, as many as edges if these are enough."""
+    edges = edge_counts(np.diff(offsets), edge)
+    return np.where(edges < FEWEST_STEPS, 2 * np.maximum(FEWEST_STEPS // 2, edges), edges + edges % 2)
 
 
 @njit()
-def _divided(offsets, edges):  # type: ignore[no-untyped-def]
-    """See `_subdivided`; `edges` (n - 1,) from each of the `offsets` (n,) to the next."""
-    steps, count = np.empty_like(edges), 0
-    for k in range(len(edges)):
-        few = edges[k] < FEWEST_STEPS
-        steps[k] = 2 * (max(FEWEST_STEPS // 2, edges[k]) if few else (edges[k] + 1) // 2)
-        count += steps[k]
-    result, filled = np.empty(count + 1), 0
-    for k in range(len(edges)):
+def _divided(offsets, steps):  # type: ignore[no-untyped-def]
+    """Material coordinates of nodes, in `steps` (n - 1,) from each of the `offsets` (n,) to the next."""
+    result, filled = np.empty(steps.sum() + 1), 0
+    for k in range(len(steps)):
         for n in range(steps[k]):
             result[filled] = offsets[k] + (offsets[k + 1] - offsets[k]) * n / steps[k]
             filled += 1
-    result[filled] = offsets[len(edges)]
+    result[filled] = offsets[len(steps)]
     return result
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.results.archive import SHELLS, Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
 from rodshell.validation import described, flag, instance, mapping
@@ -46,14 +46,16 @@ def save(
     """
     _require_archive(archive)
     flag("force", force)
-    for name, content in mapping("more", more or {}, "texts by the names of their files").items():
+    require_progress(progress)
+    more = mapping("more", {} if more is None else more, "texts by the names of their files")
+    for name, text in more.items():
         instance("the name of each file", name, str, "text")
-        instance(f"the content of {name}", content, str, "text")
+        instance(f"the content of {name}", text, str, "text")
     wanted = wanted_kinds(kinds)
-    names = [*archive_names(archive), *reserved(wanted), *(more or ())]
+    names = [*archive_names(archive), *reserved(wanted), *more]
     with open_folder(folder, reserved=names, force=force) as place:
         put_archive(archive, place)
-        for number, (name, content) in enumerate(chain(files_of(archive, wanted), (more or {}).items()), start=1):
+        for number, (name, content) in enumerate(chain(files_of(archive, wanted), more.items()), start=1):
             progress("files", f"{number} written, {name}", 0.0)
             place.put(name, content)
         place.commit()
@@ -81,6 +83,7 @@ def export(
     """
     _require_archive(archive)
     flag("force", force)
+    require_progress(progress)
     names = list[str]()
     wanted = wanted_kinds(kinds)
     with open_folder(folder, reserved=reserved(wanted), force=force) as place:
@@ -170,15 +173,14 @@ def wanted_kinds(kinds: object) -> list[str] | None:
         return None
     if isinstance(kinds, str):
         return read_kinds(kinds)
-    if not isinstance(kinds, Iterable):
+    if not isinstance(kinds, Iterable) or getattr(kinds, "ndim", 1) == 0:
         raise InputError(f"kinds must be kinds of files, such as {', '.join(KINDS)}, not {described(kinds)}")
     return [_known(kind) for kind in kinds]
 
 
 def _known(kind: object) -> str:
     if not isinstance(kind, str) or kind not in KINDS:
-        what = f'"{kind}"' if isinstance(kind, str) else described(kind)
-        raise InputError(f"unknown kind of file {what}: use {', '.join(KINDS)}")
+        raise InputError(f"unknown kind of file {described(kind)}: use {', '.join(KINDS)}")
     return kind
 
 

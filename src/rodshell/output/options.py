@@ -12,7 +12,8 @@ from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.joints import Joint
 from rodshell.rods.section import Rod
-from rodshell.validation import choice, instance, listed, positive, whole
+from rodshell.units import shown
+from rodshell.validation import choice, instance, keep, listed, positive, whole
 
 if TYPE_CHECKING:
     from rodshell.loads.strength import Limits, Strength
@@ -48,13 +49,14 @@ class DrawingStyle:
         for key in ("paper", "project", "revision", "name", "author", "date"):
             instance(f"the {key} of drawings", getattr(self, key), str, "text")
         if self.paper not in PAPERS:
-            raise InputError(f'unknown paper size "{self.paper}": use {", ".join(PAPERS)}')
-        if self.tolerance is not None:
-            object.__setattr__(self, "tolerance", positive("the tolerance of drawings", self.tolerance, "m"))
+            raise InputError(f"unknown paper size {shown(self.paper)}: use {', '.join(PAPERS)}")
+        keep(self, positive, "m", "tolerance", what="the {} of drawings")
         try:
             datetime.date.fromisoformat(self.date or "2000-01-01")
         except ValueError:
-            raise InputError(f'the date of drawings cannot be "{self.date}": write a day as "2026-11-22"') from None
+            raise InputError(
+                f'the date of drawings cannot be {shown(self.date)}: write a day as "2026-11-22"'
+            ) from None
         instance("the layers of drawings", self.layers, Mapping, "a mapping from layers to their new names")
         if self.layers:
             _require_names(self.layers)
@@ -103,9 +105,8 @@ class OutputOptions:
     strength_of: str | None = None
 
     def __post_init__(self) -> None:
-        for name in ("strength", "shear_strength"):
-            if (value := getattr(self, name)) is not None:
-                object.__setattr__(self, name, positive(f"the {name.replace('_', ' ')}", value, "Pa"))
+        keep(self, positive, "Pa", "strength", what="the {}")
+        keep(self, positive, "Pa", "shear_strength", what="the shear strength")
         if self.shear_strength is not None and self.strength is None:
             raise InputError(
                 f"a shear strength of {self.shear_strength:g} Pa does not say what bending may be: "

@@ -7,11 +7,11 @@ found are in `records`.
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import Field, ValidationError
 
-from rodshell.errors import OutputError
+from rodshell.errors import InputError, OutputError
 from rodshell.results.loaded import DesignStrength, LoadCases
 from rodshell.results.records import (
     Agreement,
@@ -45,7 +45,7 @@ from rodshell.results.records import (
     required,
     rows,
 )
-from rodshell.validation import instance
+from rodshell.validation import instance, short
 
 FORMAT = "rodshell-result"
 VERSION = 2
@@ -245,7 +245,21 @@ LEVELS: dict[Level, str] = {"good": "Good", "check": "Check", "unbuildable": "No
 """The levels in words."""
 
 
-class Verdict(Record):
+if TYPE_CHECKING:  # a type checker sees the fields
+    from pydantic._internal._model_construction import ModelMetaclass as _Refusing
+else:
+
+    class _Refusing(type(Record)):
+        """What makes records in Python: a value that cannot be used is refused in a sentence, as everywhere."""
+
+        def __call__(cls, **values):
+            try:
+                return super().__call__(**values)
+            except ValidationError as error:
+                raise InputError(f"{cls.__name__}: {_first_fault(error)}") from None
+
+
+class Verdict(Record, metaclass=_Refusing):
     """What a result is worth."""
 
     level: Level = Field(
@@ -264,7 +278,7 @@ class Verdict(Record):
 # The whole
 
 
-class Results(Record):
+class Results(Record, metaclass=_Refusing):
     """All that is known of a form, in SI; a table that is absent was not asked for or not found.
 
     `Results.of` reads a plain dictionary, `plain` gives it back.
@@ -322,7 +336,10 @@ class Results(Record):
         InputError : not a mapping. OutputError : the content is not valid; the sentence names the key.
         """
         instance("content", content, Mapping, "a mapping, as result.json holds one")
-        return cls.from_text(json.dumps(plain(upgraded(content, source=source))), source=source)
+        try:
+            return cls.from_text(json.dumps(plain(upgraded(content, source=source))), source=source)
+        except RecursionError:
+            raise InputError(f"{source} contains itself: give plain tables, lists, numbers and texts") from None
 
     @classmethod
     def from_text(cls, text: str, *, source: str) -> Self:
@@ -481,8 +498,7 @@ def _first_fault(error: ValidationError) -> str:
     where = where or "the file"
     if fault["type"] == "missing":
         return f"{where} is missing"
-    value = repr(fault["input"])
-    shown = value if len(value) <= 40 else f"{value[:37]}..."
+    shown = short(fault["input"])
     return f"{where} cannot be {shown}: {_EXPECTED.get(fault['type'], fault['msg'])}"
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, Self, get_args
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.units import shown
-from rodshell.validation import brief, number, positive
+from rodshell.validation import brief, keep, number, positive
 
 _REPLACEABLE = ("youngs_modulus", "density", "shear", "poisson_ratio")
 PresetName = Literal["larch", "spruce", "oak", "bamboo", "gfrp", "plywood", "petg", "spring-steel", "rubber"]
@@ -148,15 +148,14 @@ class Material:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        positive("Young's modulus", self.youngs_modulus, "Pa")
-        positive("density", self.density, "kg/m3")
-        number("Poisson's ratio", self.poisson_ratio)
+        keep(self, positive, "Pa", "youngs_modulus", what="Young's modulus")
+        keep(self, positive, "kg/m3", "density")
+        keep(self, number, "", "poisson_ratio", what="Poisson's ratio")
+        keep(self, positive, "Pa", "shear", what="shear modulus")
         if not -1 < self.poisson_ratio <= 0.5:
             raise InputError(f"Poisson's ratio must lie above -1 and not above 0.5, not {self.poisson_ratio}")
-        if self.shear is not None:
-            positive("shear modulus", self.shear, "Pa")
-            if self.poisson_ratio != 0.5:
-                raise InputError(f"give Poisson's ratio ({self.poisson_ratio}) or a shear modulus, not both")
+        if self.shear is not None and self.poisson_ratio != 0.5:
+            raise InputError(f"give Poisson's ratio ({self.poisson_ratio}) or a shear modulus, not both")
         if self.name is not None:
             preset_named(self.name)
 
@@ -208,7 +207,7 @@ def preset_named(name: str) -> Preset:
     ------
     InputError : there is no such preset.
     """
-    if name not in get_args(PresetName):
+    if not isinstance(name, str) or name not in get_args(PresetName):
         raise InputError(f"there is no material {shown(name)}: use {', '.join(get_args(PresetName))}")
     return PRESETS[name]  # type: ignore[index]
 

@@ -4,7 +4,6 @@ A section has two axes, those of the material directors m1 and m2. The second mo
 *towards* m1 and m2: I1 is the integral of the square of the coordinate along m1.
 """
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cached_property
 from math import pi, tanh
@@ -13,7 +12,7 @@ from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.rods.materials import Material as Material
 from rodshell.rods.materials import PresetName
-from rodshell.validation import brief, instance, not_negative, positive
+from rodshell.validation import brief, instance, keep, not_negative, numbers, positive
 
 MM = 1e-3
 
@@ -63,7 +62,7 @@ class Circle(_Round):
     radius: float
 
     def __post_init__(self) -> None:
-        positive("section radius", self.radius, "m")
+        keep(self, positive, "m", "radius", what="section {}")
 
     @property
     def outer_radius(self) -> float:
@@ -103,8 +102,7 @@ class Tube(_Round):
     thickness: float
 
     def __post_init__(self) -> None:
-        positive("section radius", self.radius, "m")
-        positive("section thickness", self.thickness, "m")
+        keep(self, positive, "m", "radius", "thickness", what="section {}")
         if self.thickness > self.radius:
             raise InputError(f"tube thickness {self.thickness} m is larger than its radius {self.radius} m")
 
@@ -150,8 +148,7 @@ class Ellipse:
     b: float
 
     def __post_init__(self) -> None:
-        positive("half-axis a", self.a, "m")
-        positive("half-axis b", self.b, "m")
+        keep(self, positive, "m", "a", "b", what="half-axis {}")
 
     @property
     def area(self) -> float:
@@ -195,8 +192,7 @@ class RectangularSection:
     height: float
 
     def __post_init__(self) -> None:
-        positive("section width", self.width, "m")
-        positive("section height", self.height, "m")
+        keep(self, positive, "m", "width", "height", what="section {}")
 
     @property
     def area(self) -> float:
@@ -260,20 +256,16 @@ class GivenSection:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        for name, unit in (("EA", "N"), ("EI1", "N m2"), ("EI2", "N m2"), ("GJ", "N m2")):
-            positive(name, getattr(self, name), unit)
-        for name, unit in (("fibre_modulus", "Pa"), ("torsion_modulus", "m3")):
-            if getattr(self, name) is not None:
-                positive(name, getattr(self, name), unit)
-        for name, unit in (("mass", "kg/m"), ("rotary_inertia", "kg m")):
-            not_negative(name, getattr(self, name), unit)
+        keep(self, positive, "N", "EA")
+        keep(self, positive, "N m2", "EI1", "EI2", "GJ")
+        keep(self, positive, "Pa", "fibre_modulus")
+        keep(self, positive, "m3", "torsion_modulus")
+        keep(self, not_negative, "kg/m", "mass")
+        keep(self, not_negative, "kg m", "rotary_inertia")
         if self.fibre_distances is not None:
-            distances = self.fibre_distances
-            if not isinstance(distances, Sequence) or isinstance(distances, str) or len(distances) != 2:
-                raise InputError(f"fibre_distances must be two lengths along m1 and m2 in m, not {distances!r}")
-            for distance in distances:
-                positive("fibre distance", distance, "m")
-            object.__setattr__(self, "fibre_distances", tuple(distances))
+            given = numbers("fibre_distances", self.fibre_distances, "two lengths along m1 and m2 in m", 2, "m")
+            distances = tuple(positive("fibre distance", distance, "m") for distance in given)
+            object.__setattr__(self, "fibre_distances", distances)
 
     def parameters(self) -> dict[str, object]:
         """The section's kind and numbers in SI, as they stand in a case file."""

@@ -38,6 +38,7 @@ from rodshell.rods.elements import NO_HESSIANS, Elements, in_parts
 from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
 from rodshell.solve.problem import NO_CURVATURE, Constraint, Damping, Force, ImplicitForce, PointLoads, Supports
 from rodshell.solve.sparse_ldl import SingularError
+from rodshell.validation import array, described, function_of, listed
 
 MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
 
@@ -83,6 +84,24 @@ class Motion:
     forces: tuple[Force, ...] = ()
     explicit: tuple[Elements, ...] = ()
 
+    def __post_init__(self) -> None:
+        mass = array("the mass", self.mass, np.float64, None, 3)
+        if not (allowed := np.isfinite(mass) & (mass >= 0)).all():
+            where = np.argwhere(~allowed)[0].tolist()
+            raise InputError(f"the mass is {mass[tuple(where)]} at {where}: give finite numbers of 0 or more")
+        for name, values, needed in (
+            ("elements", self.elements, "evaluate"),
+            ("explicit", self.explicit, "evaluate"),
+            ("forces", self.forces, "held"),
+        ):
+            for value in listed(name, values, f"a tuple of objects with {needed}(...)"):
+                if not callable(getattr(value, needed, None)) or isinstance(value, type):
+                    raise InputError(f"each of {name} must have {needed}(...), not {described(value)}")
+        if not (callable(self.constraint) or callable(getattr(self.constraint, "freedom", None))):
+            raise InputError(
+                f"constraint must be rodshell supports, or a function of time, not {described(self.constraint)}"
+            )
+
     @classmethod
     def of(
         cls,
@@ -99,6 +118,8 @@ class Motion:
         constraint : as of `Motion`; one that never moves may be given as a `Freedom`.
         forces : external forces.
         """
+        if not all(hasattr(body, name) for name in ("elements", "explicit", "stretch", "mass", "freedom")):
+            raise InputError(f"body must be a rodshell ElasticRod or Shell, not {described(body)}")
         given = body.freedom() if constraint is None else constraint
         supports = Supports(given) if isinstance(given, Freedom) else given
         implicit = [element for element in body.elements if all(element is not other for other in body.explicit)]
@@ -154,6 +175,7 @@ class ImplicitEuler:
     """Takes single steps; keeps the matrix and the buffers between them, and nothing of the motion."""
 
     def __init__(self, matrix: MakeMatrix = narrow_or_sparse) -> None:
+        function_of("matrix", matrix, "a function of blocks and free directions", None, None)
         self._make_matrix = matrix
         self._planned: tuple[object, ...] = ()
 

@@ -19,7 +19,7 @@ from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.elements import Elements, Stretch
 from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl, product, upper_triangle
-from rodshell.validation import array, finite, instance, number, vector
+from rodshell.validation import array, finite, function_of, keep, number, vector
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -357,7 +357,8 @@ class Damping:
     coefficients: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
-        if number("the damping rate", self.rate, "1/s") < 0:
+        keep(self, number, "1/s", "rate", what="the damping {}")
+        if self.rate < 0:
             raise InputError(f"the damping rate must not be negative, not {self.rate} 1/s: it would feed energy in")
         try:
             shape = np.shape(self.coefficients)
@@ -386,7 +387,7 @@ class ExplicitForce:
     force: Callable[[float, Floats, Floats], Floats]
 
     def __post_init__(self) -> None:
-        instance("the force", self.force, Callable, "a function of time, state and velocity")  # type: ignore[arg-type]
+        function_of("the force", self.force, "a function of time, state and velocity", 0.0, None, None)
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
         """The force, evaluated once for the step.
@@ -415,6 +416,10 @@ class ImplicitForce:
 
     force: Callable[[float, Floats, Floats], tuple[Floats, Floats | None, Floats | None]]
     blocks: Ints
+
+    def __post_init__(self) -> None:
+        function_of("the force", self.force, "a function of time, state and velocity", 0.0, None, None)
+        object.__setattr__(self, "blocks", array("the blocks of a force", self.blocks, np.int64, None, None))
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> None:
         _check_blocks(self.blocks, len(mass))

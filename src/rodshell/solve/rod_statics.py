@@ -22,7 +22,7 @@ from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import NUDGE, Equilibrium, SolveReport, Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
-from rodshell.validation import array, direction, finite, flag, instance, mapping, texts, vector, whole
+from rodshell.validation import array, direction, finite, flag, instance, mapping, number, short, texts, vector, whole
 
 SPIN = (1.0, 0.0, 0.0)
 
@@ -86,6 +86,16 @@ class RodLoads:
 
     def __post_init__(self) -> None:
         mapping("moments", self.moments, "a mapping from edges or ends to moments in N m")
+        for place, moment in self.moments.items():
+            number(f"the moment at {short(place)}", moment, "N m")
+        if isinstance(self.forces, Mapping):
+            for node, force in self.forces.items():
+                vector(f"the force on node {short(node)}", force)
+        else:
+            given = array("the forces on all nodes", self.forces, np.float64, None, 3)
+            finite("the forces on all nodes", given, *given.shape)
+        if self.gravity is not None:
+            vector("gravity", self.gravity)
 
     def on(self, rod: ElasticRod, spinning: Sequence[End]) -> Floats:
         """(N, 3) load on each block [N, at angles N m].
@@ -108,7 +118,7 @@ class RodLoads:
         if self.moments and not rod.twists:
             raise InputError("this rod carries no twist angles: build it with twist=True")
         for place, given in self.moments.items():
-            moment = finite(f"the moment at {place!r}", given)
+            moment = finite(f"the moment at {short(place)}", given)
             if isinstance(place, str):
                 if place not in spinning:
                     raise InputError(f'the moment at "{place}" needs a clamp there that spins: spinning=("{place}",)')
@@ -237,7 +247,7 @@ def index_of(given: int, count: int, what: str) -> int:
     what : is counted, for messages: "node" or "edge".
     """
     if not isinstance(given, int | np.integer):
-        raise InputError(f"a {what} is a whole number, not {given!r}")
+        raise InputError(f"a {what} is a whole number, not {short(given)}")
     if not -count <= given < count:
         raise InputError(f"the rod has no {what} {given}: they run from 0 to {count - 1}")
     return given % count

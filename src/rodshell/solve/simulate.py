@@ -6,20 +6,25 @@ What a motion leaves behind is a `TimeSeries`: its states at chosen times, in me
 import time as clock
 from collections.abc import Callable
 from enum import Enum
-from math import ceil, isfinite
+from math import ceil
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError, OutputError
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused, Step
 from rodshell.solve.linear_stability import refuse_unstable
+from rodshell.untrusted import limit, raised
+from rodshell.validation import array, file_path, finite, flag, function_of, instance, number, positive, whole
 
 EASY = 5  # Newton iterations after which a step that was halved may grow back
 HALVINGS = 20
+MOST_HALVINGS = 50  # a step of 1e-15 of the longest
+RECORD = 2e9  # bytes of the samples of a motion
 NAMES = ("times", "states", "velocities", "energies")  # of the files of a time series
 
 
@@ -113,18 +118,17 @@ class TimeSeries:
 
 
 class Recorder:
-    """Room for `rows` samples, in memory or as one .npy file each in the folder `stream`, which holds none yet.
+    """Room for `rows` samples, in memory or as one .npy file each in a folder, which holds none yet.
 
     A row counts once its time is written, which is last: a kill leaves complete rows only.
     """
 
-    def __init__(self, rows: int, shape: tuple[int, ...], stream: str | Path | None) -> None:
+    def __init__(self, rows: int, shape: tuple[int, ...], folder: Path | None) -> None:
         shapes = ((rows,), (rows, *shape), (rows, *shape), (rows, 2))
         self._arrays: list[Floats]
-        if stream is None:
+        if folder is None:
             self._arrays = [np.zeros(size) for size in shapes]
         else:
-            folder = Path(stream)
             there = [folder / f"{name}.npy" for name in NAMES if (folder / f"{name}.npy").exists()]
             if there:
                 raise OutputError(f"will not replace {there[0]}: give a folder that holds no time series, or move that")
@@ -147,9 +151,9 @@ class Recorder:
         self._next += 1
 
     def series(self, last: Sample, report: MotionReport) -> TimeSeries:
-        for array in self._arrays:
-            if isinstance(array, np.memmap):
-                array.flush()
+        for part in self._arrays:
+            if isinstance(part, np.memmap):
+                part.flush()
         count = _written(self._arrays[0])
         times, states, velocities, energies = (array[:count] for array in self._arrays)
         return TimeSeries(np.array(times), states, velocities, np.array(energies), last, report)
@@ -219,14 +223,37 @@ def simulate(
     OutputError : `stream` cannot be written, or holds a record.
     InputError : a value that is not finite comes in, from the caller or from a force.
     """
-    velocity = np.zeros_like(state) if velocity is None else velocity
-    _check(motion, state, velocity, until - start, step, every, halvings)
+    instance("motion", motion, Motion)
+    state = _of_motion("the state", state, motion)
+    velocity = np.zeros_like(state) if velocity is None else _of_motion("the velocity", velocity, motion)
+    if not motion.mass.any():
+        raise InputError("nothing here has mass: give the section a mass per length, or a material")
+    step, until, start = positive("the step", step, "s"), number("until", until, "s"), number("start", start, "s")
+    every, halvings = whole("every", every, 1), whole("halvings", halvings, 0, MOST_HALVINGS)
+    for name, given in (("progress", progress), ("stop", stop)):
+        if given is not None:
+            function_of(name, given, "a function of a sample", None)
+    if stepper is not None:
+        take = getattr(stepper, "take", None)
+        wanted = "a function of motion, state, velocity, time and step"
+        function_of("stepper.take", take, wanted, motion, state, velocity, time=start, step=step)
+    folder = None if stream is None else file_path("stream", stream)
+    interruptible = flag("interruptible", interruptible)
+    if not until > start:
+        raise InputError(f"the motion must end after it starts, not {until - start} s later")
+    positive("the duration of the motion", until - start, "s")
     count = max(1, ceil((until - start) / step - 1e-9))
+    samples = 1 + count // every
+    if (size := samples * 2 * state.nbytes) > limit(RECORD):
+        raise InputError(
+            f"{samples} samples of this motion take {size / 1e9:.4g} GB: use a larger step, record every 10th one, "
+            f"{raised(RECORD, size)}"
+        )
     refuse_unstable(motion, state, (until - start) / count)
     begun, end = clock.perf_counter(), End.FINISHED
     grid, first = _Grid(start, (until - start) / count), Sample(start, state.copy(), velocity.copy(), motion.in_parts())
-    march = _March(stepper or ImplicitEuler(), grid, first, halvings)
-    recorder = Recorder(1 + count // every, state.shape, stream)
+    march = _March(ImplicitEuler() if stepper is None else stepper, grid, first, halvings)
+    recorder = Recorder(samples, state.shape, folder)
 
     def record() -> None:
         recorder.add(march.sample)
@@ -333,26 +360,6 @@ class _Grid:
         return _Grid(self.start, self.length, number, level, part)
 
 
-def _check(
-    motion: Motion, state: Floats, velocity: Floats, duration: float, step: float, every: int, halvings: int
-) -> None:
-    shape = motion.mass.shape
-    for name, array in (("state", state), ("velocity", velocity), ("mass", motion.mass)):
-        if array.shape != shape:
-            raise InputError(f"the {name} has the shape {array.shape}: give one of the mass's, {shape}")
-        if not np.isfinite(array).all():
-            where = np.argwhere(~np.isfinite(array))[0].tolist()
-            raise InputError(f"the {name} is {array[tuple(where)]} at {where}: give finite numbers")
-    if not (motion.mass >= 0).all():
-        where = np.argwhere(motion.mass < 0)[0].tolist()
-        raise InputError(f"the mass is {motion.mass[tuple(where)]} at {where}: masses must not be negative")
-    if not motion.mass.any():
-        raise InputError("nothing here has mass: give the section a mass per length, or a material")
-    if not (isfinite(step) and step > 0):
-        raise InputError(f"the step must be positive, not {step} s")
-    if not (isfinite(duration) and duration > 0):
-        raise InputError(f"the motion must end after it starts, not {duration} s later")
-    if halvings < 0:
-        raise InputError(f"a step may be halved 0, 1, ... times, not {halvings}")
-    if every < 1:
-        raise InputError(f"record every 1, 2, ... steps, not every {every}")
+def _of_motion(name: str, given: ArrayLike, motion: Motion) -> Floats:
+    """An array (N, 3) as the motion has blocks."""
+    return finite(name, array(name, given, np.float64, *motion.mass.shape), *motion.mass.shape)

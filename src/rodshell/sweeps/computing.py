@@ -10,7 +10,7 @@ from typing import Any
 from rodshell.dataclass import dataclass
 from rodshell.errors import OutputError, RodshellError
 from rodshell.job import Job
-from rodshell.progress import Progress
+from rodshell.progress import Progress, require_progress
 from rodshell.sweeps.engines import Engine, opened_engine
 from rodshell.sweeps.identity import job_identity, program_version
 from rodshell.sweeps.plan import Plan
@@ -158,6 +158,7 @@ def opened_computation(
     InputError, EngineError : the engine cannot be used. OutputError : the folder cannot be written, is in use, or has
         files that are not of a sweep. KeyboardInterrupt : with what is finished, in a sentence.
     """
+    require_progress(progress)
     _require_own(folder)
     with Store(folder, writing=True) as store:
         if plan.origin.text:

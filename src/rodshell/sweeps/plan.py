@@ -1,7 +1,6 @@
 """The plan of a sweep: base, axes, columns and how it is run, read from a TOML file or a mapping."""
 
 import shlex
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from itertools import product
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from rodshell.case import BUILT_IN
-from rodshell.case.load import flattened
+from rodshell.case.load import flattened, toml_of
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.job import Job
@@ -211,10 +210,7 @@ def _opened(source: Source) -> tuple[str, str, Path, Mapping[str, Any]]:
         return "sweep", "", Path(), source
     path = file_path("the sweep", source)
     text = read_text(path)
-    try:
-        return path.stem, text, path.parent, tomllib.loads(text)
-    except (ValueError, RecursionError) as reason:
-        raise InputError(f"{path} is not valid TOML: {reason}") from None
+    return path.stem, text, path.parent, toml_of(str(path), text)
 
 
 def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:

@@ -22,7 +22,7 @@ from rodshell.targets.mesh_files import (
 )
 from rodshell.targets.nurbs_files import RHINO_FILES, STEP_FILES, grid_triangles, read_3dm, read_step
 from rodshell.units import length_text, shown
-from rodshell.validation import file_path, instance, number, numbers, positive
+from rodshell.validation import file_path, instance, keep, number, numbers, positive
 
 File = str | PathLike[str]
 
@@ -288,9 +288,9 @@ class Placement:
     move: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        positive("target scale", self.scale, "")
-        turn = numbers("target turn", self.turn, "three finite angles about x, y and z in rad", 3)
-        move = numbers("target move", self.move, "three finite lengths along x, y and z in m", 3)
+        keep(self, positive, "", "scale", what="target {}")
+        turn = numbers("target turn", self.turn, "three finite angles about x, y and z in rad", 3, "rad")
+        move = numbers("target move", self.move, "three finite lengths along x, y and z in m", 3, "m")
         object.__setattr__(self, "turn", turn)
         object.__setattr__(self, "move", move)
 
@@ -386,7 +386,7 @@ def heights_from(
     InputError : an argument or a file cannot be used; one sentence says why.
     """
     path = file_path("file", file)
-    width, depth = numbers("size", size, "two lengths in m: width along x, depth along y", 2)
+    width, depth = numbers("size", size, "two lengths in m: width along x, depth along y", 2, "m")
     positive("size", width, "m")
     positive("size", depth, "m")
     if height is not None:

@@ -346,7 +346,7 @@ class HeightField(WalledTarget):
     def _heights(self) -> Heights:
         if self.function is None:
             label = f"the height field {shown(self.formula)}"
-            heights = Heights(parse_formula(self.formula or ""), self.size)
+            heights = Heights(parse_formula("" if self.formula is None else self.formula), self.size)
         else:
             label = f"the height field of {_qualified_name(self.function)}"
             heights = Heights(self.function, self.size, exact=_takes_jets(self.function, self.size))

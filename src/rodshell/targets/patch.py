@@ -1,7 +1,6 @@
 """Patches: the parts into which seams cut a target, each itself a target that ends at them."""
 
 from functools import cached_property
-from reprlib import repr as short
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +10,7 @@ from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import unit
 from rodshell.targets.target import Gap, Implicit, Target
+from rodshell.validation import LARGEST, short
 
 BEYOND = 1e3  # lengths of an open seam by which its two ends are prolonged
 
@@ -42,9 +42,9 @@ class Seam:
         """
         try:
             given = np.asarray(points, dtype=float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"a seam must be a list of points (x, y) in m, not {short(points)}") from None
-        if given.ndim != 2 or given.shape[1] not in (2, 3) or not np.isfinite(given).all():
+        if given.ndim != 2 or given.shape[1] not in (2, 3) or not (np.abs(given) < LARGEST).all():
             raise InputError(f"a seam must be a list of finite points (x, y) in m, not of the shape {given.shape}")
         plan = given[:, :2]
         plan = plan[np.append(True, np.linalg.norm(np.diff(plan, axis=0), axis=1) > 0)]

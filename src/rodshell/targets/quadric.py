@@ -13,7 +13,7 @@ from rodshell.kernels import njit
 from rodshell.targets.rim import Disc, Domain, EllipseDomain
 from rodshell.targets.target import Implicit
 from rodshell.targets.wall_below_rim import WalledTarget
-from rodshell.validation import number, positive
+from rodshell.validation import keep, number, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class Hemisphere(_Quadric):
     radius: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", positive("target radius", self.radius, "m"))
+        keep(self, positive, "m", "radius", what="target {}")
 
     @property
     def name(self) -> str:
@@ -143,7 +143,7 @@ class Cap(Hemisphere):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "base", number("target base", self.base, "m"))
+        keep(self, number, "m", "base", what="target {}")
         if not abs(self.base) < self.radius:
             raise InputError(
                 f"the cap's base plane z = {self.base} m must cut the sphere of radius {self.radius} m: "
@@ -185,8 +185,7 @@ class Paraboloid(_Quadric):
     height: float
 
     def __post_init__(self) -> None:
-        for name in ("radius", "height"):
-            object.__setattr__(self, name, positive(f"target {name}", getattr(self, name), "m"))
+        keep(self, positive, "m", "radius", "height", what="target {}")
 
     @property
     def name(self) -> str:
@@ -235,8 +234,7 @@ class Ellipsoid(_Quadric):
     c: float
 
     def __post_init__(self) -> None:
-        for axis in "abc":
-            object.__setattr__(self, axis, positive(f"target {axis}", getattr(self, axis), "m"))
+        keep(self, positive, "m", *"abc", what="target {}")
 
     @property
     def name(self) -> str:

@@ -16,7 +16,7 @@ from rodshell.dataclass import dataclass
 from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
-from rodshell.validation import numbers, positive
+from rodshell.validation import keep, numbers, positive
 
 CORNER = 0.5  # cosine of 60 degrees: a loop is not rounded where its edges turn by more
 POINTS = 1500  # on each loop
@@ -84,7 +84,7 @@ class Disc:
     radius: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", positive("domain radius", self.radius, "m"))
+        keep(self, positive, "m", "radius", what="domain {}")
 
     @property
     def half_extent(self) -> tuple[float, float]:
@@ -117,8 +117,7 @@ class EllipseDomain:
     b: float
 
     def __post_init__(self) -> None:
-        for axis in ("a", "b"):
-            object.__setattr__(self, axis, positive(f"domain {axis}", getattr(self, axis), "m"))
+        keep(self, positive, "m", "a", "b", what="domain {}")
 
     @property
     def half_extent(self) -> tuple[float, float]:
