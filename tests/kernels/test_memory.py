@@ -11,6 +11,6 @@ def test_a_compiled_kernel_without_memory_says_so():
     def kernel(x):
         raise TypeError("exceptions must derive from BaseException")  # as Numba's machine code does
 
-    with pytest.raises(MemoryError, match="out of memory: use a larger spacing") as caught:
+    with pytest.raises(MemoryError, match="out of memory: give fewer rods") as caught:
         _taking_any_array(kernel)(np.zeros(3))
     assert isinstance(caught.value, RodshellError)
