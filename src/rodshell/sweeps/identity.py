@@ -12,6 +12,8 @@ from typing import Any
 import rodshell
 from rodshell.errors import InputError
 from rodshell.job import Job
+from rodshell.targets.gltf import gltf_parts
+from rodshell.targets.mesh_files import file_bytes
 from rodshell.units import shown
 from rodshell.version import __version__
 
@@ -45,18 +47,15 @@ def content_digest(path: Path) -> str:
         return _digest(path.absolute(), stat.st_mtime_ns, stat.st_size)
     except OSError as error:
         raise InputError(f"target.file = {shown(str(path))} cannot be read: {error.strerror}") from None
-    except (ValueError, AttributeError, TypeError):
-        raise InputError(f"target.file = {shown(str(path))} cannot be read: it is not a glTF file") from None
 
 
 @cache
 def _digest(path: Path, _modified: int, _size: int) -> str:
-    content = path.read_bytes()
+    content = file_bytes(path)
     digest = hashlib.sha256(content)
     if path.suffix.lower() == ".gltf":
-        for part in json.loads(content).get("buffers", ()):
-            if not str(part.get("uri", "data:")).startswith("data:"):
-                digest.update((path.parent / part["uri"]).read_bytes())
+        for part in gltf_parts(path, content).values():
+            digest.update(part)
     return f"{path.suffix.lower()} {digest.hexdigest()}"
 
 
