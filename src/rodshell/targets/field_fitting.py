@@ -164,7 +164,8 @@ def _doors(rim: Floats, spacing: float) -> list[Floats]:
     except QhullError:  # a line
         return []
     extent, doors = float(np.ptp(rim, axis=0).max()), list[Floats]()
-    for first, stop in zip(corners, np.append(corners[1:], corners[0] + len(rim)), strict=True):
+    stops = np.append(corners[1:], corners[0] + len(rim))
+    for first, stop in np.column_stack([corners, stops])[stops - corners > 1].tolist():
         x = rim[np.arange(first, stop + 1) % len(rim)]
         along = unit(x[-1:] - x[:1])
         off = np.linalg.norm(cross(x - x[:1], np.broadcast_to(along, x.shape)), axis=1)

@@ -26,6 +26,7 @@ OFF = 0.005  # of the size: where a vertex is further off its smooth field, the 
 ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
+MOST_ALONG = 100_000  # points of all these curves
 MOST_ENDS = 200  # closed curves at which a surface ends: each is followed at 1,500 points
 AT_ONCE = 500_000  # pairs of a point and a facet that are looked at together
 
@@ -305,11 +306,13 @@ class Freeform(Target):
 
     def _require_an_end(self, name: str) -> None:
         ends = len(self.surface.loops) + len(self.curves)
-        if ends > limit(MOST_ENDS):
-            raise InputError(
-                f"{name} ends at {ends} closed curves, and at most {limit(MOST_ENDS):.0f} are followed: fill its "
-                f"openings, {raised(MOST_ENDS, ends)}"
-            )
+        along = sum(map(len, (*self.surface.loops, *self.curves)))
+        for count, most, what in ((ends, MOST_ENDS, "closed curves"), (along, MOST_ALONG, "points")):
+            if count > limit(most):
+                raise InputError(
+                    f"{name} ends at {count} {what}, and at most {limit(most):.0f} are followed: fill its openings, "
+                    f"or mesh it more coarsely, {raised(most, count)}"
+                )
         for curve in self.curves:
             far = float(np.abs(curve).max(initial=0.0))
             if not far <= FARTHEST:

@@ -27,7 +27,7 @@ SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a gridshell can have
 WHOLE = 0.97  # of the vertices of a complete file belong to faces; fewer in a truncated one
 HEAD = 4000  # bytes that hold the header
 MOST_HEIGHTS = MOST_FACES // 2
-MOST_PARTS = 2000  # objects, nodes, solids, lines of a header: readers need time for each pair of them
+MOST_PARTS = 500  # nodes, solids, properties: readers need time for each pair of them
 MOST_STROKES = 5_000  # curves of a drawing: they are joined end to end
 NO_INDEX = re.compile(rb"^f[ \t](?:.*[ \t])?-?0+(?![^\s/]).*", re.MULTILINE)  # indices begin at 1
 SAG = 1e-4  # of a curve's extent: how finely arcs and splines of a DXF are divided
@@ -170,7 +170,7 @@ def _require_bounds(path: Path, data: bytes) -> None:
     if kind == ".stl":
         counts = {"solids": data.count(b"endsolid")}
     elif kind == ".ply":
-        counts = {"lines of its header": data[: data.find(b"end_header")].count(b"\n")}
+        counts = {"properties": data[: data.find(b"end_header")].count(b"property")}
     elif kind == ".obj" and (wrong := NO_INDEX.search(data)):
         raise InputError(f"{path} is damaged: a face refers to vertex 0 ({shown(wrong[0].decode())}): export it again")
     elif kind in IN_METRES:
