@@ -317,6 +317,7 @@ def _smooth_piece(
             f"{100 * share:.0f} % of the area"
         )
         mesh = mesh.only(pieces == chosen)
+        _Neighbours.of(mesh, name)  # refuses a piece that touches itself in a point
     if not closed and plan[chosen] < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
     return mesh, repairs
