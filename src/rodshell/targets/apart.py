@@ -1,7 +1,7 @@
 """Readers that a damaged file can crash, or hold for ever: each runs in a process of its own, with bounds.
 
-A reader is a program beside this module that imports nothing of rodshell. It has a function `main`, which takes a
-dictionary with the `path` of a copy of the file and whatever else it needs, and returns arrays.
+A reader is a program in the folder of this module that imports nothing of rodshell. It has a function `main`, which
+takes a dictionary with the `path` of a copy of the file and whatever else it needs, and returns arrays.
 """
 
 import json

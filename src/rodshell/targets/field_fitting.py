@@ -37,7 +37,7 @@ RIDGE = 1e-7  # of the sum of weights: keeps the least squares regular where poi
 # past an open rim
 EASE = 1.5  # [rad] curvature fades as 1 / (1 + turned / EASE), so that the surface does not roll up
 DIRECTIONS = 12  # in which the next cubics are placed around a cubic past the rim
-STEEP = 5.0  # spacings: a cubic that rises by more over one spacing is no continuation
+STEEP = 5.0  # spacings: a cubic that rises by more over one spacing does not continue the surface
 MEANS = 10  # cubics whose mean a new cubic is
 
 
@@ -83,7 +83,7 @@ def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
     faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
     areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.areas * (divisions == 1) / 3, 3), len(mesh.vertices))
     rim_first = np.argsort(~np.isin(np.arange(len(mesh.vertices)), np.concatenate([[-1], *mesh.loops])), kind="stable")
-    found = [(mesh.vertices[rim_first], mesh.normals[rim_first], areas[rim_first])]
+    found: list[_Parts] = [(mesh.vertices[rim_first], mesh.normals[rim_first], np.asarray(areas[rim_first], float))]
     for n, is_narrow in product(np.unique(divisions[divisions > 1]).tolist(), (False, True)):
         share = np.array([(i, j, n - i - j) for i in range(n + 1) for j in range(n + 1 - i)]).T / n
         if is_narrow:
@@ -335,7 +335,7 @@ def _proposals(field: SmoothField, front: Ints, points: CellList) -> Floats:
     terms = np.stack([np.ones(DIRECTIONS), a, b, a * a, a * b, b * b, a**3, a * a * b, a * b * b, b**3])
     lift = field.coefficients[front] @ terms
     around = np.stack(np.broadcast_arrays(s * a, s * b, lift), axis=2) @ field.frames[front]
-    sites = (field.centres[front][:, None] + around)[np.abs(lift) < STEEP * s]
+    sites: Floats = (field.centres[front][:, None] + around)[np.abs(lift) < STEEP * s]
     sites = sites[field.cells.nearest(sites, limit=0.8 * s)[0][:, 0] > 0.8 * s]
     sites = sites[points.nearest(sites, limit=0.6 * s)[0][:, 0] > 0.6 * s]
     return sites[CellList.of(sites, s).spread(0.8 * s)] if len(sites) else sites

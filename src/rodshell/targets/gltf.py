@@ -1,4 +1,4 @@
-"""What a glTF file announces, checked before it is read: counts, sizes, and the files beside it that it names."""
+"""What a glTF file announces, checked before it is read: counts, sizes, and the files that it names."""
 
 import json
 from pathlib import Path, PurePosixPath
@@ -21,7 +21,7 @@ def gltf_counts(path: Path, data: bytes) -> dict[str, int]:
 
     Raises
     ------
-    InputError : it is no glTF file, or announces more numbers than are read.
+    InputError : it is not a glTF file, or announces more numbers than are read.
     """
     try:
         tree = _tree(path, data)
@@ -40,11 +40,11 @@ def gltf_counts(path: Path, data: bytes) -> dict[str, int]:
 
 
 def gltf_parts(path: Path, data: bytes) -> dict[str, bytes]:
-    """The contents of the files beside a .gltf file that it names as its buffers, by these names.
+    """The contents of the files that a .gltf file names as its buffers, by these names.
 
     Raises
     ------
-    InputError : it is no glTF file; a name leads out of its folder; a file is missing or too large.
+    InputError : it is not a glTF file; a name leads out of its folder; a file is missing or too large.
     """
     try:
         names = [str(part.get("uri", "data:")) for part in _tree(path, data).get("buffers", ())]

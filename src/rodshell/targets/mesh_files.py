@@ -313,12 +313,11 @@ def _of_obj(path: Path, data: bytes) -> list[Floats]:
     try:
         for words in map(str.split, recoded(data).decode("utf-8").splitlines()):
             if words[:1] == ["v"]:
-                x, y, z = map(float, words[1:4])
-                points.append([x, y, z])
+                points.append([float(word) for word in words[1:4]])
             elif words[:1] == ["l"]:
                 lines.append([int(word.split("/")[0]) for word in words[1:]])
         _require_few_strokes(path, len(lines))
-        x = np.array(points).reshape(-1, 3)
+        x = np.array(points, dtype=float).reshape(len(points), 3)
         return [x[[k - 1 if k > 0 else k or len(x) for k in line]] for line in lines]  # 0 is refused
     except (ValueError, IndexError) as reason:
         raise unreadable(path, "a drawing of curves", reason) from None

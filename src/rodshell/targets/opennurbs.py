@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rhino3dm
 
 
 def main(request: dict[str, Any]) -> dict[str, Any]:
@@ -17,10 +16,12 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
 
     Returns
     -------
-    `unit`, by its name, and `names` (JSON: object, layer and number of faces of each surface); nothing for a file that
-    is none. If one surface with one face matches, also `degrees` (2,), `knots_u` and `knots_v` without the first and
-    the last, `controls` (m, n, 4) and `trims` (k, along_edges + 1, 3), the curves that bound it.
+    `unit`, by its name, and `names` (JSON: object, layer and number of faces of each surface); nothing for another
+    kind of file. If one surface with one face matches, also `degrees` (2,), `knots_u` and `knots_v` without the first
+    and the last, `controls` (m, n, 4) and `trims` (k, along_edges + 1, 3), the curves that bound it.
     """
+    import rhino3dm
+
     model = rhino3dm.File3dm.FromByteArray(Path(request["path"]).read_bytes())  # type: ignore[arg-type]
     if model is None:
         return {}
@@ -38,6 +39,8 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
 
 def surfaces_of(model: Any) -> Any:
     """Name, layer, number of faces and shape of every surface object."""
+    import rhino3dm
+
     layers = {layer.Index: layer.Name for layer in model.Layers}
     for item in model.Objects:
         shape, attributes = item.Geometry, item.Attributes
