@@ -14,6 +14,7 @@ from typing import Any
 import ezdxf
 import numpy as np
 import pytest
+from PIL import Image
 
 import rodshell as rs
 from rodshell import untrusted
