@@ -338,8 +338,9 @@ def test_reader_apart_has_bounded_memory_and_time(tmp_path: Path, monkeypatch: p
     ("text", "said"),
     [("1,2,3,4\n" + "," * 3_000_000 + "\n1,2,3,4\n1,2,3,4\n", "rows have 4 to 5 heights"),
      ("," * 3_000_000, "scale it down"), ("1e200,2,3,4\n" * 5, "m wide|no extent|not finite"),
+     ("1,2,3\n", "1 with 1 different x and 1 different y, which is not a complete lattice"),
      ("1,2,3,1e50\n" * 5, r"is 1e\+50 m wide in this unit .* give another size or height")],
-    ids=["row", "first row", "far", "high"],
+    ids=["row", "first row", "far", "point", "high"],
 )  # fmt: skip
 def test_table_of_absurd_heights_is_refused(text: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "roof.csv").write_text(text)

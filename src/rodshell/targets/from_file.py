@@ -170,7 +170,7 @@ def _lattice(path: Path, points: Floats, size: tuple[float, float]) -> tuple[Flo
         raise InputError(f"{path} seems to have points x, y, z, and some lack x or y: give both for every point")
     (x, column), (y, row) = (np.unique(points[:, k], return_inverse=True) for k in (0, 1))
     cells = np.unique(row * len(x) + column)
-    if len(points) != len(x) * len(y) or len(cells) != len(points):
+    if len(points) != len(x) * len(y) or len(cells) != len(points) or min(len(x), len(y)) < 2:
         raise InputError(
             f"{path} seems to have points x, y, z: {len(points)} with {len(x)} different x and {len(y)} different y, "
             "which is not a complete lattice: sample one height for each x and y, or mesh the points"
