@@ -573,7 +573,7 @@ def test_a_job_without_memory_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch
         np.empty(2**55)
 
     monkeypatch.setattr("rodshell.run.Run.form", too_large)
-    with pytest.raises(rs.RodshellError, match="out of memory .Unable to allocate.*: give fewer rods"):
+    with pytest.raises(rs.RodshellError, match=r"out of memory .Unable to allocate.*: give fewer rods"):
         rs.Job.load("hemisphere").run()
 
 

@@ -66,7 +66,7 @@ def read_bytes(path: Path, most: float, *, smaller: str = "") -> bytes:
     except FileNotFoundError:
         raise InputError(f"there is no file named {shown(str(path))}: check the path") from None
     except OSError as reason:
-        if path.is_dir():  # as Windows says
+        if os.path.isdir(path):  # as Windows says; unlike `Path.is_dir`, it takes any name
             raise InputError(f"{path} is a folder: give a file") from None
         raise InputError(f"{path} cannot be read: {reason.strerror}") from None
     try:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.targets import nurbs_files
+from rodshell.targets import apart, nurbs_files
 from tests.targets.meshes import Floats
 from tests.targets.stepfile import StepFile
 
@@ -113,9 +113,9 @@ def test_without_opencascade_the_sentence_says_how_to_get_it(tmp_path, monkeypat
     ],
 )
 def test_a_reader_that_falls_or_hangs_is_told_of_in_one_sentence(does, said, tmp_path, monkeypatch):
-    (tmp_path / "reader.py").write_text(does)
-    monkeypatch.setattr(nurbs_files, "READER", tmp_path / "reader.py")
-    monkeypatch.setattr(nurbs_files, "LONGEST", 1.0)
+    (tmp_path / "opencascade.py").write_text(does)
+    monkeypatch.setattr(nurbs_files, "READERS", tmp_path)
+    monkeypatch.setattr(apart, "LONGEST", 1.0)
     monkeypatch.setattr(nurbs_files, "find_spec", lambda name: True)
     with pytest.raises(rs.InputError, match=said):
         rs.surface_from(written(tmp_path / "saddle.step", saddle()))

@@ -14,6 +14,7 @@ from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, Profile, straight_rods
 from rodshell.results.records import Stiffness
 from rodshell.units import length_text, parse_quantity, read_unit, shown
+from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import instance, positive
 
 COLUMNS = (
@@ -21,6 +22,7 @@ COLUMNS = (
     "final_x0", "final_y0", "final_z0", "final_x1", "final_y1", "final_z1",
 )  # fmt: skip
 MILLIMETRE = 1e-3
+MOST_RODS = 10_000
 LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
 
 
@@ -105,15 +107,19 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
         scale = None if unit is None else float(read_unit(unit, "length"))
     except ValueError as reason:
         raise InputError(f"unit = {shown(unit)}: {reason}") from None
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as reason:
-        raise InputError(f"{path} cannot be read: {reason.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not text in UTF-8: give a CSV table") from None
+    lines = read_text(path, instead="give a CSV table").splitlines()
+    if len(lines) > limit(MOST_RODS):
+        raise InputError(
+            f"{path} has {len(lines)} lines, and at most {limit(MOST_RODS):.0f} are read: give one for each rod, "
+            f"{raised(MOST_RODS, len(lines))}"
+        )
     delimiter = max(",;\t", key=lines[0].count) if lines else ","
     reader = csv.reader(lines, delimiter=delimiter)
-    header = [name.strip() for name in next(reader, [])]
+    try:
+        table = [(reader.line_num, cells) for cells in reader]
+    except csv.Error as reason:
+        raise InputError(f"{path} line {reader.line_num} is not a row of a CSV table: {reason}") from None
+    header = [name.strip() for name in table[0][1]] if table else []
     columns = _columns(path, header)
     if columns != COLUMNS:
         if scale not in (None, MILLIMETRE):
@@ -122,7 +128,7 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     if scale is None:
         raise InputError("unit is missing: give the unit of the table's coordinates, such as m (--unit m)")
     names, numbers = list[str](), list[list[float]]()
-    for where, row in _rows(path, [(reader.line_num, cells) for cells in reader], header, delimiter):
+    for where, row in _rows(path, table[1:], header, delimiter):
         numbers.append([parse_quantity(row[column], "number", f"{where}, {column}") for column in columns])
         names.append(row.get("id", "").strip())
     if not numbers:
@@ -145,7 +151,7 @@ def _columns(path: Path, header: list[str]) -> tuple[str, ...]:
         return in_mm
     for column in COLUMNS:
         if column not in header:
-            near = get_close_matches(column, header, n=1)
+            near = get_close_matches(column, header[:100], n=1)
             hint = f" ({near[0]} looks like it)" if near and near[0] not in COLUMNS else ""
             raise InputError(
                 f"{path}: the column {column} is missing{hint}; it needs {', '.join(COLUMNS)}, or all of them with _mm"
@@ -171,10 +177,12 @@ def _rows(
 def _labels(path: Path, names: list[str]) -> list[str] | None:
     if not any(names):
         return None
+    known = set[str]()
     for k, name in enumerate(names):
-        if not name or name in names[:k]:
-            fault = f'the id "{name}" occurs twice' if name else f"rod {k + 1} has no id"
+        if not name or name in known:
+            fault = f"the id {shown(name)} occurs twice" if name else f"rod {k + 1} has no id"
             raise InputError(f"{path}: {fault}: give each rod its own, or leave the column out")
+        known.add(name)
     return names
 
 

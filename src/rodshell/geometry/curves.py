@@ -191,23 +191,27 @@ def join_end_to_end(strokes: Iterable[Floats]) -> list[Floats]:
     -------
     Polylines (n, 3); a closed polyline ends with its first point.
     """
-    left = list(strokes)
-    if not left:
+    given = list(strokes)
+    if not given:
         return []
-    tiny = TOUCH * float(np.ptp(np.vstack(left), axis=0).max())
+    tiny = TOUCH * float(np.ptp(np.vstack(given), axis=0).max())
+    ends, free = np.array([(stroke[0], stroke[-1]) for stroke in given]), np.ones(len(given), dtype=bool)
     lines = list[Floats]()
-    while left:
-        chain, turned = left.pop(), 0
-        while np.linalg.norm(chain[-1] - chain[0]) > tiny:
-            near = [(k, flip) for k, s in enumerate(left) for flip in (False, True)
-                    if np.linalg.norm((s[-1] if flip else s[0]) - chain[-1]) <= tiny]  # fmt: skip
-            if near:
-                k, flip = near[0]
-                stroke = left.pop(k)
-                chain = np.vstack([chain, (stroke[::-1] if flip else stroke)[1:]])
+    for last in range(len(given) - 1, -1, -1):
+        if not free[last]:
+            continue
+        free[last], pieces, turned = False, [given[last]], False
+        while np.linalg.norm(pieces[-1][-1] - pieces[0][0]) > tiny:
+            near = np.argwhere(free[:, None] & (np.linalg.norm(ends - pieces[-1][-1], axis=2) <= tiny))
+            if len(near):
+                k, flip = near[0].tolist()
+                free[k] = False
+                pieces.append((given[k][::-1] if flip else given[k])[1:])
             elif turned:
                 break
             else:
-                chain, turned = chain[::-1], 1
-        lines.append(np.vstack([chain[:-1], chain[:1]]) if np.linalg.norm(chain[-1] - chain[0]) <= tiny else chain)
+                pieces, turned = [piece[::-1] for piece in reversed(pieces)], True
+        line = np.vstack(pieces)
+        closed = np.linalg.norm(line[-1] - line[0]) <= tiny
+        lines.append(np.vstack([line[:-1], line[:1]]) if closed else line)
     return lines

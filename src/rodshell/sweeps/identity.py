@@ -12,12 +12,12 @@ from typing import Any
 from rodshell.case.load import FILE_KEYS
 from rodshell.errors import InputError
 from rodshell.job import Job
+from rodshell.targets.gltf import gltf_parts
+from rodshell.targets.mesh_files import file_bytes
 from rodshell.units import shown
-from rodshell.untrusted import read_bytes
 from rodshell.version import __version__
 
 DIGITS = 32
-MOST = 1e9  # bytes of a file; readers of files are stricter
 
 
 def job_identity(job: Job, until: str) -> str:
@@ -50,18 +50,15 @@ def content_digest(path: Path) -> str:
         raise
     except OSError as error:
         raise InputError(f"target.file = {shown(str(path))} cannot be read: {error.strerror}") from None
-    except (ValueError, AttributeError, TypeError):
-        raise InputError(f"target.file = {shown(str(path))} cannot be read: it is not a glTF file") from None
 
 
 @cache
 def _digest(path: Path, _modified: int, _size: int) -> str:
-    content = read_bytes(path, MOST)
+    content = file_bytes(path)
     digest = hashlib.sha256(content)
     if path.suffix.lower() == ".gltf":
-        for part in json.loads(content).get("buffers", ()):
-            if not str(part.get("uri", "data:")).startswith("data:"):
-                digest.update(read_bytes(path.parent / part["uri"], MOST))
+        for part in gltf_parts(path, content).values():
+            digest.update(part)
     return f"{path.suffix.lower()} {digest.hexdigest()}"
 
 

@@ -1,6 +1,7 @@
 """From a triangle mesh to its smooth field: samples, openings filled, least squares, continuation past an open rim."""
 
 from dataclasses import replace
+from itertools import product
 from math import pi, sqrt
 
 import numpy as np
@@ -16,6 +17,7 @@ from rodshell.targets.trianglemesh import TriangleMesh, unique_rows
 LONGEST = 0.9  # spacings: longest edge that is not divided
 FINEST = 48  # divisions of an edge
 APART = 0.2  # spacings: samples closer to each other are merged
+AT_ONCE = 1_000_000  # samples that are held before they are merged
 
 # openings
 STEEPEST = 0.35  # cosine between an opening's axis and the normals around it: beyond it no cap fits, as on a tube
@@ -35,6 +37,7 @@ RIDGE = 1e-7  # of the sum of weights: keeps the least squares regular where poi
 # past an open rim
 EASE = 1.5  # [rad] curvature fades as 1 / (1 + turned / EASE), so that the surface does not roll up
 DIRECTIONS = 12  # in which the next cubics are placed around a cubic past the rim
+STEEP = 5.0  # spacings: a cubic that rises by more over one spacing does not continue the surface
 MEANS = 10  # cubics whose mean a new cubic is
 
 
@@ -54,10 +57,14 @@ class Samples:
     areas: Floats
 
 
+_Parts = tuple[Floats, Floats, Floats]  # points, normals and areas
+
+
 def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
     """Sample the smooth surface that a mesh represents, densely enough to fit cubics to.
 
-    The samples are the vertices, and points on triangles that are large against the spacing or long and thin. Between
+    The samples are the vertices, and points on triangles that are large against the spacing or long and thin; where one
+    is narrower than samples are apart, those along its longest edge. Between
     its vertices the surface is taken as a cubic that meets their normals [Vlachos et al. 2001, Curved PN triangles]: a
     long triangle of a vault lies below the arch that it spans. Vertices of the rim come first, so that cubics are
     placed there: beyond the rim there is nothing to fit to.
@@ -67,21 +74,28 @@ def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
     mesh : the surface.
     spacing : distance between the cubics that will be fitted [m].
     """
-    corners = mesh.vertices[mesh.faces]
-    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+    faces, corners = mesh.faces, mesh.vertices[mesh.faces]
+    edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    longest = edges.max(axis=1)
     divisions = np.clip(np.ceil(longest / (LONGEST * spacing)), 1, FINEST).astype(int)
+    narrow = 2 * mesh.areas < APART * spacing * longest
+    first = np.where(narrow, edges.argmax(axis=1), 0)
+    faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
     areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.areas * (divisions == 1) / 3, 3), len(mesh.vertices))
     rim_first = np.argsort(~np.isin(np.arange(len(mesh.vertices)), np.concatenate([[-1], *mesh.loops])), kind="stable")
-    points, normals, weights = [mesh.vertices[rim_first]], [mesh.normals[rim_first]], [areas[rim_first]]
-    for n in np.unique(divisions[divisions > 1]):
-        chosen = np.flatnonzero(divisions == n)
-        i, j = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)]).T
-        share = np.stack([i, j, n - i - j]) / n
-        x, normal = _curved(corners[chosen], mesh.normals[mesh.faces[chosen]], share)
-        points.append(x.reshape(-1, 3))
-        normals.append(normal.reshape(-1, 3))
-        weights.append(np.repeat(mesh.areas[chosen] / share.shape[1], share.shape[1]))
-    return _thinned(np.vstack(points), np.vstack(normals), np.concatenate(weights), APART * spacing)
+    found: list[_Parts] = [(mesh.vertices[rim_first], mesh.normals[rim_first], np.asarray(areas[rim_first], float))]
+    for n, is_narrow in product(np.unique(divisions[divisions > 1]).tolist(), (False, True)):
+        share = np.array([(i, j, n - i - j) for i in range(n + 1) for j in range(n + 1 - i)]).T / n
+        if is_narrow:
+            share = share[:, share[2] == 0]
+        chosen = np.flatnonzero((divisions == n) & (narrow == is_narrow))
+        for part in np.array_split(chosen, -(-len(chosen) * share.shape[1] // AT_ONCE) or 1):
+            x, normal = _curved(mesh.vertices[faces[part]], mesh.normals[faces[part]], share)
+            weight = np.repeat(mesh.areas[part] / share.shape[1], share.shape[1])
+            found.append((x.reshape(-1, 3), normal.reshape(-1, 3), weight))
+            if sum(len(points) for points, _, _ in found) > 2 * AT_ONCE:
+                found = [_thinned(found, APART * spacing)]
+    return Samples(*_thinned(found, APART * spacing))
 
 
 def _curved(x: Floats, n: Floats, share: Floats) -> tuple[Floats, Floats]:
@@ -100,8 +114,9 @@ def _curved(x: Floats, n: Floats, share: Floats) -> tuple[Floats, Floats]:
     return cubic, mixed / np.maximum(np.linalg.norm(mixed, axis=2), 1e-300)[..., None]
 
 
-def _thinned(points: Floats, normals: Floats, areas: Floats, apart: float) -> Samples:
-    """One sample for each cell of a lattice, with the area of all samples in it; vertices are preferred."""
+def _thinned(found: list[_Parts], apart: float) -> _Parts:
+    """One sample for each cell of a lattice, with the area of all samples in it; the first is preferred."""
+    points, normals, areas = (np.concatenate(parts) for parts in zip(*found, strict=True))
     sound = np.isfinite(points).all(axis=1) & (dot(normals, normals) > 0.5)
     points, normals, areas = points[sound], normals[sound], areas[sound]
     cell = np.floor((points - points.min(axis=0)) / apart).astype(np.int64)
@@ -109,7 +124,7 @@ def _thinned(points: Floats, normals: Floats, areas: Floats, apart: float) -> Sa
     first, cell_of = unique_rows(np.column_stack([cell, facing]))
     order = np.argsort(first)
     weight = np.bincount(cell_of, areas)
-    return Samples(points[first][order], unit(normals[first][order]), np.maximum(weight, 1e-3 * weight.mean())[order])
+    return points[first][order], unit(normals[first][order]), np.maximum(weight, 1e-3 * weight.mean())[order]
 
 
 def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Samples:
@@ -150,7 +165,8 @@ def _doors(rim: Floats, spacing: float) -> list[Floats]:
     except QhullError:  # a line
         return []
     extent, doors = float(np.ptp(rim, axis=0).max()), list[Floats]()
-    for first, stop in zip(corners, np.append(corners[1:], corners[0] + len(rim)), strict=True):
+    stops = np.append(corners[1:], corners[0] + len(rim))
+    for first, stop in np.column_stack([corners, stops])[stops - corners > 1].tolist():
         x = rim[np.arange(first, stop + 1) % len(rim)]
         along = unit(x[-1:] - x[:1])
         off = np.linalg.norm(cross(x - x[:1], np.broadcast_to(along, x.shape)), axis=1)
@@ -319,7 +335,7 @@ def _proposals(field: SmoothField, front: Ints, points: CellList) -> Floats:
     terms = np.stack([np.ones(DIRECTIONS), a, b, a * a, a * b, b * b, a**3, a * a * b, a * b * b, b**3])
     lift = field.coefficients[front] @ terms
     around = np.stack(np.broadcast_arrays(s * a, s * b, lift), axis=2) @ field.frames[front]
-    sites = (field.centres[front][:, None] + around).reshape(-1, 3)
+    sites: Floats = (field.centres[front][:, None] + around)[np.abs(lift) < STEEP * s]
     sites = sites[field.cells.nearest(sites, limit=0.8 * s)[0][:, 0] > 0.8 * s]
     sites = sites[points.nearest(sites, limit=0.6 * s)[0][:, 0] > 0.6 * s]
     return sites[CellList.of(sites, s).spread(0.8 * s)] if len(sites) else sites

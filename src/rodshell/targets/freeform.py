@@ -15,9 +15,10 @@ from rodshell.targets.field_fitting import cubic_spacing, fill_openings, fit_fie
 from rodshell.targets.rim import Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Gap, Implicit, Target
-from rodshell.targets.trianglemesh import TriangleMesh, sound_mesh
+from rodshell.targets.trianglemesh import FARTHEST, TriangleMesh, sound_mesh
 from rodshell.targets.wall_below_rim import WalledSurface, walled_surface
 from rodshell.units import length_text
+from rodshell.untrusted import limit, raised
 from rodshell.validation import array, number
 
 PAST = 0.6  # of the size: how far the surface is continued past an open rim
@@ -25,6 +26,8 @@ OFF = 0.005  # of the size: where a vertex is further off its smooth field, the 
 ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
+MOST_ALONG = 100_000  # points of all these curves
+MOST_ENDS = 200  # closed curves at which a surface ends: each is followed at 1,500 points
 AT_ONCE = 500_000  # pairs of a point and a facet that are looked at together
 
 
@@ -302,7 +305,19 @@ class Freeform(Target):
         return float(np.nan_to_num(np.abs(self.implicit(curve).value), nan=np.inf).max())
 
     def _require_an_end(self, name: str) -> None:
-        if self.base is None and not self.surface.loops and not self.curves:
+        ends = len(self.surface.loops) + len(self.curves)
+        along = sum(map(len, (*self.surface.loops, *self.curves)))
+        for count, most, what in ((ends, MOST_ENDS, "closed curves"), (along, MOST_ALONG, "points")):
+            if count > limit(most):
+                raise InputError(
+                    f"{name} ends at {count} {what}, and at most {limit(most):.0f} are followed: fill its openings, "
+                    f"or mesh it more coarsely, {raised(most, count)}"
+                )
+        for curve in self.curves:
+            far = float(np.abs(curve).max(initial=0.0))
+            if not far <= FARTHEST:
+                raise InputError(f"the boundary curve has coordinates up to {far:.3g} m: draw it on the surface")
+        if self.base is None and not ends:
             x = self.surface.vertices
             raise InputError(
                 f"{name} is closed: say where the shell ends, by a base plane between z = {x[:, 2].min():.4g} and "

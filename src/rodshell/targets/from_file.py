@@ -1,5 +1,6 @@
 """A target from a file: a mesh, a NURBS surface or heights on a lattice; scaled, turned and moved into place."""
 
+import io
 import warnings
 from os import PathLike
 from pathlib import Path
@@ -9,26 +10,30 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
+from rodshell.targets.apart import cause
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.mesh_files import (
     MESH_FILES,
     MOST_HEIGHTS,
-    cause,
     file_bytes,
     in_metres,
     read_curves,
     read_mesh,
     require_few_heights,
+    require_size,
 )
 from rodshell.targets.nurbs_files import RHINO_FILES, STEP_FILES, grid_triangles, read_3dm, read_step
 from rodshell.units import length_text, shown
+from rodshell.untrusted import read_text
 from rodshell.validation import file_path, instance, keep, number, numbers, positive
 
 File = str | PathLike[str]
 
 SURFACE_FILES = (*MESH_FILES, *RHINO_FILES, *STEP_FILES)
 TABLES = (".csv", ".txt")
+IMAGES = ("PNG", "PPM", "JPEG", "TIFF")  # whatever a file is called, others, such as EPS, are never opened
 GRID_FILES = (*TABLES, ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff")
+LARGEST_TABLE = 100e6  # bytes: of 1.5 million points, written with 20 digits
 FEWEST = 4  # heights each way
 POINT = 3  # numbers in a row of points x, y, z; heights need more each way
 EVEN = 0.02  # of a step: coordinates go in equal steps, except for rounding
@@ -76,6 +81,8 @@ def read_heights(path: Path, size: tuple[float, float], height: float | None) ->
     faces = grid_triangles(*z.shape)[:, ::-1]
     known = np.isfinite(z.ravel())
     points = np.column_stack([across.ravel(), along.ravel(), height * z.ravel()])
+    widths = np.ptp(points[known], axis=0) if known.any() else np.zeros(3)
+    require_size(path, widths, 1.0, instead="give another size or height")
     return points, faces[known[faces].all(axis=1)], notes
 
 
@@ -115,15 +122,12 @@ def read_table(path: Path, size: tuple[float, float]) -> tuple[Floats, Floats, F
 
 
 def _cells(path: Path) -> list[list[str]]:
-    try:
-        text = file_bytes(path).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not text in UTF-8: save it as CSV in UTF-8") from None
+    text = read_text(path, LARGEST_TABLE, instead="save it as CSV in UTF-8")
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     separator = next((mark for mark in ";\t," if lines and mark in lines[0]), None)
-    columns = len(lines[0].split(separator)) if lines else 0
+    columns = len(lines[0].split(separator, MOST_HEIGHTS)) if lines else 0
     require_few_heights(path, len(lines), 1 if columns == POINT else columns)
-    rows = [[cell.strip() for cell in line.split(separator)] for line in lines]
+    rows = [[cell.strip() for cell in line.split(separator, columns)] for line in lines]
     if separator is None:  # blanks leave no cell empty
         return [["" if cell.lower() == "nan" else cell.replace(",", ".") for cell in row] for row in rows]
     return rows if separator == "," else [[cell.replace(",", ".") for cell in row] for row in rows]
@@ -166,7 +170,7 @@ def _lattice(path: Path, points: Floats, size: tuple[float, float]) -> tuple[Flo
         raise InputError(f"{path} seems to have points x, y, z, and some lack x or y: give both for every point")
     (x, column), (y, row) = (np.unique(points[:, k], return_inverse=True) for k in (0, 1))
     cells = np.unique(row * len(x) + column)
-    if len(points) != len(x) * len(y) or len(cells) != len(points):
+    if len(points) != len(x) * len(y) or len(cells) != len(points) or min(len(x), len(y)) < 2:
         raise InputError(
             f"{path} seems to have points x, y, z: {len(points)} with {len(x)} different x and {len(y)} different y, "
             "which is not a complete lattice: sample one height for each x and y, or mesh the points"
@@ -206,11 +210,11 @@ def read_image(path: Path) -> tuple[Floats, float | None]:
     """
     from PIL import Image
 
-    file_bytes(path)
+    data = io.BytesIO(file_bytes(path))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit here is lower
-            opened = Image.open(path)
+            opened = Image.open(data, formats=IMAGES)
         with opened as image:
             require_few_heights(path, image.height, image.width)
             image.load()

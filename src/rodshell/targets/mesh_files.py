@@ -13,8 +13,11 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.curves import closed_loops, join_end_to_end
-from rodshell.targets.trianglemesh import MOST_FACES
+from rodshell.targets.apart import read_apart, unreadable
+from rodshell.targets.gltf import gltf_counts, gltf_parts
+from rodshell.targets.trianglemesh import FARTHEST, MOST_FACES, require_indices
 from rodshell.units import shown
+from rodshell.untrusted import limit, raised, read_bytes
 
 CURVE_FILES = (".obj", ".dxf")
 MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
@@ -24,7 +27,9 @@ SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a gridshell can have
 WHOLE = 0.97  # of the vertices of a complete file belong to faces; fewer in a truncated one
 HEAD = 4000  # bytes that hold the header
 MOST_HEIGHTS = MOST_FACES // 2
-LONGEST = 120  # characters quoted from a reader's message
+MOST_PARTS = 500  # nodes, solids, properties: readers need time for each pair of them
+MOST_STROKES = 5_000  # curves of a drawing: they are joined end to end
+NO_INDEX = re.compile(rb"^f[ \t](?:.*[ \t])?-?0+(?![^\s/]).*", re.MULTILINE)  # indices begin at 1
 SAG = 1e-4  # of a curve's extent: how finely arcs and splines of a DXF are divided
 
 
@@ -47,6 +52,7 @@ def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = 
     """
     path = Path(path)
     data = _in_utf8(path, file_bytes(path))
+    _require_bounds(path, data)
     meshes = _loaded(path, data)
     if not meshes:
         raise InputError(f"{path} has no faces, or is damaged: export the surface as a mesh of triangles")
@@ -73,19 +79,12 @@ def file_bytes(path: Path) -> bytes:
 
     Raises
     ------
-    InputError : the file is missing, empty or too large, or cannot be read.
+    InputError : the file is missing, empty, a device or too large, or cannot be read.
     """
-    if not path.is_file():
-        raise InputError(f"there is no file named {shown(str(path))}: check the path")
-    size = path.stat().st_size
-    if size == 0:
+    data = read_bytes(path, LARGEST_FILE, smaller="reduce the mesh, as about 20,000 triangles are enough")
+    if not data:
         raise InputError(f"{path} is empty: export it again")
-    if size > LARGEST_FILE:
-        raise InputError(f"{path} has {size / 1e6:.0f} MB: reduce the mesh; about 20,000 triangles are enough")
-    try:
-        return path.read_bytes()
-    except OSError as reason:
-        raise InputError(f"{path} cannot be read: {reason.strerror}") from None
+    return data
 
 
 def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> Floats:
@@ -148,7 +147,9 @@ def _in_utf8(path: Path, data: bytes) -> bytes:
     if kind == ".ply":
         head, end, body = data.partition(b"end_header")
         return recoded(head) + end + body
-    if kind in (".obj", ".off") or (kind == ".stl" and data[:5].lower() == b"solid" and b"facet" in data[:HEAD]):
+    if kind == ".obj":  # materials split a mesh, each at the cost of a search through all vertices
+        return re.sub(rb"^usemtl .*$", b"", recoded(data), flags=re.MULTILINE)
+    if kind == ".off" or (kind == ".stl" and data[:5].lower() == b"solid" and b"facet" in data[:HEAD]):
         return recoded(data)
     return data
 
@@ -163,36 +164,50 @@ def recoded(text: bytes) -> bytes:
     return text
 
 
+def _require_bounds(path: Path, data: bytes) -> None:
+    """Refuse what would cost far more memory or time than a file of its size, before it is read."""
+    kind, counts = path.suffix.lower(), dict[str, int]()
+    if kind == ".stl":
+        counts = {"solids": data.count(b"endsolid")}
+    elif kind == ".ply":
+        counts = {"properties": data[: data.find(b"end_header")].count(b"property")}
+    elif kind == ".obj" and (wrong := NO_INDEX.search(data)):
+        raise InputError(f"{path} is damaged: a face refers to vertex 0 ({shown(wrong[0].decode())}): export it again")
+    elif kind in IN_METRES:
+        counts = gltf_counts(path, data)
+    for what, count in counts.items():
+        if count > limit(MOST_PARTS):
+            raise InputError(
+                f"{path} has {count} {what}, and at most {limit(MOST_PARTS):.0f} are read: join its meshes, "
+                f"{raised(MOST_PARTS, count)}"
+            )
+
+
 def _loaded(path: Path, data: bytes) -> dict[str, Any]:
     """The meshes in a file by name, transformed to their positions in the scene."""
     import trimesh
 
     kind = path.suffix[1:].lower()
-    inputs = {"file_obj": str(path)} if kind == "gltf" else {"file_obj": io.BytesIO(data), "file_type": kind}
+    parts = gltf_parts(path, data) if kind == "gltf" else {}  # nothing else is opened, whatever the file names
     try:
         with np.errstate(all="ignore"):  # values that are not finite are refused later, with their place
-            scene = trimesh.load_scene(**inputs, process=False, skip_materials=True)
+            scene = trimesh.load_scene(
+                io.BytesIO(data), file_type=kind, resolver=parts, process=False, skip_materials=True
+            )
+            placed = dict(scene.graph[node][::-1] for node in scene.graph.nodes_geometry)
             found: dict[str, Any] = {}
-            for node in scene.graph.nodes_geometry:
-                transform, geometry = scene.graph[node]
+            for geometry, transform in placed.items():
                 mesh = scene.geometry[geometry]
                 if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
                     x = np.asarray(mesh.vertices, dtype=float) @ transform[:3, :3].T + transform[:3, 3]
                     found[str(geometry)] = (x, np.asarray(mesh.faces, dtype=np.intp))
-            return found
     except MemoryError:
         raise InputError(f"{path} announces more data than fits into memory: it is damaged; export it again") from None
     except Exception as reason:  # a damaged file can break a reader anywhere
-        raise InputError(
-            f"{path} cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export it again "
-            f"(the reader says: {cause(reason)})"
-        ) from None
-
-
-def cause(reason: Exception) -> str:
-    """The message of a reader's exception, on one short line."""
-    said = " ".join(str(reason).split())[:LONGEST]
-    return f"{type(reason).__name__}: {said}" if said else type(reason).__name__
+        raise unreadable(path, path.suffix[1:].upper(), reason) from None
+    for vertices, faces in found.values():
+        require_indices(vertices, faces, str(path))
+    return found
 
 
 def _merged(meshes: list[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
@@ -273,38 +288,45 @@ def _strokes(path: Path, unit: float) -> list[Floats]:
     data = file_bytes(path)
     if path.suffix.lower() not in CURVE_FILES:
         raise InputError(f"{path}: curves are read from {' or '.join(CURVE_FILES)} files")
-    try:
-        strokes = _of_dxf(path) if path.suffix.lower() == ".dxf" else _of_obj(data)
-    except Exception as reason:  # a damaged file can break a reader anywhere
+    strokes = _of_dxf(path, data, FARTHEST / unit) if path.suffix.lower() == ".dxf" else _of_obj(path, data)
+    far = max((float(np.abs(stroke).max()) * unit for stroke in strokes if len(stroke)), default=0.0)
+    _require_near(path, far)
+    return [stroke * unit for stroke in strokes if len(stroke) > 1]
+
+
+def _require_few_strokes(path: Path, count: int) -> None:
+    if count > limit(MOST_STROKES):
         raise InputError(
-            f"{path} cannot be read as a drawing of curves: it is damaged or of another format; export it again "
-            f"(the reader says: {cause(reason)})"
-        ) from None
-    return [np.asarray(stroke, dtype=float) * unit for stroke in strokes if len(stroke) > 1]
+            f"{path} has {count} curves, and at most {limit(MOST_STROKES):.0f} are read: draw one polyline around the "
+            f"shell, {raised(MOST_STROKES, count)}"
+        )
 
 
-def _of_obj(data: bytes) -> list[Floats]:
+def _require_near(path: Path, far: float) -> None:
+    if not far <= FARTHEST:
+        raise InputError(f"{path} has curves with coordinates up to {far:.3g} m: draw them near the origin")
+
+
+def _of_obj(path: Path, data: bytes) -> list[Floats]:
     """The `l` elements of an OBJ."""
     points, lines = list[list[float]](), list[list[int]]()
-    for words in map(str.split, recoded(data).decode("utf-8").splitlines()):
-        if words[:1] == ["v"]:
-            points.append([float(word) for word in words[1:4]])
-        elif words[:1] == ["l"]:
-            lines.append([int(word.split("/")[0]) for word in words[1:]])
-    x = np.array(points)
-    return [x[[k - 1 if k > 0 else k for k in line]] for line in lines]
+    try:
+        for words in map(str.split, recoded(data).decode("utf-8").splitlines()):
+            if words[:1] == ["v"]:
+                points.append([float(word) for word in words[1:4]])
+            elif words[:1] == ["l"]:
+                lines.append([int(word.split("/")[0]) for word in words[1:]])
+        _require_few_strokes(path, len(lines))
+        x = np.array(points, dtype=float).reshape(len(points), 3)
+        return [x[[k - 1 if k > 0 else k or len(x) for k in line]] for line in lines]  # 0 is refused
+    except (ValueError, IndexError) as reason:
+        raise unreadable(path, "a drawing of curves", reason) from None
 
 
-def _of_dxf(path: Path) -> list[Floats]:
-    import ezdxf
-    from ezdxf import path as curves
-
-    space = ezdxf.readfile(path).modelspace()
-    kinds = "LINE LWPOLYLINE POLYLINE ARC CIRCLE ELLIPSE SPLINE"
-    found = [curves.make_path(entity) for entity in space.query(kinds)]
-    strokes = list[Floats]()
-    for curve in found:
-        rough = np.array([tuple(p) for p in curve.flattening(1e9)])
-        sag = SAG * max(float(np.ptp(rough, axis=0).max()), 1e-12)
-        strokes.append(np.array([tuple(p) for p in curve.flattening(sag)]))
-    return strokes
+def _of_dxf(path: Path, data: bytes, farthest: float) -> list[Floats]:
+    request = {"sag": SAG, "most": limit(MOST_STROKES), "farthest": farthest}
+    found = read_apart(Path(__file__).with_name("dxf_curves.py"), path, data, "a drawing of curves", **request)
+    _require_few_strokes(path, int(found["count"]))
+    if "points" not in found:
+        _require_near(path, float(found["far"]) * FARTHEST / farthest)
+    return np.split(found["points"], found["ends"][1:-1])

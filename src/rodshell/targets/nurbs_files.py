@@ -2,12 +2,8 @@
 
 import json
 import re
-import subprocess
-import sys
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +11,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.curves import closed_loops
+from rodshell.targets.apart import read_apart
 from rodshell.targets.mesh_files import file_bytes
 from rodshell.units import shown
 
@@ -23,6 +20,7 @@ PER_SPAN = 4  # quads per span of a NURBS with many knots
 FINEST = 400  # quads each way, at most
 ALONG_EDGES = 400  # straight pieces of each trimming edge
 LISTED = 12  # faces named in a message
+MOST = 1e15  # of a control point, in the unit of its file
 
 RHINO_FILES = (".3dm",)
 RHINO_UNITS = {
@@ -34,8 +32,8 @@ STEP_FILES = (".step", ".stp")
 MILLIMETRE = 1e-3  # m: OpenCASCADE converts every unit to millimetres
 LAST_LINE = b"END-ISO-10303-21"
 ABSURD = re.compile(rb"-?\d\.\d*E\+?\d{3,}")  # OpenCASCADE does not terminate with such coordinates
-READER = Path(__file__).with_name("opencascade.py")
-LONGEST = 120.0  # seconds that reading may take
+READERS = Path(__file__).parent
+HIGHEST = 25  # degree: of splines beyond it, no digit of a point is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +44,26 @@ class Nurbs:
     ----------
     degrees : along u and along v.
     knots : (m + degree + 1,) and (n + degree + 1,), ascending.
-    controls : (m, n, 4) control points: weight times x, y and z, and the weight.
+    controls : (m, n, 4) control points: weight times x, y and z, and the weight, which is positive.
     """
 
     degrees: tuple[int, int]
     knots: tuple[Floats, Floats]
     controls: Floats
+
+    @property
+    def fault(self) -> str:
+        """Why there is no such surface; empty for one that is sound."""
+        for degree, knots, count in zip(self.degrees, self.knots, self.controls.shape, strict=False):
+            if not 1 <= degree <= HIGHEST:
+                return f"its degree is {degree}, and {HIGHEST} at most is read"
+            if len(knots) != count + degree + 1 or count <= degree:
+                return f"it has {len(knots)} knots for {count} control points of degree {degree}"
+            if not (np.isfinite(knots).all() and (np.diff(knots) >= 0).all() and knots[degree] < knots[-degree - 1]):
+                return "its knots do not ascend"
+        if not np.isfinite(self.controls).all() or np.abs(self.controls).max() > MOST:
+            return f"its control points are not finite, or beyond {MOST:g}"
+        return "" if (self.controls[..., 3] > 0).all() else "a control point has no positive weight"
 
     def points(self, u: Floats, v: Floats) -> Floats:
         """Points (k, l, 3) of the surface at the parameters `u` (k,) and `v` (l,)."""
@@ -117,68 +129,32 @@ def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Fl
     ------
     InputError : the file is missing or damaged; rhino3dm is not installed; the file has no such face, or several.
     """
-    try:
-        import rhino3dm
-    except ImportError:
-        raise InputError(f'{path}: 3dm files need rhino3dm: pip install "rodshell[rhino]"') from None
-    data = file_bytes(path)
-    model = rhino3dm.File3dm.FromByteArray(data)  # type: ignore[arg-type]
-    if model is None:
+    if find_spec("rhino3dm") is None:
+        raise InputError(f'{path}: 3dm files need rhino3dm: pip install "rodshell[rhino]"')
+    request = {"name": name, "along_edges": ALONG_EDGES}
+    found = read_apart(READERS / "opennurbs.py", path, file_bytes(path), "3DM", **request)
+    if not found:
         raise InputError(f"{path} cannot be read as 3DM: save it again from Rhino")
-    shape = _selected(path, _surfaces(model, rhino3dm), name)
-    whole = shape if isinstance(shape, rhino3dm.Surface) else shape.Faces[0].UnderlyingSurface()
-    trims = [] if whole is shape or shape.IsSurface else _trims(shape)
-    return *_nurbs(whole).triangles(), trims, RHINO_UNITS.get(model.Settings.ModelUnitSystem.name)
+    if "controls" not in found:
+        raise _no_single_surface(path, json.loads(str(found["names"])), name)
+    # OpenNURBS omits the first and the last knot
+    knots = [np.concatenate([side[:1], side, side[-1:]]) for side in (found["knots_u"], found["knots_v"])]
+    surface = Nurbs(tuple(found["degrees"].tolist()), (knots[0], knots[1]), found["controls"])
+    if surface.fault:
+        raise InputError(f"{path} is damaged: {surface.fault}: save it again from Rhino")
+    return *surface.triangles(), closed_loops(found["trims"]), RHINO_UNITS.get(str(found["unit"]))
 
 
-def _surfaces(model: Any, rhino3dm: Any) -> list[tuple[str, str, Any]]:
-    """(name, layer, shape) of every surface object."""
-    layers = {layer.Index: layer.Name for layer in model.Layers}
-    found = []
-    for item in model.Objects:
-        shape, attributes = item.Geometry, item.Attributes
-        if isinstance(shape, rhino3dm.Extrusion):
-            shape = shape.ToBrep(True)
-        if isinstance(shape, rhino3dm.Brep | rhino3dm.Surface):
-            found.append((attributes.Name, layers.get(attributes.LayerIndex, ""), shape))
-    return found
-
-
-def _selected(path: Path, objects: list[tuple[str, str, Any]], name: str | None) -> Any:
-    wanted = [shape for label, layer, shape in objects if name in (None, label, layer)]
-    if len(wanted) != 1:
-        names = ", ".join(shown(label or layer) for label, layer, _ in objects) or "none"
-        what = "surfaces" if name is None else f"surfaces named {shown(name)}"
-        raise InputError(
-            f"{path} has {len(wanted)} {what}: choose one by its object or layer name (available: {names})"
-        )
-    faces = len(getattr(wanted[0], "Faces", "1"))
-    if faces != 1:
-        raise InputError(f"{path}: the surface has {faces} faces: merge them, or export a mesh")
-    return wanted[0]
-
-
-def _nurbs(surface: Any) -> Nurbs:
-    """Convert any surface; OpenNURBS omits the first and the last knot."""
-    form = surface.ToNurbsSurface()
-    knots = [np.array(list(side)) for side in (form.KnotsU, form.KnotsV)]
-    count = (len(knots[0]) - form.OrderU + 2, len(knots[1]) - form.OrderV + 2)
-    points = [form.Points[i, j] for i in range(count[0]) for j in range(count[1])]
-    controls = np.array([(p.X, p.Y, p.Z, p.W) for p in points]).reshape(*count, 4)
-    whole = [np.concatenate([side[:1], side, side[-1:]]) for side in knots]
-    return Nurbs((form.OrderU - 1, form.OrderV - 1), (whole[0], whole[1]), controls)
-
-
-def _trims(brep: Any) -> list[Floats]:
-    """The closed curves that bound a face; an edge that a loop follows twice is a seam of the surface, not an end."""
-    loops = brep.Faces[0].Loops
-    edges = [trim.EdgeIndex for loop in (loops[k] for k in range(len(loops))) for trim in loop.Trims]
-    return closed_loops([_polyline(brep.Edges[k]) for k in edges if k >= 0 and edges.count(k) == 1])
-
-
-def _polyline(curve: Any) -> Floats:
-    t = np.linspace(curve.Domain.T0, curve.Domain.T1, ALONG_EDGES + 1)
-    return np.array([(p.X, p.Y, p.Z) for p in map(curve.PointAt, t.tolist())])
+def _no_single_surface(path: Path, surfaces: list[tuple[str, str, int]], name: str | None) -> InputError:
+    faces = [count for label, layer, count in surfaces if name in (None, label, layer)]
+    if len(faces) == 1:
+        return InputError(f"{path}: the surface has {faces[0]} faces: merge them, or export a mesh")
+    names = ", ".join(shown(label or layer) for label, layer, _ in surfaces[:LISTED]) or "none"
+    what = "surfaces" if name is None else f"surfaces named {shown(name)}"
+    more = ", ..." if len(surfaces) > LISTED else ""
+    return InputError(
+        f"{path} has {len(faces)} {what}: choose one by its object or layer name (available: {names}{more})"
+    )
 
 
 def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Floats]]:
@@ -204,19 +180,8 @@ def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[F
         raise InputError(f"{path} is truncated: its last line, {LAST_LINE.decode()}, is missing; export it again")
     if far := ABSURD.search(data):
         raise InputError(f"{path} is damaged: it has a coordinate {far[0].decode()}; export it again")
-    with tempfile.TemporaryDirectory() as folder:
-        result = Path(folder) / "face.npz"
-        samples = {"grid": GRID, "per_span": PER_SPAN, "finest": FINEST, "along_edges": ALONG_EDGES}
-        request = json.dumps({"path": str(path), "name": name, **samples})
-        program = [sys.executable, "-P", str(READER), request, str(result)]
-        try:
-            subprocess.run(program, capture_output=True, timeout=LONGEST, check=True)
-            with np.load(result) as found:
-                parts = {key: found[key] for key in found.files}
-        except subprocess.TimeoutExpired:
-            raise InputError(f"{path} cannot be read within {LONGEST:.0f} s: export the one face by itself") from None
-        except (subprocess.CalledProcessError, OSError):
-            raise InputError(f"{path} cannot be read as STEP: it is damaged; export it again") from None
+    samples = {"grid": GRID, "per_span": PER_SPAN, "finest": FINEST, "along_edges": ALONG_EDGES}
+    parts = read_apart(READERS / "opencascade.py", path, data, "STEP", name=name, **samples)
     if "points" not in parts:
         raise _no_single_face(path, json.loads(str(parts["names"])), name)
     rows, columns, _ = parts["points"].shape

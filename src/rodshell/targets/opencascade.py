@@ -1,14 +1,6 @@
-"""A separate program that reads a face of a STEP file with OpenCASCADE; see `nurbs_files.read_step`.
-
-It imports nothing of rodshell, and runs in a separate process because a damaged file can crash OpenCASCADE.
-Usage: `python -P opencascade.py REQUEST RESULT`. REQUEST is JSON with `path`, `name` (of a face, or null) and the
-resolution: `grid`, `per_span`, `finest`, `along_edges`. RESULT is an npz file with `names` (JSON, a list for each face)
-and, if one face matches, `points` (k, l, 3) of its surface and `trims` (n, along_edges + 1, 3), the curves that bound
-it, in millimetres.
-"""
+"""A separate program that reads a face of a STEP file with OpenCASCADE; see `apart` and `nurbs_files.read_step`."""
 
 import json
-import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -122,8 +114,18 @@ def trims_of(face: Any, along_edges: int) -> Any:
     return np.array(strokes).reshape(-1, along_edges + 1, 3)
 
 
-def main(request: dict[str, Any], result: str) -> None:
-    """Read the file, and write the result."""
+def main(request: dict[str, Any]) -> dict[str, Any]:
+    """The faces of a file, and the one that is wanted.
+
+    Parameters
+    ----------
+    request : `path`, `name` of a face, or None, and the resolution: `grid`, `per_span`, `finest`, `along_edges`.
+
+    Returns
+    -------
+    `names` (JSON, a list for each face) and, if one face matches, `points` (k, l, 3) of its surface and `trims`
+    (n, along_edges + 1, 3), the curves that bound it, in millimetres.
+    """
     from OCP.BRepAdaptor import BRepAdaptor_Surface
 
     faces = read(request["path"])
@@ -135,8 +137,4 @@ def main(request: dict[str, Any], result: str) -> None:
         along = request["along_edges"]
         untrimmed = is_untrimmed(wanted[0], surface)
         found["trims"] = np.empty((0, along + 1, 3)) if untrimmed else trims_of(wanted[0], along)
-    np.savez(result, **found)
-
-
-if __name__ == "__main__":
-    main(json.loads(sys.argv[1]), sys.argv[2])
+    return found

@@ -19,6 +19,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
+from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.targets.target import Implicit
 
@@ -52,6 +53,8 @@ class CellList:
     @staticmethod
     def of(points: Floats, cell: float) -> "CellList":
         """Sort points (n, 3) [m] into cells of the width `cell` [m], wider where there would be too many."""
+        if not np.isfinite(points).all():  # compiled loops use an index as it is
+            raise InputError("a surface is so rough or folded that no smooth one follows it: smooth it")
         low, shape, cell = _lattice_over(points, cell)
         return CellList(points, low, shape, cell, *_sorted(points, low, shape, cell))
 

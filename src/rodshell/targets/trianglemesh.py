@@ -13,6 +13,7 @@ from rodshell.geometry.frames import cross, dot
 CREASE = 40.0  # degrees between faces: a smooth piece ends there
 WELD = 1e-6  # of the largest extent: vertices this close are merged; single precision has 1e-7
 MOST_FACES = 3_000_000
+FARTHEST = 1e9  # m: coordinates that are still known to a micrometre
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,16 +149,20 @@ def _require_numbers(vertices: Floats, faces: Ints, name: str) -> None:
         raise InputError(f"{name} has no faces: export the surface as a mesh of triangles")
     if len(faces) > MOST_FACES:
         raise InputError(f"{name} has {len(faces)} faces: reduce it to {MOST_FACES} or fewer")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(
-            f"{name} is damaged: a face refers to vertex {int(faces.max() if faces.min() >= 0 else faces.min())} of "
-            f"{len(vertices)}: export it again"
-        )
+    require_indices(vertices, faces, name)
     bad = ~np.isfinite(vertices[faces]).all(axis=(1, 2))
     if bad.any():
         raise InputError(f"{name} has {int(bad.sum())} faces with coordinates that are not finite: export it again")
-    if np.abs(vertices[faces]).max() > 1e100:
-        raise InputError(f"{name} has coordinates up to {np.abs(vertices[faces]).max():.1g}: export it again")
+    far = float(np.abs(vertices[faces]).max())
+    if far > FARTHEST:
+        raise InputError(f"{name} has coordinates up to {far:.3g} m: move it near the origin, or export it again")
+
+
+def require_indices(vertices: Floats, faces: Ints, name: str) -> None:
+    """Refuse faces (m, 3) with vertices that are not there."""
+    if faces.min(initial=0) < 0 or faces.max(initial=-1) >= len(vertices):
+        wrong = int(faces.max() if faces.min() >= 0 else faces.min())
+        raise InputError(f"{name} is damaged: a face refers to vertex {wrong} of {len(vertices)}: export it again")
 
 
 def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
@@ -312,6 +317,7 @@ def _smooth_piece(
             f"{100 * share:.0f} % of the area"
         )
         mesh = mesh.only(pieces == chosen)
+        _Neighbours.of(mesh, name)  # refuses a piece that touches itself in a point
     if not closed and plan[chosen] < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
     return mesh, repairs

@@ -1,0 +1,74 @@
+"""A separate program that reads a surface of a 3dm file with OpenNURBS; see `apart` and `nurbs_files.read_3dm`."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def main(request: dict[str, Any]) -> dict[str, Any]:
+    """The surfaces of a file, and the one that is wanted.
+
+    Parameters
+    ----------
+    request : `path`; `name` of an object or a layer, or None; `along_edges`, the pieces of each trimming edge.
+
+    Returns
+    -------
+    `unit`, by its name, and `names` (JSON: object, layer and number of faces of each surface); nothing for another
+    kind of file. If one surface with one face matches, also `degrees` (2,), `knots_u` and `knots_v` without the first
+    and the last, `controls` (m, n, 4) and `trims` (k, along_edges + 1, 3), the curves that bound it.
+    """
+    import rhino3dm
+
+    model = rhino3dm.File3dm.FromByteArray(Path(request["path"]).read_bytes())  # type: ignore[arg-type]
+    if model is None:
+        return {}
+    surfaces = list(surfaces_of(model))
+    found: dict[str, Any] = {"unit": model.Settings.ModelUnitSystem.name}
+    found["names"] = json.dumps([names for *names, _ in surfaces])
+    wanted = [(shape, faces) for name, layer, faces, shape in surfaces if request["name"] in (None, name, layer)]
+    if len(wanted) == 1 and wanted[0][1] == 1:
+        shape = wanted[0][0]
+        whole = shape if isinstance(shape, rhino3dm.Surface) else shape.Faces[0].UnderlyingSurface()
+        trims = [] if whole is shape or shape.IsSurface else trims_of(shape, request["along_edges"])
+        found |= nurbs_of(whole) | {"trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
+    return found
+
+
+def surfaces_of(model: Any) -> Any:
+    """Name, layer, number of faces and shape of every surface object."""
+    import rhino3dm
+
+    layers = {layer.Index: layer.Name for layer in model.Layers}
+    for item in model.Objects:
+        shape, attributes = item.Geometry, item.Attributes
+        if isinstance(shape, rhino3dm.Extrusion):
+            shape = shape.ToBrep(True)
+        if isinstance(shape, rhino3dm.Brep | rhino3dm.Surface):
+            yield attributes.Name, layers.get(attributes.LayerIndex, ""), len(getattr(shape, "Faces", "1")), shape
+
+
+def nurbs_of(surface: Any) -> dict[str, Any]:
+    """Any surface as a NURBS."""
+    form = surface.ToNurbsSurface()
+    knots = [np.array(list(side), dtype=float) for side in (form.KnotsU, form.KnotsV)]
+    orders = (form.OrderU, form.OrderV)
+    count = [len(side) - order + 2 for side, order in zip(knots, orders, strict=True)]
+    points = [form.Points[i, j] for i in range(count[0]) for j in range(count[1])]
+    controls = np.array([(p.X, p.Y, p.Z, p.W) for p in points]).reshape(*count, 4)
+    return {"degrees": np.array(orders) - 1, "knots_u": knots[0], "knots_v": knots[1], "controls": controls}
+
+
+def trims_of(brep: Any, pieces: int) -> list[Any]:
+    """The curves that bound a face; an edge that a loop follows twice is a seam of the surface, not an end."""
+    loops = brep.Faces[0].Loops
+    edges = [trim.EdgeIndex for loop in (loops[k] for k in range(len(loops))) for trim in loop.Trims]
+    return [polyline(brep.Edges[k], pieces) for k in edges if k >= 0 and edges.count(k) == 1]
+
+
+def polyline(curve: Any, pieces: int) -> list[tuple[float, float, float]]:
+    """Points at equal steps of a curve's parameter."""
+    t = np.linspace(curve.Domain.T0, curve.Domain.T1, pieces + 1)
+    return [(p.X, p.Y, p.Z) for p in map(curve.PointAt, t.tolist())]
