@@ -13,7 +13,7 @@ import numpy as np
 
 from rodshell.errors import RodshellError
 from rodshell.results import read
-from rodshell.results.folder import mark, read_manifest
+from rodshell.results.manifest import mark, read_manifest
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 PROGRAM = "from rodshell.cli import entry; entry()"

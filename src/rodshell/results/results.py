@@ -13,6 +13,7 @@ from pydantic import Field, ValidationError
 
 from rodshell.errors import OutputError
 from rodshell.results.loaded import DesignStrength, LoadCases
+from rodshell.results.manifest import read_table
 from rodshell.results.records import (
     Agreement,
     Bent,
@@ -49,6 +50,7 @@ from rodshell.validation import instance
 
 FORMAT = "rodshell-result"
 VERSION = 2
+SIZE = 50e6  # bytes of result.json
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
 
 Level = Literal["good", "check", "unbuildable", "unknown"]
@@ -235,7 +237,7 @@ class Drawings(Record):
     project: Text = Field(default="", description="name of the project")
     revision: Text = Field(default="", description="revision")
     tolerance: Number = key("to which lengths are to be kept", "m")
-    layers: dict[str, Text] = Field(default_factory=dict, description="other names of DXF layers")
+    layers: dict[Text, Text] = Field(default_factory=dict, description="other names of DXF layers")
     name: Text = Field(default="", description='name of the drawings; "": the target\'s')
     author: Text = Field(default="", description="author")
     date: Text = Field(default="", description='a day as "2026-11-22"; "": the day of writing')
@@ -274,7 +276,7 @@ class Results(Record):
     version: Whole = Field(default=VERSION, description="version of the keys")
     units: Text = Field(default="SI", description='"SI"')
     version_rodshell: Text | None = key("the rodshell that found it")
-    versions: dict[str, Text] | None = key("versions of Python and of the numerical libraries")
+    versions: dict[Text, Text] | None = key("versions of Python and of the numerical libraries")
     name: Text | None = key("name of the result")
     status: Text = Field(default="unknown", description='"converged", or which stage stopped')
     warnings: Rows[Text] = rows("sentences")
@@ -353,14 +355,9 @@ def read_results(path: Path) -> Results:
     ------
     OutputError : there is no such file, or this version cannot read it; the sentence names the key.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise OutputError(f"{path.parent} holds no rodshell result: it has no {path.name}") from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise OutputError(f"cannot read {path}: {error}") from error
-    if not isinstance(content, dict):
-        raise OutputError(f"{path} is not a rodshell result: it is not a table of keys")
+    if not path.exists():
+        raise OutputError(f"{path.parent} holds no rodshell result: it has no {path.name}")
+    content = read_table(path, SIZE)
     return Results.from_text(json.dumps(upgraded(content, source=str(path))), source=str(path))
 
 
@@ -483,11 +480,14 @@ def _first_fault(error: ValidationError) -> str:
         return f"{where} is missing"
     value = repr(fault["input"])
     shown = value if len(value) <= 40 else f"{value[:37]}..."
-    return f"{where} cannot be {shown}: {_EXPECTED.get(fault['type'], fault['msg'])}"
+    expected = _EXPECTED.get(fault["type"])
+    return f"{where} cannot be {shown}: {expected.format(**fault.get('ctx', {})) if expected else fault['msg']}"
 
 
 _EXPECTED = {
     "float_type": "it must be a number",
+    "greater_than_equal": "it must be a number from {ge:g}",
+    "less_than_equal": "it must be a number up to {le:g}",
     "finite_number": "it must be a finite number, or null where it is not known",
     "int_type": "it must be a whole number",
     "int_from_float": "it must be a whole number",
