@@ -38,7 +38,6 @@ from rodshell.results.manifest import (
     own_table,
     read_manifest,
 )
-from rodshell.units import shown
 from rodshell.validation import file_path, instance
 
 try:
@@ -129,7 +128,7 @@ class ResultFolder:
             staged = (file.relative_to(self.new).as_posix() for file in self.new.rglob("*") if file.is_file())
             written = {name: found for name in sorted(staged) if (found := mark(self.new, name)) is not None}
             if strange := next((name for name in written if not inside(name)), None):
-                raise OutputError(f"cannot write a file of the name {shown(strange)}: choose another name")
+                raise OutputError(f"cannot write a file of the name {strange!r:.80}: choose another name")
             with _locked(self.path):
                 _recover(self.path, but=self.stage)
                 there = self.check([*written, MANIFEST])
@@ -351,7 +350,7 @@ def _record(stage: Path) -> _Commit:
         if not (isinstance(files, list) and isinstance(removes, list) and isinstance(replaces, dict)):
             raise OutputError("it lacks its names")
         if names := [name for name in (*files, *removes, *replaces) if not inside(name)]:
-            raise OutputError(f"{shown(names[0])} cannot be the name of a file of a result")
+            raise OutputError(f"{names[0]!r:.80} cannot be the name of a file of a result")
         if not all(map(is_mark, replaces.values())):
             raise OutputError("it does not say what stood in the folder")
         for name in files:

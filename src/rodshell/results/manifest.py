@@ -16,6 +16,7 @@ from rodshell.errors import InputError, OutputError
 from rodshell.untrusted import TEXT, read_text
 
 MANIFEST, FORMAT, VERSION = "manifest.json", "rodshell-manifest", 1
+HASHED = 1_000_000_000  # bytes of a file whose content is compared, in about a second; of larger ones their size is
 
 Mark = dict[str, object]
 """What stands at a name: {"size", "sha256"} of a file, {"link"} of a symbolic link, {"folder"} or {"other"}; {"behind"}
@@ -34,7 +35,9 @@ def mark(folder: Path, name: str) -> Mark | None:
         return {"behind": behind}
     if is_own_file(folder, name):
         with path.open("rb") as stream:
-            return {"size": path.stat().st_size, "sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
+            size = path.stat().st_size
+            digest = hashlib.file_digest(stream, "sha256").hexdigest() if size <= HASHED else ""
+            return {"size": size, "sha256": digest}
     if path.is_symlink():
         return {"link": str(path.readlink())}
     if path.is_dir():

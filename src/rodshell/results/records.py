@@ -11,6 +11,7 @@ from math import isfinite
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationInfo, model_validator
 from pydantic_core import CoreSchema, core_schema
 
@@ -19,6 +20,8 @@ Gate = Literal["flat", "from_flat", "remeshed", "tolerance", "stable"]
 FEWEST_STATIONS = 2
 LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
 MOST = 10**15  # of a count
+FARTHEST = 1e6  # m between two points of a shell, and of each of its lengths
+ORIGIN = 1e9  # m from the origin, as in national grids
 
 
 def printable(text: str) -> str:
@@ -176,6 +179,21 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     return value
+
+
+def far_apart(points: NDArray[Any]) -> str:
+    """What is wrong with the places (..., 2 or 3) [m] of points of one shell, or nothing; nan is not known.
+
+    Parameters
+    ----------
+    points : at least one.
+    """
+    rows = points.reshape(-1, points.shape[-1])
+    if np.nanmax(np.abs(rows), initial=0.0) > ORIGIN:
+        return f"a point more than {ORIGIN:g} m from the origin"
+    if np.max(np.nanmax(rows, axis=0, initial=-ORIGIN) - np.nanmin(rows, axis=0, initial=ORIGIN)) > FARTHEST:
+        return f"points more than {FARTHEST:g} m apart"
+    return ""
 
 
 # What was asked for

@@ -5,16 +5,19 @@ found are in `records`.
 """
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, ValidationError
 
 from rodshell.errors import OutputError
 from rodshell.results.loaded import DesignStrength, LoadCases
 from rodshell.results.manifest import read_table
 from rodshell.results.records import (
+    FARTHEST,
     Agreement,
     Bent,
     ByEnds,
@@ -40,6 +43,7 @@ from rodshell.results.records import (
     Text,
     Whole,
     by_ends,
+    far_apart,
     json_text,
     key,
     plain,
@@ -416,8 +420,15 @@ def contradictions(results: Results) -> Iterator[str]:
     ids = [rod.id for rod in results.rods]
     known = set(ids)
     if len(known) < len(ids):
-        twice = next(name for k, name in enumerate(ids) if name in ids[:k])
-        yield f'rods: the id "{twice}" occurs twice'
+        yield f'rods: the id "{Counter(ids).most_common(1)[0][0]}" occurs twice'
+    for k, rod in enumerate(results.rods):
+        joints = [joint.at for joint in rod.joints]
+        lengths = (rod.start, rod.end, rod.offset, rod.length, rod.cut_length, *rod.splices, *joints)
+        if max((abs(length) for length in lengths if length is not None), default=0.0) > FARTHEST:
+            yield f"rods[{k}] holds a length above {FARTHEST:g} m"
+    for name, points in (("footprint", results.footprint), ("boundary", results.boundary)):
+        if points and (fault := far_apart(np.array(points, dtype=float))):
+            yield f"{name} holds {fault}"
     for where, name in _named_rods(results):
         if name not in known:
             yield f'{where}: there is no rod "{name}"'
@@ -442,9 +453,12 @@ def contradictions(results: Results) -> Iterator[str]:
             braces = len(results.fabrication.bracing) if results.fabrication else 0
             if len(loaded.bracing) not in (0, braces):
                 yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
+    needed = [name for name in counts if name.startswith("reactions.") or name.endswith("support_forces")]
     for name, points in counts.items():
-        if len(points) not in (0, 2 * len(ids)):
+        if len(points) not in (2 * len(ids), *([] if name in needed else [0])):
             yield f"{name} has {len(points)} points for {len(ids)} rods: there must be two for each"
+    if results.loads and not results.boundary:
+        yield "there are loads, but no boundary"
 
 
 def _named_rods(results: Results) -> Iterator[tuple[str, str]]:

@@ -15,7 +15,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError, OutputError
-from rodshell.results.records import LARGEST
+from rodshell.results.records import FARTHEST, LARGEST, far_apart
 from rodshell.results.results import Results
 from rodshell.untrusted import limit, raised, read_bytes
 
@@ -24,8 +24,6 @@ States = Mapping[str, NDArray[Any]]
 SIZE = 500e6  # bytes of states.npz, and of all its arrays
 DIRECTORY = 1 << 20  # bytes of the list of arrays in it, enough for 10,000
 HEADER = 1000  # characters of an array's header; NumPy writes 128
-FARTHEST = 1e6  # m between two nodes of a shape
-ORIGIN = 1e9  # m from the origin, as of national grids
 COMPRESSION = 1  # half the time of NumPy's 6, for files that are 6 % longer
 
 SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order in which they are computed
@@ -167,11 +165,8 @@ def _out_of_range(name: str, values: NDArray[Any]) -> str:
         return "" if name not in ("flat", *SHELLS) else "no node"
     if not np.isfinite(values).all():
         return "a number that is not finite"
-    low, high = values.min(), values.max()
-    points = name in ("flat", *SHELLS, "history", "target_points") or name.startswith("loaded_")
-    most = FARTHEST if name in GAPS.values() else 1.0 if name == "history_share" else ORIGIN if points else LARGEST
-    if max(-float(low), float(high)) > most:
-        return f"{low:.4g} to {high:.4g}: numbers from {-most:g} to {most:g} are read"
-    if points and np.ptp(values.reshape(-1, values.shape[-1]), axis=0).max() > FARTHEST:
-        return f"nodes that are more than {FARTHEST:g} m apart"
-    return ""
+    if name in ("flat", *SHELLS, "history", "target_points") or name.startswith("loaded_"):
+        return far_apart(values)
+    low, high = float(values.min()), float(values.max())
+    most = FARTHEST if name in GAPS.values() else 1.0 if name == "history_share" else LARGEST
+    return f"{low:.4g} to {high:.4g}: it must lie from {-most:g} to {most:g}" if max(-low, high) > most else ""
