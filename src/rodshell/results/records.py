@@ -21,6 +21,7 @@ FEWEST_STATIONS = 2
 LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
 MOST = 10**15  # of a count
 FARTHEST = 1e6  # m between two points of a shell, and of each of its lengths
+SHORTEST = 1e-9  # m of a rod
 ORIGIN = 1e9  # m from the origin, as in national grids
 
 
@@ -182,18 +183,12 @@ def plain(value: Any) -> Any:
 
 
 def far_apart(points: NDArray[Any]) -> str:
-    """What is wrong with the places (..., 2 or 3) [m] of points of one shell, or nothing; nan is not known.
-
-    Parameters
-    ----------
-    points : at least one.
-    """
+    """What is wrong with the places (..., 2 or 3) [m] of points of one shell, one at least and finite; or nothing."""
     rows = points.reshape(-1, points.shape[-1])
-    if np.nanmax(np.abs(rows), initial=0.0) > ORIGIN:
+    low, high = rows.min(axis=0).astype(float), rows.max(axis=0).astype(float)
+    if max(high.max(), -low.min()) > ORIGIN:
         return f"a point more than {ORIGIN:g} m from the origin"
-    if np.max(np.nanmax(rows, axis=0, initial=-ORIGIN) - np.nanmin(rows, axis=0, initial=ORIGIN)) > FARTHEST:
-        return f"points more than {FARTHEST:g} m apart"
-    return ""
+    return f"points more than {FARTHEST:g} m apart" if max(high - low) > FARTHEST else ""
 
 
 # What was asked for

@@ -18,6 +18,7 @@ from rodshell.results.loaded import DesignStrength, LoadCases
 from rodshell.results.manifest import read_table
 from rodshell.results.records import (
     FARTHEST,
+    SHORTEST,
     Agreement,
     Bent,
     ByEnds,
@@ -47,6 +48,7 @@ from rodshell.results.records import (
     json_text,
     key,
     plain,
+    printable,
     required,
     rows,
 )
@@ -237,7 +239,7 @@ class Fabrication(Record):
 class Drawings(Record):
     """What the drawings have in common."""
 
-    paper: Text = Field(default="A3", description="size of the PDF's sheets: A4 to A0")
+    paper: Literal["A4", "A3", "A2", "A1", "A0"] = Field(default="A3", description="size of the PDF's sheets: A4 to A0")
     project: Text = Field(default="", description="name of the project")
     revision: Text = Field(default="", description="revision")
     tolerance: Number = key("to which lengths are to be kept", "m")
@@ -384,7 +386,10 @@ def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
         raise OutputError(f'{source} is not a rodshell result: its "format" is not "{FORMAT}"')
     version = content.get("version", VERSION)
     if not isinstance(version, int) or isinstance(version, bool) or not 1 <= version <= VERSION:
-        raise OutputError(f"{source} has version {version}, this rodshell reads 1 to {VERSION}: install a newer one")
+        raise OutputError(
+            f"{source} has version {printable(str(version)):.20}, this rodshell reads 1 to {VERSION}: "
+            "install a newer one"
+        )
     content |= {"format": FORMAT, "version": VERSION}
     if "version_gridshell" in content:
         content["version_rodshell"] = content.pop("version_gridshell")
@@ -422,13 +427,16 @@ def contradictions(results: Results) -> Iterator[str]:
     if len(known) < len(ids):
         yield f'rods: the id "{Counter(ids).most_common(1)[0][0]}" occurs twice'
     for k, rod in enumerate(results.rods):
-        joints = [joint.at for joint in rod.joints]
-        lengths = (rod.start, rod.end, rod.offset, rod.length, rod.cut_length, *rod.splices, *joints)
-        if max((abs(length) for length in lengths if length is not None), default=0.0) > FARTHEST:
-            yield f"rods[{k}] holds a length above {FARTHEST:g} m"
+        lengths = [length for length in (rod.end - rod.start, rod.length, rod.cut_length) if length is not None]
+        at = [rod.start, rod.end, rod.offset or 0.0, *rod.splices, *(joint.at for joint in rod.joints), *lengths]
+        if min(lengths) < SHORTEST or max(map(abs, at)) > FARTHEST:
+            yield f"rods[{k}] has a length that is not from {SHORTEST:g} to {FARTHEST:g} m"
     for name, points in (("footprint", results.footprint), ("boundary", results.boundary)):
-        if points and (fault := far_apart(np.array(points, dtype=float))):
+        placed = [point for point in points if None not in point]
+        if placed and (fault := far_apart(np.array(placed))):
             yield f"{name} holds {fault}"
+        if name == "footprint" and len(placed) < len(points):
+            yield f"{name} holds a point that is not known"
     for where, name in _named_rods(results):
         if name not in known:
             yield f'{where}: there is no rod "{name}"'
@@ -489,19 +497,19 @@ def _first_fault(error: ValidationError) -> str:
     """The first fault in a sentence that names its key as it stands in the file, "rods[3].joints[0].at"."""
     fault = error.errors(include_url=False)[0]
     where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"]).lstrip(".")
-    where = where or "the file"
+    where = printable(where)[:200] or "the file"
     if fault["type"] == "missing":
         return f"{where} is missing"
     value = repr(fault["input"])
     shown = value if len(value) <= 40 else f"{value[:37]}..."
-    expected = _EXPECTED.get(fault["type"])
-    return f"{where} cannot be {shown}: {expected.format(**fault.get('ctx', {})) if expected else fault['msg']}"
+    expected = _EXPECTED.get(fault["type"], "") % fault.get("ctx", {})
+    return f"{where} cannot be {shown}: {expected or fault['msg'].removeprefix('Value error, ')}"
 
 
 _EXPECTED = {
     "float_type": "it must be a number",
-    "greater_than_equal": "it must be a number from {ge:g}",
-    "less_than_equal": "it must be a number up to {le:g}",
+    "greater_than_equal": "it must be a number from %(ge)g",
+    "less_than_equal": "it must be a number up to %(le)g",
     "finite_number": "it must be a finite number, or null where it is not known",
     "int_type": "it must be a whole number",
     "int_from_float": "it must be a whole number",

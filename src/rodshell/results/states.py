@@ -66,7 +66,12 @@ def read_states(path: Path, results: Results) -> dict[str, NDArray[Any]]:
         raise OutputError(f"{path} {DAMAGED}") from error
     for fault in state_faults(states, results):
         raise OutputError(f"{path}: {fault}")
-    return states
+    return {name: values.astype(_kind(name, values), copy=False) for name, values in states.items()}
+
+
+def _kind(name: str, values: NDArray[Any]) -> np.dtype[Any]:
+    """What numbers an array has that is as it should be."""
+    return values.dtype.newbyteorder("=") if values.dtype.kind == "f" or name in INDICES else np.dtype(float)
 
 
 class _Pieces(BytesIO):
@@ -110,8 +115,13 @@ def state_faults(states: States, results: Results) -> Iterator[str]:
     results : by which the number of rods and stages is known.
     """
     for name, values in states.items():
-        if values.dtype.kind not in ("iu" if name in INDICES else "fiu") or values.dtype.itemsize > 8:
-            yield f"{name} must be an array of {'whole ' if name in INDICES else ''}numbers"
+        if values.dtype.kind not in ("iu" if name in INDICES else "fiu") or values.dtype.itemsize not in (4, 8):
+            yield f"{name} must be an array of {'whole ' if name in INDICES else ''}numbers of 32 or 64 bits"
+            return
+    for name, needed in (("rod_nodes", "rod_start"), ("rod_start", "rod_nodes"), ("history", "history_share"),
+                         ("history_share", "history"), ("target_points", "target_faces")):  # fmt: skip
+        if name in states and needed not in states:
+            yield f"{name} is there, but {needed} is missing"
             return
     count = next((len(states[name]) for name in ("flat", *SHELLS) if name in states and states[name].ndim), 0)
     for name, shape in _shapes(states, count, results):
@@ -121,11 +131,6 @@ def state_faults(states: States, results: Results) -> Iterator[str]:
     for name, values in states.items():
         if fault := _out_of_range(name, values):
             yield f"{name} holds {fault}"
-    for name, needed in (("rod_nodes", "rod_start"), ("rod_start", "rod_nodes"), ("history", "history_share"),
-                         ("history_share", "history"), ("target_points", "target_faces")):  # fmt: skip
-        if name in states and needed not in states:
-            yield f"{name} is there, but {needed} is missing"
-            return
     for name, points in (("rod_nodes", count), ("target_faces", len(states.get("target_points", ())))):
         nodes = states.get(name, np.empty(0, dtype=int))
         if nodes.size and not (nodes.min() >= 0 and nodes.max() < points):
