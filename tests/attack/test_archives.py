@@ -228,7 +228,7 @@ def change_arrays(folder: Path, edits: dict[str, Edit | None]) -> None:
 
 
 TEXTS: dict[str, str] = {
-    "too large": " " * 50_000_001,
+    "too large": " " * 25_000_001,
     "deep": '{"rods": ' + "[" * 100_000,
     "deep where all is allowed": '{"later": ' + "[" * 900 + "]" * 900 + "}",
     "a long number": '{"version": ' + "9" * 5000 + "}",
@@ -261,6 +261,7 @@ KEYS: dict[str, tuple[Edit, str]] = {
     "a rod too long": (_set("rods", 0, "cut_length", to=1e7), f"from {SHORTEST:g} to {FARTHEST:g} m"),
     "a rod without length": (_set("rods", 0, "end", to=-1e3), f"from {SHORTEST:g} to {FARTHEST:g} m"),
     "a far end": (_set("footprint", 0, 0, to=1e20), "footprint holds a point more than 1e+09 m from the origin"),
+    "an unknown end in space": (_set("boundary", 0, 1, to=None), "boundary holds a point that is not known"),
     "an unknown end": (_set("footprint", 0, 0, to=None), "footprint holds a point that is not known"),
     "no forces": (_set("reactions", "pinned", "moments", to=[]), "reactions.pinned.moments has 0 points for 6 rods"),
     "no forces under loads": (_set("loads", "snow", "pinned", "support_forces", to=[]), "support_forces has 0 points"),

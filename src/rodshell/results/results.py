@@ -8,10 +8,10 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import FailFast, Field, ValidationError
 
 from rodshell.errors import OutputError
 from rodshell.results.loaded import DesignStrength, LoadCases
@@ -56,7 +56,7 @@ from rodshell.validation import instance
 
 FORMAT = "rodshell-result"
 VERSION = 2
-SIZE = 50e6  # bytes of result.json
+SIZE = 25e6  # bytes of result.json; its content takes up to a hundred times that
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
 
 Level = Literal["good", "check", "unbuildable", "unknown"]
@@ -261,7 +261,7 @@ class Verdict(Record):
         'checked first; "unbuildable": no end condition gives a shell that can be built; "unknown": no shell was '
         "computed, as where the computation did not converge, or one that might be built was not"
     )
-    reasons: tuple[Text, ...] = Field(min_length=1, description="sentences, the gravest first")
+    reasons: Annotated[tuple[Text, ...], FailFast()] = Field(min_length=1, description="sentences, the gravest first")
 
     @property
     def headline(self) -> str:
@@ -305,7 +305,7 @@ class Results(Record):
     refinement: Refinement | None = key("how the form was refined; absent where that was not asked for")
     bending: Bending | None = key("bending and stress")
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
-    joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
+    joint_loads: ByEnds[Rows[JointLoad]] = by_ends("what acts at the joints")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
     strength: DesignStrength | None = key("design strengths, by which the rods are judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
@@ -435,7 +435,7 @@ def contradictions(results: Results) -> Iterator[str]:
         placed = [point for point in points if None not in point]
         if placed and (fault := far_apart(np.array(placed))):
             yield f"{name} holds {fault}"
-        if name == "footprint" and len(placed) < len(points):
+        if len(placed) < len(points):
             yield f"{name} holds a point that is not known"
     for where, name in _named_rods(results):
         if name not in known:
@@ -462,9 +462,9 @@ def contradictions(results: Results) -> Iterator[str]:
             if len(loaded.bracing) not in (0, braces):
                 yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
     needed = [name for name in counts if name.startswith("reactions.") or name.endswith("support_forces")]
-    for name, points in counts.items():
-        if len(points) not in (2 * len(ids), *([] if name in needed else [0])):
-            yield f"{name} has {len(points)} points for {len(ids)} rods: there must be two for each"
+    for name, entries in counts.items():
+        if len(entries) not in (2 * len(ids), *([] if name in needed else [0])):
+            yield f"{name} has {len(entries)} points for {len(ids)} rods: there must be two for each"
     if results.loads and not results.boundary:
         yield "there are loads, but no boundary"
 
