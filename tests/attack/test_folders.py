@@ -186,6 +186,18 @@ def test_manifest_that_lists_files_behind_a_link_reaches_none(dome: Path) -> Non
     assert contents(dome.parent / "victim") == {"empty": None, "notes": b"mine"}
 
 
+def test_manifest_that_lists_a_link_as_it_is_does_not_hide_it(dome: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The tables were written nowhere, with exit code 0."""
+    shutil.rmtree(dome / "schedule")
+    (dome / "schedule").symlink_to(dome.parent / "victim")
+    listed = json.loads((dome / "manifest.json").read_text())
+    listed["files"] |= {f"schedule/{name}.csv": {"behind": "schedule"} for name in ("rods", "joints", "supports")}
+    (dome / "manifest.json").write_text(json.dumps(listed))
+    code, said = export(dome, capsys)
+    assert code == 2
+    assert "will not replace schedule" in said
+
+
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs root")
 def test_stage_of_another_user_is_neither_completed_nor_read(dome: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (dome / "name").write_text("old")

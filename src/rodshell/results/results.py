@@ -6,7 +6,7 @@ found are in `records`.
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -431,7 +431,7 @@ def contradictions(results: Results) -> Iterator[str]:
         at = [rod.start, rod.end, rod.offset or 0.0, *rod.splices, *(joint.at for joint in rod.joints), *lengths]
         if min(lengths) < SHORTEST or max(map(abs, at)) > FARTHEST:
             yield f"rods[{k}] has a length that is not from {SHORTEST:g} to {FARTHEST:g} m"
-    for name, points in (("footprint", results.footprint), ("boundary", results.boundary)):
+    for name, points in _places(results):
         placed = [point for point in points if None not in point]
         if placed and (fault := far_apart(np.array(placed))):
             yield f"{name} holds {fault}"
@@ -467,6 +467,17 @@ def contradictions(results: Results) -> Iterator[str]:
             yield f"{name} has {len(entries)} points for {len(ids)} rods: there must be two for each"
     if results.loads and not results.boundary:
         yield "there are loads, but no boundary"
+
+
+def _places(results: Results) -> Iterator[tuple[str, Sequence[Sequence[float | None]]]]:
+    """Points that are drawn, by the key of each list."""
+    yield from (("footprint", results.footprint), ("boundary", results.boundary))
+    for k, seam in enumerate(results.seams):
+        yield f"seams[{k}].points", seam.points
+        yield f"seams[{k}].meetings", [meeting.point for meeting in seam.meetings]
+    for ends, agreement in results.agreement.items():
+        if agreement.where is not None:
+            yield f"agreement.{ends}.where", [agreement.where]
 
 
 def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
