@@ -13,7 +13,7 @@ import numpy as np
 
 from rodshell.errors import RodshellError
 from rodshell.results import read
-from rodshell.results.folder import mark, read_manifest
+from rodshell.results.manifest import mark, read_manifest
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 PROGRAM = "from rodshell.cli import entry; entry()"
@@ -38,6 +38,42 @@ JOBS = {
     "gravity": Job("gravity", (*SMALL, "--method", "gravity")),
     "paper": Job("paper", (*SMALL, "--method", "paper", "--drape.drag", "5")),
 }
+CASE = """[target]
+kind = "hemisphere"
+[layout]
+rods = [5, 5]
+spacing = {spacing}
+edge = 0.04
+length = 0.9
+[drawings]
+project = "{project}"
+"""
+LOADS = """[[loads]]
+name = "snow"
+kind = "snow"
+value = "0.01 kN/m2"
+[[combinations]]
+name = "winter"
+factors = {{ snow = 1.0 }}
+"""
+
+
+def jobs_of_files(folder: Path) -> dict[str, Job]:
+    """The commands that begin with a case or an earlier result, which are written into `folder`."""
+    folder.mkdir(parents=True)
+    (folder / "loads.toml").write_text(LOADS.format())
+    for name, spacing, word in (("old", 0.08, OLD), ("new", 0.075, NEW)):
+        (folder / f"{name}.toml").write_text(CASE.format(spacing=spacing, project=word))
+    cases = ((str(folder / "old.toml"),), (str(folder / "new.toml"),))
+    run(Job("source", ("form",)), cases[0], folder / "source")
+    projects = ("--drawings.project", OLD), ("--drawings.project", NEW)
+    return {
+        "check": Job("check", ("check", "--loads", str(folder / "loads.toml")), *cases),
+        "refine": Job("refine", ("refine", "--vary", "tails"), *cases),
+        "popup": Job("popup", ("popup", str(folder / "source")), *projects),
+    }
+
+
 MINE = {"notes.md": "mine", "photos/site.jpg": "mine", "drawings/mine.dxf": "mine", "pictures/stage_left.png": "mine"}
 
 
@@ -136,7 +172,7 @@ def project(folder: Path) -> str:
     except RodshellError as error:
         return str(error)
     name = str(archive.results.plain()["drawings"]["project"])
-    if f'project = "{name}"' not in archive.case_toml:
+    if "[drawings]" in archive.case_toml and f'project = "{name}"' not in archive.case_toml:  # a table has none
         return f"result.json is of {name}, case.toml is not"
     ends = np.array(archive.results.plain()["footprint"])
     flat = archive.states["flat"]

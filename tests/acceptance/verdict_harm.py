@@ -19,6 +19,7 @@ from tests.acceptance.kills import (
     PROGRAM,
     SMALL,
     Faults,
+    Job,
     foreign_touched,
     kill,
     lay_foreign_files,
@@ -36,8 +37,8 @@ SEED = 20261122
 def rows() -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as folder:
         yield from foreign_rows(Path(folder) / "foreign")
-        for name in JOBS:
-            yield from kill_rows(name, Path(folder) / name)
+        for job in JOBS.values():
+            yield from kill_rows(job, Path(folder) / job.name)
         yield from mount_rows(Path(folder) / "mount")
         yield from read_only_rows(Path(folder) / "read-only")
 
@@ -76,15 +77,15 @@ def foreign_rows(folder: Path) -> Iterator[Row]:
         yield Row(case, f"{what}: not replaced by --force", float(forced.returncode not in FOUND), 0)
 
 
-def kill_rows(name: str, folder: Path) -> Iterator[Row]:
+def kill_rows(job: Job, folder: Path, kills: int = KILLS) -> Iterator[Row]:
     """KILL, TERM and INT in turn, every other one while files are written; after each the next run."""
-    job, faults, chance = JOBS[name], Faults(), random.Random(f"{SEED} {name}")
+    faults, chance = Faults(), random.Random(f"{SEED} {job.name}")
     dome, pristine = folder / "dome", folder / "kept/pristine"
     run(job, job.old, pristine)
     lay_foreign_files(pristine)
     lasts = run(job, job.new, folder / "kept/timed")
     seen, tries = {OLD: 0, NEW: 0}, 0
-    while sum(seen.values()) < KILLS and tries < 3 * KILLS:
+    while sum(seen.values()) < kills and tries < 3 * kills:
         shutil.rmtree(dome, ignore_errors=True)
         shutil.copytree(pristine, dome)
         how = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)[sum(seen.values()) % 3]
@@ -103,8 +104,8 @@ def kill_rows(name: str, folder: Path) -> Iterator[Row]:
         faults.foreign += foreign_touched(dome)
     for word in faults.notes:
         print("  ", word, flush=True)
-    case, note = f"{KILLS} kills, {name}", f"{seen[OLD]} old, {seen[NEW]} new; {tries - KILLS} were over before"
-    yield Row(case, "kills that did not come in time", KILLS - sum(seen.values()), 0, note=note)
+    case, note = f"{kills} kills, {job.name}", f"{seen[OLD]} old, {seen[NEW]} new; {tries - kills} were over before"
+    yield Row(case, "kills that did not come in time", kills - sum(seen.values()), 0, note=note)
     yield Row(case, "files of others touched", faults.foreign, 0)
     yield Row(case, "torn", faults.torn, 0)
     yield Row(case, "left over after the next run", faults.left, 0)

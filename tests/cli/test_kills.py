@@ -47,14 +47,14 @@ shown.Progress.__call__ = lost
 IN_AN_IMPORT = """
 import builtins
 wanted = builtins.__import__
-def slowly(name, *rest):
+def slowly(name, *rest, **more):
     if name == "rodshell.job":
         print("here", flush=True)
         try:
             time.sleep(30)
         except KeyboardInterrupt as error:
             raise ImportError("half imported") from error
-    return wanted(name, *rest)
+    return wanted(name, *rest, **more)
 builtins.__import__ = slowly
 """
 

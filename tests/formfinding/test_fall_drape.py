@@ -15,7 +15,7 @@ from rodshell.errors import InputError, OutputError, StabilityError
 from rodshell.formfinding.methods import Draped, Fall
 from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
-from rodshell.results.folder import read_manifest
+from rodshell.results.manifest import read_manifest
 from rodshell.solve.equilibrium import Status
 from rodshell.solve.simulate import TimeSeries
 from tests.formfinding.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout

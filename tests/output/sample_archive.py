@@ -174,3 +174,61 @@ def with_deployment(archive: Archive, stages: int = 9) -> Archive:
     rows = [{"share": float(s), "height": float(np.ptp(x[:, 2]))} for s, x in zip(share, history, strict=True)]
     results = Results.of({**archive.results.plain(), "deployment": {"ends": "pinned", "stages": rows}})
     return Archive(results, states, archive.case_toml)
+
+
+def with_everything() -> Archive:
+    """A dome of three rods in each family with every array and nearly every table; figures of the right kind."""
+    made = with_deployment(sample_archive(3, 2), stages=4)
+    result, states = made.results.plain(), dict(made.states)
+    entries, rods = len(states["rod_nodes"]), result["rods"]
+    for ends in ("pinned", "clamped"):
+        states |= {
+            f"curvature_{ends}": np.linspace(0, 1, entries), f"force_{ends}": np.linspace(-1, 1, entries),
+            f"loaded_{ends}_snow": 1.01 * states[f"popped_{ends}"], f"loaded_stress_{ends}_snow": np.ones(entries),
+            f"loaded_mode_{ends}_snow": 0.01 * states["flat"], f"loaded_buckling_{ends}_snow_1": 0.01 * states["flat"],
+        }  # fmt: skip
+    states |= {
+        "history_curvature": states["history_stress"], "target_points": states["draped"].astype(np.float32),
+        "target_faces": np.array([[0, 1, 2], [1, 2, 3]], dtype=np.uint32),
+    }  # fmt: skip
+    for k, rod in enumerate(rods):
+        rod |= {"cut_length": rod["length"] + 0.02, "mass": 0.01, "layer": 1 + k % 2, "min_radius": 0.1,
+                "max_stress": 1e6, "utilisation": 0.4, "splices": [rod["length"] / 2]}  # fmt: skip
+    rods[0]["stiffness"] = {"at": [0.0, rods[0]["length"]], "factors": [1.0, 2.0], "varies": "size",
+                            "sizes": [0.002, 0.003]}  # fmt: skip
+    ids, point = [rod["id"] for rod in rods], [0.0, 0.0, 1.0]
+    forces, place = 2 * len(rods) * [point], {"rod": ids[0], "at": 0.1}
+    loaded = {
+        "at_factor": 1.0, "load_sum": point, "reaction_sum": point, "max_deflection": 0.01, "linear_factor": 3.0,
+        "limit_factor": 2.0, "limit_kind": "limit point", "imperfect_factor": 1.5, "imperfect_kind": "bifurcation",
+        "duration": "short", "utilisation": 0.3, "utilisations": {"bending": 0.3, "shear": 0.1}, "euler": 0.2,
+        "euler_at": place, "max_stress": 1e6, "governs": {**place, "by": "bending"}, "uplift": 1.0,
+        "reactions": forces, "support_forces": forces, "support_moments": forces, "bracing": [1.0, 2.0],
+        "mode_factors": [3.0], "frequencies": [1.0],
+    }  # fmt: skip
+    reactions = {"force_sum": point, "moment_sum": point, "largest_force": 1.0, "forces": forces, "moments": forces}
+    bars = [{"pieces": [{"piece": name, "length": 0.1} for name in ids], "left": 0.1}]
+    joints = [f"{ids[0]}/{ids[3]}", f"{ids[1]}/{ids[4]}"]
+    result |= {
+        "bending": {"strength": 1e7, "pinned": {**place, "max_stress": 1e6, "min_radius": 0.1, "utilisation": 0.2}},
+        "reactions": {ends: dict(reactions) for ends in ("pinned", "clamped")},
+        "joint_loads": {"pinned": [{"rods": [ids[0], ids[3]], "force": point, "normal_force": 1.0, "shear_moment": 1.0,
+                                    "out_of_plane_moment": 1.0, "scissor_deg": 2.0}]},
+        "self_weight": {"pinned": {"load_factor": 3.0, "deflection": 0.01, "limit": "limit point"}},
+        "loads": {"snow": {"pinned": dict(loaded), "clamped": dict(loaded)}},
+        "contact": {"pinned": {"clearance": 0.01, "pairs": 0, "rods": ids[:2], "where": point}},
+        "other_shapes": {"pinned": {"tried": 3, "found": [{"distance": 0.1, "energy": 1.1, "mirror": True}]}},
+        "end_tangents": forces, "dropped": [{"id": "X", "reason": "short"}],
+        "verdict": {"level": "good", "reasons": ["It pops up."]}, "strength": {"permanent": 1e7, "short": 2e7},
+        "joint": {"kind": "pin", "eccentricity": 0.0, "mass": 0.0},
+        "drawings": {"paper": "A3", "project": "dome", "layers": {"CUT": "cut"}, "date": "2026-11-22"},
+        "fabrication": {"end_allowance": 0.01, "stock_length": 1.0, "kerf": 0.003, "total_mass": 1.0,
+                        "bracing": [{"from": joints[k], "to": joints[1 - k], "flat": 0.04, "final": 0.05, "cut": 0.05}
+                                    for k in (0, 1)],
+                        "stock": {"waste": 0.1, "fewest": 1, "bars": bars}},
+        "seams": [{"points": [[0.0, 0.0], [0.1, 0.1]],
+                   "meetings": [{"ends": [f"{ids[0]}.0", f"{ids[1]}.1"], "point": [-0.1, 0.0, 0.1]}],
+                   "forces": {"pinned": {"each": [point], "largest": 1.0, "sum": point}}}],
+    }  # fmt: skip
+    result["deployment"] |= {"snaps": [[0.1, 0.2]], "snapped_by": [0.1], "reached_from_flat": True}
+    return Archive(Results.of(result), states, made.case_toml)

@@ -16,6 +16,7 @@ from rodshell.output.files import KINDS, NAMES, Content
 from rodshell.results import Archive, folder, read
 from rodshell.results.archive import ARCHIVE
 from rodshell.results.folder import ForeignFileError, open_folder
+from rodshell.results.manifest import mark, read_manifest
 from tests.output.forms import wished
 from tests.output.sample_archive import sample_archive, table_archive
 
@@ -134,7 +135,7 @@ def test_a_manifest_from_elsewhere_reaches_nothing_outside_its_folder(dome: Path
     (dome / "link").symlink_to(dome.parent)
     listed = json.loads((dome / "manifest.json").read_text())
     for name in ("../mine.txt", str(mine), "link/mine.txt"):
-        listed["files"][name] = folder.mark(dome.parent, "mine.txt")
+        listed["files"][name] = mark(dome.parent, "mine.txt")
     (dome / "manifest.json").write_text(json.dumps(listed))
     rewrite(dome)
     assert mine.read_text() == "mine"
@@ -177,7 +178,7 @@ def test_export_follows_the_same_rules_and_keeps_the_rest_of_the_result(dome: Pa
     assert {name: data for name, data in contents(dome).items() if name in before and name != "manifest.json"} == {
         name: data for name, data in before.items() if name != "manifest.json"
     }
-    assert {"drawings/plan.svg", "schedule/rods.csv"} <= folder.read_manifest(dome).keys()
+    assert {"drawings/plan.svg", "schedule/rods.csv"} <= read_manifest(dome).keys()
     (dome / "drawings/plan.svg").write_text("mine")
     with pytest.raises(ForeignFileError, match=r"plan\.svg"):
         export(read(dome), dome, ["svg"])

@@ -229,7 +229,8 @@ def test_a_corrupt_result_is_one_sentence_that_names_the_key(
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [(b"", "cannot read"), (b"{", "cannot read"), (b"\xff\xfe", "cannot read"), (b"[1, 2]", "is not a table of keys"),
+    [(b"", "cannot read"), (b"{", "cannot read"), (b"\xff\xfe", "is not text in UTF-8: it is damaged"),
+     (b"[1, 2]", "is not a table of keys"),
      (b"null", "is not a table of keys"), (b'{"a": ' + b"[" * 100_000, "cannot read"),
      (b'{"format": "rodshell-result", "version": 2, "name": "\\ud800"}', "result.json")],
 )  # fmt: skip

@@ -195,7 +195,8 @@ def read_result(folder: Path) -> ResultRods:
     InputError : the result has no rods, or no shell in space; its rods lie in two layers, or have linkers of their own.
     """
     from rodshell.output.grid import rods_of
-    from rodshell.results.archive import SHELLS, read
+    from rodshell.results.archive import read
+    from rodshell.results.states import SHELLS
 
     archive = read(folder)
     results = archive.results

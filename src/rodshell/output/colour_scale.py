@@ -12,7 +12,8 @@ from rodshell.dataclass import dataclass
 from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import number
-from rodshell.results.archive import SHELLS, Archive, made_once
+from rodshell.results.archive import Archive, made_once
+from rodshell.results.states import SHELLS
 from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.progress import Progress, require_progress, silent
-from rodshell.results.archive import SHELLS, Archive, archive_names, put_archive
+from rodshell.results.archive import Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
+from rodshell.results.states import SHELLS
 from rodshell.validation import described, flag, instance, mapping
 
 if TYPE_CHECKING:

@@ -11,9 +11,10 @@ from rodshell.errors import OutputError
 from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
-from rodshell.results.archive import BENT, GAPS, SHELLS, Archive, made_once
+from rodshell.results.archive import Archive, made_once
 from rodshell.results.laths import laths_on
 from rodshell.results.records import Rod
+from rodshell.results.states import BENT, GAPS, SHELLS
 
 CAPTIONS = {
     "flat": "Flat, as cut and laid out",

@@ -56,6 +56,10 @@ class Label(NamedTuple):
         return np.array([(x, y), (a + c * u - s * v, b + s * u + c * v)])
 
 
+MOST_SQUARES = 10_000  # that a box is found by; one that lies in more is compared with all
+WIDE = ()
+
+
 class Room:
     """The boxes (4, 2) that are taken, found by the square of the plane that they lie in.
 
@@ -64,7 +68,7 @@ class Room:
 
     def __init__(self, square: float, within: "Room | None" = None) -> None:
         self._square = square
-        self._taken: dict[tuple[int, int], list[tuple[Extent, Floats]]] = {}
+        self._taken: dict[tuple[int, ...], list[tuple[Extent, Floats]]] = {}
         self._boxes = list[Floats]()
         self._within = within
 
@@ -73,10 +77,12 @@ class Room:
         if self._within is not None and not self._within.free(box):
             return False
         extent = left, low, right, high = _extent(box)
+        squares, taken = self._squares(extent), self._taken
+        lists = taken.values() if squares == [WIDE] else (taken.get(square, ()) for square in (*squares, WIDE))
         near = [
             other
-            for square in self._squares(extent)
-            for (x0, y0, x1, y1), other in self._taken.get(square, ())
+            for boxes in lists
+            for (x0, y0, x1, y1), other in boxes
             if x0 < right and left < x1 and y0 < high and low < y1
         ]
         return not boxes_meet(box, near)
@@ -99,8 +105,10 @@ class Room:
         for box in other._boxes:
             self.take(box)
 
-    def _squares(self, extent: Extent) -> list[tuple[int, int]]:
+    def _squares(self, extent: Extent) -> list[tuple[int, ...]]:
         (left, low, right, high), square = extent, self._square
+        if (right - left + square) * (high - low + square) > MOST_SQUARES * square**2:
+            return [WIDE]
         rows = range(int(low // square), int(high // square) + 1)
         return [(x, y) for x in range(int(left // square), int(right // square) + 1) for y in rows]
 

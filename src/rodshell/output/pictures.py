@@ -24,7 +24,8 @@ from rodshell.output.grid import (
     shape_of,
 )
 from rodshell.output.svg import number, picture_document
-from rodshell.results.archive import SHELLS, Archive, made_once
+from rodshell.results.archive import Archive, made_once
+from rodshell.results.states import SHELLS
 from rodshell.results.wording import MINUS, UNDER, nice_ticks, shown_length
 
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(27.0)  # of the eye

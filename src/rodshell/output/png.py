@@ -11,9 +11,11 @@ from aggdraw import Pen as Stroke
 from PIL import Image, ImageDraw, ImageFont
 
 from rodshell.arrays import Floats
+from rodshell.errors import OutputError
 from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Path, Text
 
 CAP = 0.5  # pixels
+LONGEST = 20_000.0  # drawing units, of which a picture is some 900 wide: lower letters cannot be drawn
 COLOURS = 256  # of a file at most: a third of the bytes, and no colour off by more than a tenth
 HALO = 2.0  # width of a text's halo, in drawing units
 
@@ -27,9 +29,12 @@ def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
     width : of the image [pixels].
     """
     low, high = drawing.box()
-    scale = width / float(high[0] - low[0])
+    across, up = (high - low).tolist()
+    if max(across, up) > LONGEST:
+        raise OutputError(f"{drawing.title}: a point lies so far from the others that no picture can show both")
+    scale = width / across
     corner = np.array([low[0], high[1]])
-    size = (width, round(scale * float(high[1] - low[1])))
+    size = (width, round(scale * up))
     canvas = Draw("RGB", size, "white")
     last, stroke = None, None
     for path, points in zip(drawing.paths, _lines(drawing.paths, corner, scale), strict=True):

@@ -21,10 +21,11 @@ from rodshell.output.section_profiles import profiles_svg
 from rodshell.output.svg import SCALE, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
-from rodshell.results.archive import SHELLS, shown_case
+from rodshell.results.archive import shown_case
 from rodshell.results.laths import laths_text
 from rodshell.results.records import Agreement, Drape, Ends, Gate, PopUp, Record
 from rodshell.results.results import Clearance, Reactions, Stock
+from rodshell.results.states import SHELLS
 from rodshell.results.strength_used import ENDS, by_design_strength
 from rodshell.results.verdict import facts, unknown_below
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent

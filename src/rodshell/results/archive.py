@@ -9,45 +9,50 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import field
 from functools import wraps
-from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
-from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.dataclass import dataclass
-from rodshell.errors import OutputError
+from rodshell.errors import InputError, OutputError
 from rodshell.results.folder import ResultFolder, reading
+from rodshell.results.manifest import inside
 from rodshell.results.results import Results, Verdict, read_results
+from rodshell.results.states import SHELLS, packed, read_states
 from rodshell.results.summary import summary_text
 from rodshell.results.verdict import CONVERGED, verdict_of
-from rodshell.validation import instance, mapping
+from rodshell.untrusted import limit, raised, read_text
+from rodshell.validation import file_path, instance, mapping
 
 LARGEST = 20_000_000  # bytes of a file that is copied
+ALL_COPIES = 100_000_000  # bytes of all files that are copied
+MOST_FILES = 100  # that a case names
 FOLDER = "inputs"
 NAMED = re.compile(r'^(file|boundary) = (".*")$', re.MULTILINE)  # in the text of a resolved case
 PARTS = ".gltf"
-COMPRESSION = 1  # of states.npz: half the time of NumPy's 6, for files that are 6 % longer
 
 
-def read_inputs(case_toml: str, where: Callable[[str], Path] = Path) -> dict[str, bytes]:
+def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> dict[str, bytes]:
     """The contents of the files that a case names and that are to be kept with its result, by the path in the case.
 
     Parameters
     ----------
     case_toml : text of the case.
-    where : the place of a file by its path in the case.
+    where : the place of a file by its path in the case; None for one that is not read.
     """
-    found = {}
+    found, left = dict[str, bytes](), ALL_COPIES
     for name in _names(case_toml):
         path = where(name)
-        if path.is_file() and path.suffix.lower() != PARTS and path.stat().st_size <= LARGEST:
+        if path is None or not path.is_file() or path.suffix.lower() == PARTS:
+            continue
+        if path.stat().st_size <= min(LARGEST, left):
             found[name] = path.read_bytes()
+            left -= len(found[name])
     return found
 
 
@@ -61,7 +66,7 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
     folder : of the result.
     """
     copies, new_names = dict[str, bytes](), dict[str, str]()
-    for name in dict.fromkeys(_names(case_toml)):
+    for name in _names(case_toml):
         if name in inputs:
             new_names[name] = f"{FOLDER}/{_free_name(Path(name).name, copies)}"
             copies[new_names[name]] = inputs[name]
@@ -81,16 +86,17 @@ def shown_case(case_toml: str, inputs: Mapping[str, bytes]) -> str:
     return _renamed(kept, {name: Path(name).name for name in _names(kept) if name not in copies})
 
 
-def opened_case(case_toml: str, where: Callable[[str], Path]) -> tuple[str, dict[str, bytes]]:
-    """The case of a result folder and the contents of its inputs; files that were not copied are named absolutely.
+def opened_case(case_toml: str, folder: Path, file: Callable[[str], Path]) -> tuple[str, dict[str, bytes]]:
+    """The case of a result folder and the contents of its inputs; files that were not copied are named absolutely, and
+    not read: a case may come from somebody who wants to have them in a report.
 
     Parameters
     ----------
-    case_toml : text of the case.
-    where : the place of a file by its path in the case.
+    case_toml : text of the case; folder : of the result.
+    file : the place of a file in it by its name.
     """
-    inputs = read_inputs(case_toml, where)
-    outside = {name: str(where(name).absolute()) for name in _names(case_toml) if name not in inputs}
+    inputs = read_inputs(case_toml, lambda name: file(name) if inside(name) and name.startswith(f"{FOLDER}/") else None)
+    outside = {name: str((folder / name).absolute()) for name in _names(case_toml) if name not in inputs}
     return _renamed(case_toml, outside), inputs
 
 
@@ -101,7 +107,7 @@ def input_hash(case_toml: str, inputs: Mapping[str, bytes]) -> str:
     ----------
     case_toml, inputs : as of `kept_case`; a file that is not copied counts as empty.
     """
-    names = list(dict.fromkeys(_names(case_toml)))
+    names = _names(case_toml)
     digest = hashlib.sha256(_renamed(case_toml, {name: str(k) for k, name in enumerate(names)}).encode())
     for name in names:
         digest.update(inputs.get(name, b""))
@@ -109,7 +115,14 @@ def input_hash(case_toml: str, inputs: Mapping[str, bytes]) -> str:
 
 
 def _names(case_toml: str) -> list[str]:
-    return [json.loads(text) for _, text in NAMED.findall(case_toml)]
+    """The files that a case names, each once."""
+    try:
+        names = list(dict.fromkeys(json.loads(text) for _, text in NAMED.findall(case_toml)))
+    except ValueError as error:
+        raise InputError(f"the path of a file cannot be read: {error}") from None
+    if len(names) > limit(MOST_FILES):
+        raise InputError(f"it names {len(names)} files: give fewer, {raised(MOST_FILES, len(names))}")
+    return names
 
 
 def _renamed(case_toml: str, new_names: Mapping[str, str]) -> str:
@@ -140,9 +153,6 @@ def _relative(name: str, folder: Path) -> str:
 
 
 ARCHIVE = ("result.json", "case.toml", "states.npz")  # from which every other file can be made again
-SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order in which they are computed
-GAPS = {"draped": "gap_draped", "popped_pinned": "gap_pinned", "popped_clamped": "gap_clamped"}
-BENT = ("curvature", "stress")  # known at each entry of `rod_nodes`
 T = TypeVar("T")
 
 
@@ -273,12 +283,7 @@ def put_archive(archive: Archive, place: ResultFolder) -> None:
     place.put("result.json", archive.results.text())
     if archive.case_toml:
         place.put("case.toml", kept_case(archive.case_toml, archive.inputs, place.path)[0])
-    stream = BytesIO()
-    with ZipFile(stream, "w", ZIP_DEFLATED, compresslevel=COMPRESSION) as states:
-        for name, values in archive.states.items():
-            with states.open(f"{name}.npy", "w", force_zip64=True) as entry:
-                np.lib.format.write_array(entry, values, allow_pickle=False)
-    place.put("states.npz", stream.getvalue())
+    place.put("states.npz", packed(archive.states))
     for name, content in kept_case(archive.case_toml, archive.inputs, Path())[1].items():
         place.put(name, content)
 
@@ -292,78 +297,15 @@ def read(folder: str | os.PathLike[str]) -> Archive:
         file and the key.
     """
     instance("folder", folder, str | os.PathLike, "the path of a folder")
-    where = Path(folder).expanduser()
+    where = file_path("folder", folder)
     if where.is_file():
         raise OutputError(f"{where} is a file: give the folder of a rodshell result")
-    with reading(folder) as file:
+    with reading(where) as file:
         results = read_results(file("result.json"))
-        states = _read_states(file("states.npz"))
+        states = read_states(file("states.npz"), results)
         try:
             case = file("case.toml")
-            case_toml, inputs = opened_case(case.read_text(encoding="utf-8") if case.exists() else "", file)
-        except (OSError, ValueError) as error:
-            raise OutputError(f"cannot read the result in {where}: {error}") from error
-    for fault in state_faults(states, results):
-        raise OutputError(f"{where / 'states.npz'}: {fault}")
+            case_toml, inputs = opened_case(read_text(case) if case.exists() else "", where, file)
+        except InputError as error:
+            raise OutputError(f"cannot read the case in {where}: {error}") from None
     return Archive(results, states, case_toml, inputs)
-
-
-def _read_states(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays of a states.npz, not checked.
-
-    Raises
-    ------
-    OutputError : it is missing, not to be opened, or broken.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
-    except FileNotFoundError:
-        raise OutputError(f"{path} is missing: run case.toml again") from None
-    except (PermissionError, IsADirectoryError) as error:
-        raise OutputError(f"cannot read {path}: {error.strerror}") from None
-    except Exception as error:  # numpy and zipfile have many ways to say that a file is broken; some advise pickles
-        raise OutputError(
-            f"{path} cannot be read: it is damaged or not written by rodshell; run case.toml again"
-        ) from error
-
-
-def state_faults(states: Mapping[str, NDArray[Any]], results: Results) -> Iterator[str]:
-    """What is wrong with states: shapes that do not fit each other or the results, indices out of range, places that
-    are not finite.
-
-    Parameters
-    ----------
-    states : arrays by name, see `Archive`.
-    results : by which the number of rods and stages is known.
-    """
-    for name, values in states.items():
-        if values.dtype.kind not in ("iu" if name in ("rod_nodes", "rod_start") else "fiu"):
-            yield f"{name} must be an array of {'whole ' if name.startswith('rod_') else ''}numbers"
-            return
-    count = next((len(states[name]) for name in ("flat", *SHELLS) if name in states and states[name].ndim), 0)
-    wanted: dict[str, tuple[int, ...]] = dict.fromkeys(("flat", *SHELLS), (count, 3))
-    wanted |= dict.fromkeys(GAPS.values(), (count,))
-    if "rod_nodes" in states:
-        entries = states["rod_nodes"].size
-        wanted |= {"rod_nodes": (entries,), "rod_start": (len(results.rods),)}
-        wanted |= {f"{what}_{ends}": (entries,) for what in BENT for ends in ("pinned", "clamped")}
-    if "history" in states:
-        stages = len(results.deployment.stages) if results.deployment else 0
-        wanted |= {"history": (stages, count, 3), "history_share": (stages,)}
-        wanted |= {f"history_{what}": (stages, states["rod_nodes"].size) for what in BENT if "rod_nodes" in states}
-    for name, shape in wanted.items():
-        if name in states and states[name].shape != shape:
-            yield f"{name} has the shape {states[name].shape}, not {shape}"
-            return
-    for name in ("flat", *SHELLS, "history", "history_share"):
-        if name in states and not np.isfinite(states[name]).all():
-            yield f"{name} holds a number that is not finite"
-    if "rod_nodes" in states:
-        nodes, starts = states["rod_nodes"], states.get("rod_start")
-        if nodes.size and not (nodes.min() >= 0 and nodes.max() < count):
-            yield f"rod_nodes holds {nodes.min()} to {nodes.max()}, but there are {count} nodes"
-        if starts is None:
-            yield "rod_nodes is there, but rod_start is missing"
-        elif starts.size and (starts[0] != 0 or np.any(starts[1:] <= starts[:-1]) or starts[-1] >= nodes.size):
-            yield f"rod_start must ascend from 0 to below the {nodes.size} entries of rod_nodes"

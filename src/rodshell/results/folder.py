@@ -5,11 +5,10 @@ down what is to be moved, and from then on the new result counts: should the pro
 readers take what was not moved from the stage, and the next writer moves it. What a killed process left before its
 commit is removed by the next writer.
 
-manifest.json lists the files that rodshell wrote with size and SHA-256. A file that is not listed, or whose content is
-no longer the listed one, belongs to the user.
+A folder may be a stranger's: a commit is completed only if no name in it leads out of the folder, nor through a link,
+and not if it is another user's.
 """
 
-import hashlib
 import json
 import os
 import shutil
@@ -20,25 +19,34 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import field
-from pathlib import Path, PurePosixPath
-from typing import Any
+from pathlib import Path
+from warnings import warn
 
 from rodshell.dataclass import dataclass
-from rodshell.errors import InputError, OutputError
-from rodshell.validation import instance
+from rodshell.errors import InputError, OutputError, OutputWarning
+from rodshell.results.manifest import (
+    MANIFEST,
+    Mark,
+    above,
+    foreign,
+    inside,
+    is_mark,
+    is_no_folder,
+    is_own_file,
+    manifest_text,
+    mark,
+    own_table,
+    read_manifest,
+)
+from rodshell.validation import file_path, instance
 
 try:
     import fcntl
 except ImportError:  # Windows: two runs into one folder at the same time are not kept apart there
     fcntl = None  # type: ignore[assignment]
 
-MANIFEST, MANIFEST_FORMAT, MANIFEST_VERSION = "manifest.json", "rodshell-manifest", 1
 STAGE, NEW, RECORD = ".rodshell-stage-", "new", "commit.json"
 FORGOTTEN = 3600.0  # s: age of a stage that has lost its process, where locks are not available
-
-Mark = dict[str, object]
-"""What stands at a name: {"size", "sha256"} of a file, {"link"} of a symbolic link, {"folder"} or {"other"}; {"behind"}
-of a name whose folder is in fact a link, a file or another mount."""
 
 
 class ForeignFileError(OutputError):
@@ -119,6 +127,8 @@ class ResultFolder:
         try:
             staged = (file.relative_to(self.new).as_posix() for file in self.new.rglob("*") if file.is_file())
             written = {name: found for name in sorted(staged) if (found := mark(self.new, name)) is not None}
+            if strange := next((name for name in written if not inside(name)), None):
+                raise OutputError(f"cannot write a file of the name {strange!r:.80}: choose another name")
             with _locked(self.path):
                 _recover(self.path, but=self.stage)
                 there = self.check([*written, MANIFEST])
@@ -127,7 +137,8 @@ class ResultFolder:
                 removed = {name: found for name, found in now.items() if found == old[name]}
                 self.kept = tuple(name for name, found in now.items() if found is not None and name not in removed)
                 self.put(MANIFEST, manifest_text({**(old if keep_others else {}), **written}))
-                record = {"files": [*written, MANIFEST], "replaces": there | removed, "removes": list(removed)}
+                replaced = {name: found for name, found in (there | removed).items() if is_mark(found)}
+                record = {"files": [*written, MANIFEST], "replaces": replaced, "removes": list(removed)}
                 (self.stage / "record").write_text(json.dumps(record), encoding="utf-8")
                 with _uninterrupted():
                     (self.stage / "record").replace(self.stage / RECORD)  # from here on the new result counts
@@ -161,7 +172,7 @@ def open_folder(
     instance("folder", folder, str | os.PathLike, "the path of a folder")
     if isinstance(folder, str) and not folder.strip():
         raise InputError('folder must be the path of a folder, not "": "." is the current one')
-    path = Path(folder).expanduser().resolve()
+    path = file_path("folder", folder).resolve()
     made = list[Path]()
     stage, lock = None, None
     try:
@@ -193,20 +204,37 @@ def open_folder(
 def reading(folder: str | os.PathLike[str]) -> Iterator[Callable[[str], Path]]:
     """Where each file of a result is, by name: in its folder, or still in the stage of a commit that was killed.
 
+    What `reading` gives raises an OutputError for a name where something stands that is not a file, or leads outside.
+
     Parameters
     ----------
     folder : with a result, or one that a killed process was writing.
     """
     path = Path(folder).expanduser()
     with _locked(path, shared=True):
-        stage = next((stage for stage in _stages(path) if (stage / RECORD).exists()), None)
-        record = _record(stage) if stage else {"files": (), "removes": ()}
+        left, record = path, _Commit((), (), {})
+        for stage in _stages(path):
+            if os.path.lexists(stage / RECORD):
+                try:
+                    left, record = stage / NEW, _record(stage)
+                except OutputError as fault:  # what stands in the folder is checked whole
+                    warn(str(fault), OutputWarning, stacklevel=4)
 
         def where(name: str) -> Path:
-            if stage is None or name not in (*record["files"], *record["removes"]):
-                return path / name
-            staged = stage / NEW / name
-            return staged if staged.exists() or name in record["removes"] else path / name
+            file, staged = path / name, left / name
+            if name in record.removes or (name in record.files and staged.exists()):
+                file = staged
+            try:
+                file.lstat()
+            except (FileNotFoundError, NotADirectoryError):
+                return file
+            except OSError as reason:
+                raise OutputError(f"{file} cannot be read: {reason.strerror}") from None
+            if not Path(os.path.realpath(file)).is_relative_to(os.path.realpath(path)):
+                raise OutputError(f"{file} leads out of the folder of the result: copy the file there")
+            if not file.is_file():
+                raise OutputError(f"{file} is not a file: run the case again in another folder")
+            return file
 
         yield where
 
@@ -255,11 +283,22 @@ def _make(path: Path) -> list[Path]:
 
 
 def _stages(path: Path) -> list[Path]:
-    return [stage for stage in path.glob(f"{STAGE}*") if stage.is_dir() and not stage.is_symlink()]
+    """Those of this user, and of the owner of the folder."""
+    found = (stage for stage in path.glob(f"{STAGE}*") if not is_no_folder(stage) and stage.name.isprintable())
+    return [stage for stage in found if _is_mine(stage) or stage.stat().st_uid == path.stat().st_uid]
+
+
+def _is_mine(path: Path) -> bool:
+    return not hasattr(os, "geteuid") or path.stat().st_uid == os.geteuid()
 
 
 def _recover(path: Path, but: Path | None = None) -> None:
-    """Complete a commit that was killed, and remove the stages of processes that are gone."""
+    """Complete a commit that was killed, and remove the stages of processes that are gone.
+
+    Raises
+    ------
+    OutputError : the record of a commit is damaged, or another user's.
+    """
     for stage in _stages(path):
         if stage == but:
             continue
@@ -268,9 +307,14 @@ def _recover(path: Path, but: Path | None = None) -> None:
         except BlockingIOError:
             continue
         try:
-            if (stage / RECORD).exists():
+            if os.path.lexists(stage / RECORD):
+                if not _is_mine(stage):
+                    raise OutputError(
+                        f"{stage} was left by an interrupted write of another user, whose next run completes it: "
+                        "choose another folder, or remove that one"
+                    )
                 _apply(path, stage)
-            elif lock is None and time.time() - stage.stat().st_mtime < FORGOTTEN:
+            elif not _is_mine(stage) or (lock is None and time.time() - stage.stat().st_mtime < FORGOTTEN):
                 continue
             shutil.rmtree(stage, ignore_errors=True)
         finally:
@@ -278,31 +322,65 @@ def _recover(path: Path, but: Path | None = None) -> None:
                 os.close(lock)
 
 
-def _record(stage: Path) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads((stage / RECORD).read_text(encoding="utf-8"))
-    return content
+@dataclass(frozen=True)
+class _Commit:
+    """What is to be done so that a new result stands in its folder, as commit.json of its stage says it.
+
+    Parameters
+    ----------
+    files : names of files that go from the stage into the folder; removes : of files that go from the folder.
+    replaces : the files and links that stood at these names, or where a folder has to be, and may go.
+    """
+
+    files: tuple[str, ...]
+    removes: tuple[str, ...]
+    replaces: Mapping[str, Mark]
+
+
+def _record(stage: Path) -> _Commit:
+    """What is left to be done for a stage.
+
+    Raises
+    ------
+    OutputError : not what a writer wrote: the sentence names the stage, which is to be removed.
+    """
+    try:
+        content = own_table(stage, RECORD)
+        files, removes, replaces = (content.get(name) for name in ("files", "removes", "replaces"))
+        if not (isinstance(files, list) and isinstance(removes, list) and isinstance(replaces, dict)):
+            raise OutputError("it lacks its names")
+        if names := [name for name in (*files, *removes, *replaces) if not inside(name)]:
+            raise OutputError(f"{names[0]!r:.80} cannot be the name of a file of a result")
+        if not all(map(is_mark, replaces.values())):
+            raise OutputError("it does not say what stood in the folder")
+        for name in files:
+            if os.path.lexists(stage / NEW / name) and not is_own_file(stage, f"{NEW}/{name}"):
+                raise OutputError(f"{NEW}/{name} is not a file")
+    except OutputError as fault:
+        raise OutputError(f"{stage} was left by an interrupted write and is damaged ({fault}): remove it") from None
+    return _Commit(tuple(files), tuple(removes), replaces)
 
 
 def _apply(path: Path, stage: Path) -> None:
     """Move and remove what the stage's record says; what somebody has changed since it was written stays."""
     record = _record(stage)
-    replaces: dict[str, Mark | None] = record["replaces"]
-    for name in record["removes"]:
-        if mark(path, name) == replaces[name]:
+    for name in record.removes:
+        if mark(path, name) == record.replaces.get(name, {}):
             (path / name).unlink(missing_ok=True)
-    for name in record["files"]:
+    for name in record.files:
         source, target = stage / NEW / name, path / name
         if not source.exists():
             continue  # it was moved before the kill
         for part in above(name):  # a file or a link in a folder's place, which --force gave away
-            if part in replaces and mark(path, part) == replaces[part]:
+            if part in record.replaces and mark(path, part) == record.replaces[part]:
                 (path / part).unlink(missing_ok=True)
-        if mark(path, name) in (None, replaces.get(name)):
+        if mark(path, name) in (None, record.replaces.get(name)):
             target.parent.mkdir(parents=True, exist_ok=True)
             source.replace(target)
-    for folder in {path / part for name in record["removes"] for part in above(name)}:
-        with suppress(OSError):
-            folder.rmdir()
+    for part in sorted({part for name in record.removes for part in above(name)}, reverse=True):
+        if mark(path, part) == {"folder": True}:
+            with suppress(OSError):
+                (path / part).rmdir()
     (stage / RECORD).unlink()
 
 
@@ -357,81 +435,3 @@ def _uninterrupted() -> Iterator[None]:
             signal.signal(kind, signal.SIG_DFL if handler is None else handler)
         for number in late:
             signal.raise_signal(number)
-
-
-def mark(folder: Path, name: str) -> Mark | None:
-    """What stands at a name in a folder, links not followed; None where nothing does.
-
-    Parameters
-    ----------
-    folder : of the result; name : of a file in it, with slashes.
-    """
-    path = folder / name
-    behind = next((part for part in above(name) if _is_no_folder(folder / part)), None)
-    if behind is not None:
-        return {"behind": behind}
-    if path.is_symlink():
-        return {"link": str(path.readlink())}
-    if path.is_file():
-        with path.open("rb") as stream:
-            return {"size": path.stat().st_size, "sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
-    if path.is_dir():
-        return {"folder": True}
-    return {"other": True} if path.exists() else None
-
-
-def read_manifest(folder: Path) -> dict[str, Mark]:
-    """What was written to `folder`, by name; empty where there is no manifest of ours."""
-    try:
-        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        if content["format"] != MANIFEST_FORMAT:
-            return {}
-        return {name: found for name, found in content["files"].items() if _inside(name) and isinstance(found, dict)}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return {}
-
-
-def manifest_text(files: Mapping[str, Mark]) -> str:
-    """The content of manifest.json, a line for each file.
-
-    Parameters
-    ----------
-    files : marks of the files, by name.
-    """
-    lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(files[name])}" for name in sorted(files))
-    head = f' "format": {json.dumps(MANIFEST_FORMAT)},\n "version": {MANIFEST_VERSION},\n "files": {{\n'
-    return "{\n" + head + lines + "\n }\n}\n"
-
-
-def above(name: str) -> list[str]:
-    """The folders that a name stands in, the outermost first."""
-    return [str(folder) for folder in reversed(PurePosixPath(name).parents)][1:]
-
-
-def foreign(folder: Path, marks: Mapping[str, Mark | None]) -> list[str]:
-    """Of names and what stands there, those that rodshell did not write, or that conflict with such a name.
-
-    Parameters
-    ----------
-    folder : of the result; marks : what stands at each name, see `mark`.
-    """
-    listed = read_manifest(folder)
-    found = list[str]()
-    for name, here in marks.items():
-        if here is None or (bool(listed) if name == MANIFEST else here == listed.get(name)):
-            continue
-        found.append(str(here.get("behind", name)))
-    return list(dict.fromkeys(found))
-
-
-def _is_no_folder(path: Path) -> bool:
-    """Whether something else stands there; another mount too, into which files cannot be moved in one step."""
-    if path.is_dir() and not path.is_symlink():
-        return path.stat().st_dev != path.parent.stat().st_dev
-    return path.is_symlink() or path.exists()
-
-
-def _inside(name: object) -> bool:
-    """Whether a name cannot lead out of the folder."""
-    path = PurePosixPath(str(name))
-    return isinstance(name, str) and not path.is_absolute() and ".." not in path.parts and "\\" not in name

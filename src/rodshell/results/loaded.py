@@ -77,4 +77,4 @@ class LoadedShell(Record):
     )
 
 
-LoadCases = dict[str, ByEnds[LoadedShell]]
+LoadCases = dict[Text, ByEnds[LoadedShell]]

@@ -11,12 +11,18 @@ from math import isfinite
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationInfo, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 Ends = Literal["pinned", "clamped"]
 Gate = Literal["flat", "from_flat", "remeshed", "tolerance", "stable"]
 FEWEST_STATIONS = 2
+LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
+MOST = 10**15  # of a count
+FARTHEST = 1e6  # m between two points of a shell, and of each of its lengths
+SHORTEST = 1e-9  # m of a rod
+ORIGIN = 1e9  # m from the origin, as in national grids
 
 
 def printable(text: str) -> str:
@@ -25,8 +31,21 @@ def printable(text: str) -> str:
 
 
 def _finite_or_unknown(value: object, info: ValidationInfo) -> object:
-    """None for a number of a computation that is not finite; in a file such a number is an error."""
-    return None if info.mode == "python" and isinstance(value, float) and not isfinite(value) else value
+    """None for a number of a computation that is out of range; in a file such a number is an error."""
+    return None if info.mode == "python" and isinstance(value, float) and not abs(value) <= LARGEST else value
+
+
+def _in_range(value: Any, info: ValidationInfo) -> Any:
+    """The value of a key that is not known here: of an object, or of a later version."""
+    if info.mode == "python":
+        return plain(value)
+    if isinstance(value, int | float) and not abs(value) <= LARGEST:
+        raise ValueError(f"it must be a number from {-LARGEST:g} to {LARGEST:g}")
+    if isinstance(value, dict):
+        return {printable(name): _in_range(item, info) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_in_range(item, info) for item in value]
+    return printable(value) if isinstance(value, str) else value
 
 
 def _no_rows_for_null(value: object) -> object:
@@ -49,18 +68,19 @@ class _Checked:
         return {**self._schema}
 
 
-_REAL = core_schema.float_schema(strict=True)
+_REAL = core_schema.float_schema(strict=True, ge=-LARGEST, le=LARGEST)
 _NUMBER = core_schema.with_info_before_validator_function(_finite_or_unknown, core_schema.nullable_schema(_REAL))
 
 Real = Annotated[float, _Checked(_REAL)]
 Number = Annotated[Real | None, _Checked(_NUMBER)]
-Whole = Annotated[int, _Checked(core_schema.int_schema(strict=True))]
+Whole = Annotated[int, _Checked(core_schema.int_schema(strict=True, ge=-MOST, le=MOST))]
 Flag = Annotated[bool, _Checked(core_schema.bool_schema(strict=True))]
 Text = Annotated[
     str, _Checked(core_schema.no_info_after_validator_function(printable, core_schema.str_schema(strict=True)))
 ]
+_Other = Annotated[Any, _Checked(core_schema.with_info_after_validator_function(_in_range, core_schema.any_schema()))]
 T = TypeVar("T")
-Rows = Annotated[tuple[T, ...], BeforeValidator(_no_rows_for_null)]
+Rows = Annotated[tuple[T, ...], FailFast(), BeforeValidator(_no_rows_for_null)]
 ByEnds = Annotated[dict[Ends, T], BeforeValidator(_no_keys_for_null)]
 Flat = Annotated[tuple[Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 2))]
 Point = Annotated[tuple[Number, Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 3))]
@@ -70,6 +90,7 @@ class Record(BaseModel):
     """A part of result.json: frozen, with the keys that the file has."""
 
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, populate_by_name=True, defer_build=True)
+    __pydantic_extra__: dict[str, _Other] = Field(init=False)
 
     def plain(self) -> dict[str, Any]:
         """The record as it stands in result.json: plain dictionaries, lists and numbers, without absent keys."""
@@ -159,6 +180,15 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     return value
+
+
+def far_apart(points: NDArray[Any]) -> str:
+    """What is wrong with the places (..., 2 or 3) [m] of points of one shell, one at least and finite; or nothing."""
+    rows = points.reshape(-1, points.shape[-1])
+    low, high = rows.min(axis=0).astype(float), rows.max(axis=0).astype(float)
+    if max(high.max(), -low.min()) > ORIGIN:
+        return f"a point more than {ORIGIN:g} m from the origin"
+    return f"points more than {FARTHEST:g} m apart" if max(high - low) > FARTHEST else ""
 
 
 # What was asked for

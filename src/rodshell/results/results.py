@@ -5,15 +5,20 @@ found are in `records`.
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError
+import numpy as np
+from pydantic import FailFast, Field, ValidationError
 
 from rodshell.errors import InputError, OutputError
 from rodshell.results.loaded import DesignStrength, LoadCases
+from rodshell.results.manifest import read_table
 from rodshell.results.records import (
+    FARTHEST,
+    SHORTEST,
     Agreement,
     Bent,
     ByEnds,
@@ -39,9 +44,11 @@ from rodshell.results.records import (
     Text,
     Whole,
     by_ends,
+    far_apart,
     json_text,
     key,
     plain,
+    printable,
     required,
     rows,
 )
@@ -49,6 +56,7 @@ from rodshell.validation import instance, short
 
 FORMAT = "rodshell-result"
 VERSION = 2
+SIZE = 25e6  # bytes of result.json; its content takes up to a hundred times that
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
 
 Level = Literal["good", "check", "unbuildable", "unknown"]
@@ -231,11 +239,11 @@ class Fabrication(Record):
 class Drawings(Record):
     """What the drawings have in common."""
 
-    paper: Text = Field(default="A3", description="size of the PDF's sheets: A4 to A0")
+    paper: Literal["A4", "A3", "A2", "A1", "A0"] = Field(default="A3", description="size of the PDF's sheets: A4 to A0")
     project: Text = Field(default="", description="name of the project")
     revision: Text = Field(default="", description="revision")
     tolerance: Number = key("to which lengths are to be kept", "m")
-    layers: dict[str, Text] = Field(default_factory=dict, description="other names of DXF layers")
+    layers: dict[Text, Text] = Field(default_factory=dict, description="other names of DXF layers")
     name: Text = Field(default="", description='name of the drawings; "": the target\'s')
     author: Text = Field(default="", description="author")
     date: Text = Field(default="", description='a day as "2026-11-22"; "": the day of writing')
@@ -267,7 +275,7 @@ class Verdict(Record, metaclass=_Refusing):
         'checked first; "unbuildable": no end condition gives a shell that can be built; "unknown": no shell was '
         "computed, as where the computation did not converge, or one that might be built was not"
     )
-    reasons: tuple[Text, ...] = Field(min_length=1, description="sentences, the gravest first")
+    reasons: Annotated[tuple[Text, ...], FailFast()] = Field(min_length=1, description="sentences, the gravest first")
 
     @property
     def headline(self) -> str:
@@ -288,7 +296,7 @@ class Results(Record, metaclass=_Refusing):
     version: Whole = Field(default=VERSION, description="version of the keys")
     units: Text = Field(default="SI", description='"SI"')
     version_rodshell: Text | None = key("the rodshell that found it")
-    versions: dict[str, Text] | None = key("versions of Python and of the numerical libraries")
+    versions: dict[Text, Text] | None = key("versions of Python and of the numerical libraries")
     name: Text | None = key("name of the result")
     status: Text = Field(default="unknown", description='"converged", or which stage stopped')
     warnings: Rows[Text] = rows("sentences")
@@ -311,7 +319,7 @@ class Results(Record, metaclass=_Refusing):
     refinement: Refinement | None = key("how the form was refined; absent where that was not asked for")
     bending: Bending | None = key("bending and stress")
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
-    joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
+    joint_loads: ByEnds[Rows[JointLoad]] = by_ends("what acts at the joints")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
     strength: DesignStrength | None = key("design strengths, by which the rods are judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
@@ -370,14 +378,9 @@ def read_results(path: Path) -> Results:
     ------
     OutputError : there is no such file, or this version cannot read it; the sentence names the key.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise OutputError(f"{path.parent} holds no rodshell result: it has no {path.name}") from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise OutputError(f"cannot read {path}: {error}") from error
-    if not isinstance(content, dict):
-        raise OutputError(f"{path} is not a rodshell result: it is not a table of keys")
+    if not path.exists():
+        raise OutputError(f"{path.parent} holds no rodshell result: it has no {path.name}")
+    content = read_table(path, SIZE)
     return Results.from_text(json.dumps(upgraded(content, source=str(path))), source=str(path))
 
 
@@ -400,7 +403,10 @@ def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
         raise OutputError(f'{source} is not a rodshell result: its "format" is not "{FORMAT}"')
     version = content.get("version", VERSION)
     if not isinstance(version, int) or isinstance(version, bool) or not 1 <= version <= VERSION:
-        raise OutputError(f"{source} has version {version}, this rodshell reads 1 to {VERSION}: install a newer one")
+        raise OutputError(
+            f"{source} has version {printable(str(version)):.20}, this rodshell reads 1 to {VERSION}: "
+            "install a newer one"
+        )
     content |= {"format": FORMAT, "version": VERSION}
     if "version_gridshell" in content:
         content["version_rodshell"] = content.pop("version_gridshell")
@@ -436,8 +442,18 @@ def contradictions(results: Results) -> Iterator[str]:
     ids = [rod.id for rod in results.rods]
     known = set(ids)
     if len(known) < len(ids):
-        twice = next(name for k, name in enumerate(ids) if name in ids[:k])
-        yield f'rods: the id "{twice}" occurs twice'
+        yield f'rods: the id "{Counter(ids).most_common(1)[0][0]}" occurs twice'
+    for k, rod in enumerate(results.rods):
+        lengths = [length for length in (rod.end - rod.start, rod.length, rod.cut_length) if length is not None]
+        at = [rod.start, rod.end, rod.offset or 0.0, *rod.splices, *(joint.at for joint in rod.joints), *lengths]
+        if min(lengths) < SHORTEST or max(map(abs, at)) > FARTHEST:
+            yield f"rods[{k}] has a length that is not from {SHORTEST:g} to {FARTHEST:g} m"
+    for name, points in _places(results):
+        placed = [point for point in points if None not in point]
+        if placed and (fault := far_apart(np.array(placed))):
+            yield f"{name} holds {fault}"
+        if len(placed) < len(points):
+            yield f"{name} holds a point that is not known"
     for where, name in _named_rods(results):
         if name not in known:
             yield f'{where}: there is no rod "{name}"'
@@ -462,9 +478,23 @@ def contradictions(results: Results) -> Iterator[str]:
             braces = len(results.fabrication.bracing) if results.fabrication else 0
             if len(loaded.bracing) not in (0, braces):
                 yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
-    for name, points in counts.items():
-        if len(points) not in (0, 2 * len(ids)):
-            yield f"{name} has {len(points)} points for {len(ids)} rods: there must be two for each"
+    needed = [name for name in counts if name.startswith("reactions.") or name.endswith("support_forces")]
+    for name, entries in counts.items():
+        if len(entries) not in (2 * len(ids), *([] if name in needed else [0])):
+            yield f"{name} has {len(entries)} points for {len(ids)} rods: there must be two for each"
+    if results.loads and not results.boundary:
+        yield "there are loads, but no boundary"
+
+
+def _places(results: Results) -> Iterator[tuple[str, Sequence[Sequence[float | None]]]]:
+    """Points that are drawn, by the key of each list."""
+    yield from (("footprint", results.footprint), ("boundary", results.boundary))
+    for k, seam in enumerate(results.seams):
+        yield f"seams[{k}].points", seam.points
+        yield f"seams[{k}].meetings", [meeting.point for meeting in seam.meetings]
+    for ends, agreement in results.agreement.items():
+        if agreement.where is not None:
+            yield f"agreement.{ends}.where", [agreement.where]
 
 
 def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
@@ -495,15 +525,17 @@ def _first_fault(error: ValidationError) -> str:
     """The first fault in a sentence that names its key as it stands in the file, "rods[3].joints[0].at"."""
     fault = error.errors(include_url=False)[0]
     where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"]).lstrip(".")
-    where = where or "the file"
+    where = printable(where)[:200] or "the file"
     if fault["type"] == "missing":
         return f"{where} is missing"
-    shown = short(fault["input"])
-    return f"{where} cannot be {shown}: {_EXPECTED.get(fault['type'], fault['msg'])}"
+    expected = _EXPECTED.get(fault["type"], "") % fault.get("ctx", {})
+    return f"{where} cannot be {short(fault['input'])}: {expected or fault['msg'].removeprefix('Value error, ')}"
 
 
 _EXPECTED = {
     "float_type": "it must be a number",
+    "greater_than_equal": "it must be a number from %(ge)g",
+    "less_than_equal": "it must be a number up to %(le)g",
     "finite_number": "it must be a finite number, or null where it is not known",
     "int_type": "it must be a whole number",
     "int_from_float": "it must be a whole number",

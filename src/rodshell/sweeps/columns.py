@@ -112,7 +112,7 @@ def _inside(node: Mapping[str, Any]) -> dict[str, Any]:
     for choice in _choices(node):
         found |= choice.get("properties", {})
         each, names = choice.get("additionalProperties"), choice.get("propertyNames", {})
-        if isinstance(each, Mapping):
+        if each and isinstance(each, Mapping):
             found |= dict.fromkeys(names.get("enum", (ANY,)), each)
     return found
 
