@@ -265,6 +265,8 @@ else:
                 return super().__call__(**values)
             except ValidationError as error:
                 raise InputError(f"{cls.__name__}: {_first_fault(error)}") from None
+            except RecursionError:
+                raise InputError(f"{cls.__name__}: a value contains itself: give plain ones") from None
 
 
 class Verdict(Record, metaclass=_Refusing):
