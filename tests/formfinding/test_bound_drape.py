@@ -95,8 +95,9 @@ def test_a_drape_is_where_newtons_steps_alone_lead_to_round_off(name, monkeypatc
     monkeypatch.setattr(newton_step, "MULTIPLIERS", 1.0)  # so that it goes on
     newton = drape_case(name)
     assert newton.report.factorizations == newton.report.iterations > draped.report.factorizations
-    # 2e-16 to 5e-16 measured; 1e-14 to 3e-13 where chord steps were in other directions than their matrix
-    assert np.abs(draped.positions - newton.positions).max() < 2e-14 * draped.target.size
+    # 2e-16 to 1e-13 measured: an end moves along its line of the net to first order, so that where it goes depends a
+    # little on the steps
+    assert np.abs(draped.positions - newton.positions).max() < 1e-12 * draped.target.size
 
 
 def test_a_drape_does_not_end_before_its_axial_forces_are_found(monkeypatch):
@@ -122,35 +123,63 @@ def test_nodes_lie_on_the_sphere():
 
 @every_case
 def test_rods_end_where_the_target_ends(name):
-    trimmed = rs.trim(drape_case(name))
-    margin = trimmed.draped.target.margin(trimmed.boundary.points)
-    # G0 is the net's. Between joints the bound rods leave the net, most where they graze the end: by 4e-3 of the
-    # size on the turned ellipsoid, by 5e-4 or less on the others
-    assert np.abs(margin).max() < (6e-3 if "turned" in name else 1e-3) * trimmed.draped.target.size
+    """But for straight edges in place of bent rods, to second order: 4e-4 of the size at four edges a span."""
+    off = []
+    for edge in (0.0125, 0.00625):
+        trimmed = rs.trim(drape_case(name, edge=edge))
+        off.append(np.abs(trimmed.draped.target.margin(trimmed.boundary.points)).max() / trimmed.draped.target.size)
+    assert off[0] < 6e-4
+    assert off[1] < 0.35 * off[0]
 
 
-def test_rods_of_a_denser_grid_end_closer_to_the_targets_end():
-    ends = [rs.trim(drape_case("ellipsoid, turned", spacing=h, edge=h / 4)).boundary.points for h in (0.05, 0.025)]
-    coarse, fine = (np.abs(ELLIPSOID.margin(points)).max() for points in ends)
-    assert fine < coarse / 8  # 0.88 and 0.06 mm
+@pytest.mark.parametrize("name", ["barrel", "saddle"])
+@pytest.mark.parametrize("spacing", [1.0, 0.5])
+def test_rods_that_cross_no_axis_end_on_a_rectangle(name, spacing):
+    """At 45 degrees to its sides, where rods in the corners are free to slide: by 230 and 399 mm on the saddle."""
+    formula = {"barrel": "3 - 0.1*y^2", "saddle": "2.5 - 0.12*y^2 + 0.02*x^2"}[name]
+    target = rs.HeightField(formula=formula, domain=rs.Rectangle((24.0, 8.0)))
+    trimmed = rs.trim(rs.drape(layout_of(spacing=spacing, edge=spacing / 6, rotate=pi / 4), ROD, target))
+    x, y, _ = np.abs(trimmed.boundary.points).T
+    assert np.minimum(np.abs(x - 12.0), np.abs(y - 4.0)).max() < 5e-4  # 0.36 mm at 1 m, a quarter at 0.5 m
+    assert x.max() < 12.0005
+    assert y.max() < 4.0005
 
 
 # Equilibrium, from numpy twins of the energies
 
 
+def held_ends(draped):
+    """Node and direction (3,) on the net of each rod end that no other node is close to."""
+    mesh, net = draped.mesh, draped.net.node_positions(draped.mesh)
+    close = 0.2 * np.median(mesh.edge_lengths)
+    for piece in draped.net.rods:
+        for k, rod in enumerate(mesh.grid.rods):
+            s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
+            if (rod.family, rod.offset) == (piece.family, piece.offset) and s[0] <= piece.start and piece.end <= s[-1]:
+                for end in (piece.start, piece.end):
+                    i = int(np.argmin(np.abs(s - end)))
+                    before, after = max(i - 1, 0), min(i + 1, len(s) - 1)
+                    if min(abs(s[j] - s[i]) for j in {before, after} - {i}) > close and rod.offset != 0.0:
+                        yield nodes[i], net[nodes[after]] - net[nodes[before]]
+
+
 def binding(draped):
-    """The constraint of a bound drape, made anew: two tangent directions, one on the axes, none at the anchor."""
+    """The constraint of a bound drape, made anew: two tangent directions, one on the axes and at the ends of rods, none
+    at the anchor."""
     mesh, x = draped.mesh, draped.positions
     count, guides = np.full(len(x), 2), np.tile([0.3, 0.5, 0.8], (len(x), 1))
     for k, rod in enumerate(mesh.grid.rods):
         if rod.offset == 0.0:
             count[mesh.nodes_of(k)] -= 1
             guides[mesh.nodes_of(k)] = np.gradient(x[mesh.nodes_of(k)], axis=0)
+    for node, along in held_ends(draped):
+        count[node], guides[node] = 1, along
     return BoundToTarget(draped.target, count, guides)
 
 
 def directions_on_a_sphere(draped):
-    """T (3n, free) without the library: tangents at right angles to the radius, those of the axes in their planes."""
+    """T (3n, free) without the library: tangents at right angles to the radius, those of the axes in their planes, and
+    those of the ends of rods along the net."""
     x = draped.positions
     columns = []
     plane = {}
@@ -158,6 +187,7 @@ def directions_on_a_sphere(draped):
         if rod.offset == 0.0:
             for node in draped.mesh.nodes_of(k):
                 plane.setdefault(int(node), []).append([1.0, 0, 0] if rod.family == "u" else [0, 1.0, 0])
+    plane.update({int(node): [along] for node, along in held_ends(draped)})
     for node, point in enumerate(x):
         if node in plane:
             axes = plane[node] if len(plane[node]) == 1 else []

@@ -54,8 +54,8 @@ def test_each_rod_lies_on_its_own_parallel_surface_with_its_own_lengths(name):
 @every_target
 def test_rods_end_along_the_normal_over_the_targets_end(name):
     boundary, mesh = form(name).trimmed.boundary, form(name).trimmed.mesh
-    feet, off = TARGETS[name].closest(boundary.points), form(name).draped.figures.net_deviation.max()
-    assert np.abs(feet[:, 2]).max() <= 1.001 * off  # the drape's own error at this spacing
+    feet, off = TARGETS[name].closest(boundary.points), np.abs(form(name).draped.figures.net_deviation).max()
+    assert np.abs(feet[:, 2]).max() <= 1.001 * off < 4e-4 * TARGETS[name].size  # of straight edges
     away = boundary.points - feet
     normals = TARGETS[name].on_surface(feet).normal
     np.testing.assert_allclose(away, mesh.heights[mesh.ends.ravel(), None] * normals, atol=1e-9 * R)

@@ -58,8 +58,15 @@ def altered_pop_up(**changes):
 # What it says of itself
 
 
+def test_supports_beside_the_end_of_the_target_are_told_with_the_edge_that_would_do():
+    (warning,) = hemisphere_form().warnings
+    assert warning.startswith("44 supports are off the end of the target, by up to 0.0783 mm (of rod ")
+    edge = float(warning.rpartition("use a layout.edge of ")[2].removesuffix(" mm")) / 1e3
+    assert rs.find_form(HEMISPHERE, layout_of(edge=edge), ROD, ends=()).warnings == ()
+
+
 def test_a_form_that_was_found_is_converged_and_has_nothing_to_warn_of():
-    form = hemisphere_form()
+    form = rs.find_form(HEMISPHERE, layout_of(edge=0.05 / 6), ROD)
     assert form.status == "converged"
     assert form.warnings == ()
     assert list(form.popped) == ["pinned", "clamped"]
@@ -557,7 +564,7 @@ def test_final_ends_that_do_not_fit_are_refused():
         rs.pop_up_table(grid, finals[1:], ROD)
     with pytest.raises(InputError, match="finite"):
         rs.pop_up_table(grid, np.where(finals == finals[3, 1, 2], np.nan, finals), ROD)
-    with pytest.raises(InputError, match=r"rod U02 is 0\.2744 m long, but its final ends lie 0\.4481 m apart"):
+    with pytest.raises(InputError, match=r"rod U02 is 0\.2744 m long, but its final ends lie 0\.4478 m apart"):
         rs.pop_up_table(grid, 2 * finals, ROD)
 
 

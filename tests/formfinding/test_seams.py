@@ -159,7 +159,7 @@ def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
 
 
 def test_a_patch_alone_is_the_same_form() -> None:
-    """One job with the patch's boundary and rods; only its ends are not moved (0.1 mm) to where the others are."""
+    """One job with the patch's boundary and rods; only its ends are not moved (0.03 mm) to where the others are."""
     form = sewn("dome, diagonal")
     for name, laid in form.stages.patch_nets.items():
         alone = rs.find_form(laid.patch, laid.layout, ROD, anchor=laid.anchor, ends=("clamped",))
@@ -169,7 +169,7 @@ def test_a_patch_alone_is_the_same_form() -> None:
         np.testing.assert_array_equal(found.trimmed.positions[free], alone.trimmed.positions[free])
         np.testing.assert_array_equal(found.footprint.points, alone.footprint.points)
         apart = np.linalg.norm(found.popped["clamped"].positions - alone.popped["clamped"].positions, axis=1)
-        assert apart.max() < 2 * form.stages.moved[name] < 4e-4
+        assert apart.max() < 3 * form.stages.moved[name] < 1.2e-4
 
 
 @pytest.mark.slow
@@ -255,7 +255,7 @@ def test_the_strong_bending_of_patches_is_that_of_the_worst() -> None:
     target, seams, spacing = CASES["two bumps, in the valley"]
     result = rs.find_form(target, layout_of(spacing), lath, seams=seams, joint=rs.Pin(), ends=()).results().plain()
     bent = [patch["drape"]["strong_bending"] for patch in result["patches"]]
-    assert bent[0]["beyond"] > 1.1 * bent[1]["beyond"]
+    assert bent[0]["beyond"] > 1.05 * bent[1]["beyond"]
     assert result["patches"][0]["drape"]["min_angle_deg"] > result["patches"][1]["drape"]["min_angle_deg"]
     assert result["drape"]["strong_bending"] == bent[0]
 

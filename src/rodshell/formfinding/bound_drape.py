@@ -4,7 +4,8 @@ Every node slides on the target without friction, rods do not stretch, and bendi
 leaves open: the shape of each span between its joints. Out of the surface the rods follow its curvature; their
 bending within it, about the normal, has EI2, and twist angles are left out as for a round rod. No load and no stretch
 stiffness enter, so that the result does not depend on scale or material. The axes and the anchor are held, as the net
-holds them. The solve starts from the net's lines with their ends corrected, close to the final rods.
+holds them, and so are the ends of rods across their lines: rods that cross no axis would slide, by a spacing. The solve
+starts from the net's lines, close to the final rods.
 """
 
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from math import degrees
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, median
 from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
@@ -33,11 +34,10 @@ from rodshell.solve.path import going_on
 from rodshell.solve.problem import Problem
 from rodshell.targets import Target
 
-CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
+CLEARANCE = 0.2  # edges between a rod's end and the next joint past it; an end that is held is further from any node
 WARN_ANGLE = 25.0  # degrees
 MOST_SOLVES = 3  # of a drape in layers; the second leaves strains of 1e-8
 PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces converge by a factor of 0.05 a step at 200 rods
-STEEP = 0.5  # rad: where a line turns by more in its last span, beam theory does not hold and its rod stays on it
 
 
 def bound_drape(
@@ -75,18 +75,17 @@ def bound_drape(
     spans = spans_along(mesh, ends, whole)
     start = net.node_positions(mesh)
     normal = unit(target.level(start)[1])
-    corrected = corrected_ends(target, mesh, start, normal)
     within = rod.bend_stiffnesses[1]
     problem = Problem(
         elements=(IsotropicBend(mesh.bends, within / mesh.voronoi_lengths),),
         stretch=_penalty(mesh, within, target),
-        constraint=_bind(target, mesh, start, normal),
+        constraint=_bind(target, mesh, start, normal, spans),
         length=target.size,
         inextensible=True,
         flat_coordinates=mesh.flat[:, :2],
     )
     found = _in_layers(
-        problem, target, mesh, corrected, eccentricity,
+        problem, target, mesh, start, eccentricity,
         progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
     touching = np.zeros(mesh.node_count, dtype=bool)
@@ -198,18 +197,27 @@ def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentric
     return np.asarray(mesh.edge_lengths * np.sqrt(dot(chord, chord) / dot(in_layer, in_layer)))
 
 
-def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats) -> BoundToTarget:
-    """All nodes on the target; those of the two axes are held on their lines, and the anchor at its point."""
+def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats, spans: Ints) -> BoundToTarget:
+    """All nodes on the target; those of the two axes, and the ends of rods, move only along the net's lines, and the
+    anchor does not move. An end close to another node is left to that, since it would be a lever.
+
+    Parameters
+    ----------
+    start, normal : (n, 3) nodes of the net [m], and the target's normals there.
+    spans : (m, 2) see `spans_along`.
+    """
     count, guides = np.full(mesh.node_count, 2, dtype=np.intp), np.zeros((mesh.node_count, 3))
     guides[:, 1] = np.abs(normal[:, 0]) > 0.7
     guides[:, 0] = 1.0 - guides[:, 1]
-    for k, line in enumerate(mesh.grid.rods):
-        if line.offset == 0.0:
-            nodes = mesh.nodes_of(k)
-            count[nodes] -= 1
-            along = start[nodes]
-            along = np.concatenate([along[:1], along, along[-1:]])
-            guides[nodes] = along[2:] - along[:-2]
+    held = np.array([rod.offset == 0.0 for rod in mesh.grid.rods])[mesh.rod_of]
+    apart = np.abs(np.diff(mesh.stations))
+    nearest = np.minimum(np.append(np.inf, apart), np.append(apart, np.inf))
+    held[spans] |= nearest[spans] > CLEARANCE * median(mesh.edge_lengths)
+    entries, rods = np.flatnonzero(held), mesh.rod_of[held]
+    before, after = np.maximum(entries - 1, mesh.rod_start[rods]), np.minimum(entries + 1, mesh.rod_stop[rods] - 1)
+    nodes = mesh.rod_nodes[entries]
+    guides[nodes] = start[mesh.rod_nodes[after]] - start[mesh.rod_nodes[before]]
+    np.subtract.at(count, nodes, 1)
     return BoundToTarget(target, count, guides)
 
 
@@ -261,90 +269,3 @@ def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
         "min_angle_deg": degrees(net.min_angle),
         "min_angle_at": list(net.min_angle_at),
     }
-
-
-def corrected_ends(target: Target, mesh: GridMesh, points: Floats, normal: Floats) -> Floats:
-    """(n, 3) the nodes, moved sideways on the target to where rods would lie, to first order [m].
-
-    A line of the net is curved up to its end, while a rod's bending moment vanishes there (the natural boundary
-    condition). This hardly moves the joints: between them each rod differs from its line by a cubic spline that
-    vanishes at the joints, and whose end moments cancel the line's geodesic curvature. By beam theory, to first order;
-    the correction decays by the factor 2 - sqrt(3) = 0.27 from joint to joint, as cubic splines do (docs/theory.md, The
-    bound drape). The axes stay: they are geodesics, and the drape holds them on their lines.
-
-    Parameters
-    ----------
-    target : the surface.
-    mesh : of the net's lines.
-    points : (n, 3) its nodes on the net's lines [m].
-    normal : (n, 3) of the surface there.
-    """
-    joint = np.zeros(mesh.node_count, dtype=bool)
-    joint[mesh.joint_nodes] = True
-    result = points.copy()
-    rods = np.flatnonzero([rod.offset != 0.0 for rod in mesh.grid.rods])
-    _correct(points, normal, mesh.rod_nodes, mesh.rod_start[rods], mesh.rod_stop[rods], mesh.stations, joint, result)
-    return target.retract(result)
-
-
-@njit(error_model="numpy")
-def _correct(points, normal, rod_nodes, rod_start, rod_stop, stations, joint, result):  # type: ignore[no-untyped-def]
-    most = 0
-    for rod in range(len(rod_start)):
-        most = max(most, rod_stop[rod] - rod_start[rod])
-    at, side, curvature = np.empty(most, dtype=np.int64), np.empty((most, 3)), np.empty(most)
-    moments, share = np.empty(most), np.empty(most)
-    for rod in range(len(rod_start)):
-        nodes, s = rod_nodes[rod_start[rod] : rod_stop[rod]], stations[rod_start[rod] : rod_stop[rod]]
-        joints, last = 0, len(nodes) - 1
-        for k in range(len(nodes)):
-            if joint[nodes[k]]:
-                at[joints] = k
-                joints += 1
-        if joints < 2 or last < 4:
-            continue
-        for k in range(len(nodes)):  # unit vectors across the rod, and geodesic curvature towards them by three nodes
-            before, after, square, curvature[k] = max(k - 1, 0), min(k + 1, last), 0.0, 0.0
-            a, b, c, back, ahead = nodes[before], nodes[k], nodes[after], s[k] - s[before], s[after] - s[k]
-            for i in range(3):
-                m, p = (i + 1) % 3, (i + 2) % 3
-                across = normal[b, m] * (points[c, p] - points[a, p]) - normal[b, p] * (points[c, m] - points[a, m])
-                side[k, i] = across
-                square += across * across
-            for i in range(3):
-                side[k, i] /= np.sqrt(square)
-            if at[0] + 2 < k < at[joints - 1] - 2:  # only the first and the last joint's curvature is needed
-                continue
-            for i in range(3):
-                turn = (points[c, i] - points[b, i]) / ahead - (points[b, i] - points[a, i]) / back
-                curvature[k] += 2.0 * turn / (back + ahead) * side[k, i]
-        for end, k, step in ((0, 1, 1), (last, last - 1, -1)):  # extrapolated
-            rate = (curvature[k + step] - curvature[k]) / (s[k + step] - s[k])
-            curvature[end] = curvature[k] + rate * (s[end] - s[k])
-        # second derivatives of the cubic spline that vanishes at the joints, given those at its ends
-        moments[0], moments[joints - 1], share[0], turn = -curvature[at[0]], -curvature[at[joints - 1]], 0.0, 0.0
-        for end, inner in ((0, 1), (joints - 1, joints - 2)):
-            turn = max(turn, abs(moments[end]) * abs(s[at[inner]] - s[at[end]]))
-        if turn > STEEP:
-            continue
-        for k in range(1, joints - 1):
-            back, ahead = s[at[k]] - s[at[k - 1]], s[at[k + 1]] - s[at[k]]
-            pivot = 2.0 * (back + ahead) - back * share[k - 1]
-            share[k] = ahead / pivot
-            moments[k] = -back * moments[k - 1] / pivot
-        for k in range(joints - 2, 0, -1):
-            moments[k] -= share[k] * moments[k + 1]
-        span = 0
-        for k in range(len(nodes)):
-            if k == at[span + 1] and span + 2 < joints:
-                span += 1
-            a, b = at[span], at[span + 1]
-            h = s[b] - s[a]
-            x, y = (s[b] - s[k]) / h, (s[k] - s[a]) / h
-            shift = h * h / 6.0 * (moments[span] * (x**3 - x) + moments[span + 1] * (y**3 - y))
-            if not a <= k <= b:  # past the last joint the rod is straight
-                end, inner = (span, span + 1) if k < a else (span + 1, span)
-                slope, far = h / 6.0 * (2.0 * moments[end] + moments[inner]), abs(s[k] - s[at[end]])
-                shift = far * (slope + 0.5 * far * moments[end])
-            for i in range(0 if joint[nodes[k]] else 3):
-                result[nodes[k], i] += shift * side[k, i]

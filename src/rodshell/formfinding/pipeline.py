@@ -40,6 +40,7 @@ from rodshell.validation import choices_of, instance
 STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
 ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other axis
 LONG_TAIL = 3.0  # spacings past a rod's last joint
+ON_THE_END, MOST_OFF = 2e-4, 1e-3  # of the size, and m: a support that is further from the target's end gives a warning
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +215,7 @@ class PatchForm:
         """Sentences that a user should read before anything else."""
         if self.lying is None:
             return _rolled(self.popped)
-        tails = _long_tails(self.lying) if self.draped.converged else ()
+        tails = (*_off_the_end(self.lying), *_long_tails(self.lying)) if self.draped.converged else ()
         flat = flat_warnings(self.lying.positions, self.rod)
         pieces = _in_pieces(self.lying)
         return (*flat, *self.draped.warnings, *pieces, *_stretched(self.draped), *tails, *_rolled(self.popped))
@@ -381,6 +382,24 @@ def _stretched(draped: Draped) -> tuple[str, ...]:
     return (
         f"on the target the rods stretch by {100 * strain:.2g} % under their own weight, so that they are cut too "
         'short: use a stiffer or lighter material (rod.material; a thicker section does not help), or method "bound"',
+    )
+
+
+def _off_the_end(trimmed: Trimmed) -> tuple[str, ...]:
+    """A warning where supports of the net's rods lie beside the target's end: edges are straight, rods are bent."""
+    draped, points = trimmed.draped, trimmed.boundary.points
+    if draped.eccentricity or not isinstance(draped.method, Bound):
+        return ()
+    off = np.abs(draped.target.margin(points))
+    allowed, worst = min(ON_THE_END * draped.target.size, MOST_OFF), int(off.argmax())
+    if off[worst] <= allowed:
+        return ()
+    edge = length_text(0.9 * draped.layout.edge * sqrt(allowed / off[worst]))  # the error is of second order
+    rod, (x, y, z) = trimmed.mesh.grid.rods[worst // 2].name, points[worst]
+    return (
+        f"{np.count_nonzero(off > allowed)} supports are off the end of the target, by up to {length_text(off[worst])} "
+        f"(of rod {rod} at ({x:.4g}, {y:.4g}, {z:.4g}) m), since the mesh's edges are long for its curvature: use a "
+        f"layout.edge of {edge}",
     )
 
 

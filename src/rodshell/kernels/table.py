@@ -24,7 +24,6 @@ KERNELS: dict[str, dict[str, str]] = {
         "_tangents": "f2 f2",
     },
     "formfinding.bound_drape": {
-        "_correct": "f2 f2 i1 i1 i1 f1 b1 f2",
         "_mark": "i2 i1 b1",
     },
     "formfinding.finite_sections": {
