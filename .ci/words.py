@@ -50,7 +50,6 @@ VARIABLES = {
 }
 MODULES = {
     "of": "from_objects",
-    "natural": "end_correction",
     "overhead": "initial_placement",
     "rising": "dynamic_pop_up",
     "standing": "the wall below the rim",
