@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.acceptance import (
+    drawn,
     house,
     joints,
     loads_shells,
@@ -30,6 +31,7 @@ pytestmark = pytest.mark.slow
 
 Rows = Callable[[], Iterator[Row]]
 CHEAP: dict[str, tuple[Rows, ...]] = {
+    "drawn": (partial(drawn.end_rows, 14),),
     "house": (house.tree_rows,),
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
     "loads": (
