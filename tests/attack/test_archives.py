@@ -426,3 +426,24 @@ def test_line_as_long_as_a_million_labels_takes_no_time(dome: Path) -> None:
     content["rods"][0]["end"] = 1e5
     (dome / "result.json").write_text(json.dumps(content))
     assert outcome(dome, ["svg"]) == ""
+
+
+def test_archive_without_rods_is_refused_on_reading(dome: Path) -> None:
+    content = json.loads((dome / "result.json").read_text())
+    kept = (
+        "format",
+        "version",
+        "units",
+        "version_rodshell",
+        "name",
+        "status",
+        "target",
+        "layout",
+        "rod",
+        "joint",
+    )
+    bare = {key: content[key] for key in kept} | {key: [] for key in ("rods", "footprint", "boundary", "end_tangents")}
+    (dome / "result.json").write_text(json.dumps(bare | {"dropped": [], "warnings": []}))
+    (dome / "states.npz").write_bytes(npz())
+    with pytest.raises(RodshellError, match=r"there are no rods in result\.json"):
+        read(dome)

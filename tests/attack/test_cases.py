@@ -38,6 +38,8 @@ DOTS = "a." * 50_000 + "a"
 
 BOMBS: dict[str, Any] = {
     "dots": f"{DOTS} = 1\n",
+    "quotes in quoted dots": '"a\\"b".' * 50_000 + "a = 1\n",
+    "many keys of some dots": "".join(f"k{n}.{'a.' * 90}a = {n}\n" for n in range(5000)),
     "quoted dots": '"a".' * 50_000 + "a = 1\n",
     "dots and spaces": "a . " * 50_000 + "a = 1\n",
     "dots of a table": f"[{DOTS}]\nb = 1\n",
@@ -112,7 +114,7 @@ def test_a_bomb_costs_little_and_is_refused_in_a_sentence(what: str) -> None:
 
 def test_a_bomb_in_a_file_is_refused_and_a_pipe_is_read(tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(BOMBS["dots"])
-    with pytest.raises(rs.InputError, match=r"case.toml has a key of more than a hundred tables"):
+    with pytest.raises(rs.InputError, match=r"case.toml has a key of more than twenty tables"):
         rs.Job.load(tmp_path / "case.toml")
     for path in ("/dev/zero", tmp_path / "a\0b", "~nobody-of-this-name/case.toml"):
         with pytest.raises(rs.InputError):

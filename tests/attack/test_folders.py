@@ -112,6 +112,8 @@ DAMAGED: dict[str, tuple[object, Prepare | None]] = {
     "the folder itself": (record(["."]), None),
     "no name": (record([""]), None),
     "another way to write it": (record(["./evil"]), None),
+    "a name too long": (record(["e" * 5000]), None),
+    "removal of a name too long": (record([], ["e" * 300]), None),
     "NUL": (record(["ev\0il"]), None),
     "half a pair": (record(["ev\ud800il"]), None),
     "escapes of a terminal": (record(["\x1b[31mevil"]), None),

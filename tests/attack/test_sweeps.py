@@ -68,6 +68,12 @@ def refused(folder: Path) -> str:
     return str(error.value)
 
 
+@pytest.mark.parametrize("factor", ["108", "1e308"])
+def test_store_is_read_whatever_its_limit(factor: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RODSHELL_LIMITS", factor)
+    read(folder)
+
+
 # Code
 
 

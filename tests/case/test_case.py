@@ -1,5 +1,6 @@
 """The case file: what is left out, what is written back, and what is refused."""
 
+import os
 import tomllib
 from math import cos, pi, tau
 from pathlib import Path
@@ -541,3 +542,12 @@ def test_arrays_do_in_place_of_lists() -> None:
     assert load_case("hemisphere", given) == load_case("hemisphere", same)
     with pytest.raises(InputError, match=r"target.kind must be .*, not a list"):
         load_case({"target": {"kind": np.zeros(3)}})
+
+
+@pytest.mark.skipif(not Path("/dev/fd").exists(), reason="needs /dev/fd")
+def test_files_of_a_case_from_a_shell_s_pipe_lie_in_the_current_folder() -> None:
+    read, write = os.pipe()
+    os.write(write, b'[target]\nkind = "mesh"\nfile = "roof.obj"\nunit = "m"\n')
+    os.close(write)
+    assert load_case(f"/dev/fd/{read}").target.file == "roof.obj"
+    os.close(read)

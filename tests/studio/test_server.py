@@ -147,6 +147,27 @@ def test_from_another_machine_a_token_is_needed(tmp_path: Path) -> None:
         assert client.get("/api/version").status_code == 200  # by the cookie
 
 
+@pytest.mark.parametrize("path", ["/static/studio.js", "/static/none", "/api/version", "/"])
+def test_only_an_address_with_the_right_token_is_answered_with_the_cookie(path: str, tmp_path: Path) -> None:
+    """Scripts are sent to everybody; the key once went with them, whatever token was asked for."""
+    with TestClient(studio_app(settings(tmp_path, hosts=(), token="right", key="kept"))) as client:
+        for query in ("", "?token=", "?token=wrong", "?token=kept"):
+            assert "set-cookie" not in client.get(f"{path}{query}").headers
+        assert client.get("/api/version").status_code == 403
+
+
+def test_a_link_in_a_job_s_folder_is_not_among_its_files(client: TestClient, tmp_path: Path) -> None:
+    name = "a" * 24
+    result = tmp_path / "jobs" / name / "result"
+    result.mkdir(parents=True)
+    (result.parent / "status.json").write_text('{"status": "done", "case": {}}')
+    (tmp_path / "secret").write_text("mine")
+    (result / "result.json").write_text("{}")
+    (result / "link").symlink_to(tmp_path / "secret")
+    assert client.get(f"/api/jobs/{name}").json()["files"] == ["result.json"]
+    assert client.get(f"/api/jobs/{name}/files/link").status_code == 404
+
+
 def test_no_climbing_name_is_answered(client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "secret.obj").write_text("v 0 0 0\n")
     assert client.get("/api/jobs/..%2f..%2fsecret.obj").status_code == 404

@@ -74,8 +74,8 @@ DEEPEST = 10  # tables and lists within each other: points of a line of a load i
 LONGEST_KEY = 200  # characters
 MOST_KEYS = 1000  # of one table
 TOO_DEEP = f"tables or lists are within each other more than {DEEPEST} deep: a case has none such"
-MANY_DOTS = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""")
-"""A dotted key of more than a hundred tables, for which tomllib takes memory by the square of their number."""
+MANY_DOTS = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}""")
+"""A dotted key of more than twenty tables, for which tomllib takes memory by the square of their number."""
 
 NOT_A_WORD = "the keys of a case are words such as target.radius, not {}"
 
@@ -353,7 +353,7 @@ def toml_of(name: str, text: str, wrong_type: str = "") -> dict[str, Any]:
     if len(text) > limit(TEXT):
         raise InputError(f"{name} has more than {limit(TEXT) / 1e6:g} MB: shorten it, {raised(TEXT, len(text))}")
     if MANY_DOTS.search(text):
-        raise InputError(f"{name} has a key of more than a hundred tables: the keys of a case have three at most")
+        raise InputError(f"{name} has a key of more than twenty tables: the keys of a case have three at most")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as reason:
@@ -419,12 +419,13 @@ def _wanted_in(folder: Path) -> str:
 
 
 def _from_its_folder(path: Path, raw: Raw) -> Raw:
-    """Files that a case names lie in its own folder, unless they are given from the root."""
+    """Files that a case names lie in its own folder, unless they are given from the root; of a shell's pipe, here."""
+    folder = Path() if path.parent.parts[:2] in (("/", "dev"), ("/", "proc")) else path.parent
     for name, keys in FILE_KEYS.items():
         table = raw.get(name)
         if not isinstance(table, dict):
             continue
         for key in keys:
             if isinstance(table.get(key), str):
-                table[key] = str(path.parent / table[key])
+                table[key] = str(folder / table[key])
     return raw

@@ -17,6 +17,7 @@ from rodshell.untrusted import TEXT, read_text
 
 MANIFEST, FORMAT, VERSION = "manifest.json", "rodshell-manifest", 1
 HASHED = 1_000_000_000  # bytes of a file whose content is compared, in about a second; of larger ones their size is
+LONGEST_NAME = 255  # bytes of a file's name, as of usual file systems
 
 Mark = dict[str, object]
 """What stands at a name: {"size", "sha256"} of a file, {"link"} of a symbolic link, {"folder"} or {"other"}; {"behind"}
@@ -145,7 +146,7 @@ def is_own_file(folder: Path, name: str) -> bool:
 
 def inside(name: object) -> bool:
     """Whether a name is that of a file within the folder, in the one way in which it is written."""
-    if not isinstance(name, str) or not name.isprintable():
+    if not isinstance(name, str) or not name.isprintable() or max(map(len, name.encode().split(b"/"))) > LONGEST_NAME:
         return False
     path = Path(name)
     return path.as_posix() == name and not path.anchor and ".." not in path.parts and path != Path()

@@ -114,6 +114,9 @@ def state_faults(states: States, results: Results) -> Iterator[str]:
     states : arrays by name, see `Archive`.
     results : by which the number of rods and stages is known.
     """
+    if not results.rods:
+        yield "there are no rods in result.json"
+        return
     for name, values in states.items():
         if values.dtype.kind not in ("iu" if name in INDICES else "fiu") or values.dtype.itemsize not in (4, 8):
             yield f"{name} must be an array of {'whole ' if name in INDICES else ''}numbers of 32 or 64 bits"

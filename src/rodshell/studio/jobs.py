@@ -96,9 +96,8 @@ class Jobs:
         except InputError:
             return {"id": name, "status": "failed", "sentence": "what was kept of this job is damaged: send it again"}
         if status["status"] == "done":
-            status["files"] = [
-                path.relative_to(result).as_posix() for path in sorted(result.rglob("*")) if path.is_file()
-            ]
+            files = [path for path in sorted(result.rglob("*")) if path.is_file() and not path.is_symlink()]
+            status["files"] = [path.relative_to(result).as_posix() for path in files]
         return {"id": name} | status
 
     def file(self, name: str, path: str) -> Path | None:

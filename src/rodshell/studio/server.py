@@ -131,7 +131,7 @@ class _Guard:
             return
         client = HTTPConnection(scope)
         cookie = f"rodshell-{(scope.get('server') or ('', ''))[1]}"  # a browser sends the cookies of all ports to each
-        why = self._refusal(client, cookie)
+        why, proved = self._refusal(client, cookie)
         if why and scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 4403, "reason": why})
             return
@@ -146,7 +146,7 @@ class _Guard:
         async def answer(message: Message) -> None:
             if message["type"] == "http.response.start":
                 more = dict(HEADERS)
-                if self._settings.token and "token" in client.query_params:
+                if proved:
                     key = self._settings.key or self._settings.token
                     more["set-cookie"] = f"{cookie}={key}; HttpOnly; SameSite=Strict; Path=/"
                 message["headers"] = [*message["headers"], *((k.encode(), v.encode()) for k, v in more.items())]
@@ -154,24 +154,25 @@ class _Guard:
 
         await self._app(scope, receive, answer)
 
-    def _refusal(self, client: HTTPConnection, cookie: str) -> str:
-        """Why a request is refused; "" where it is not."""
+    def _refusal(self, client: HTTPConnection, cookie: str) -> tuple[str, bool]:
+        """Why a request is refused, "" where it is not; and whether its address has the token."""
         host, origin, settings = client.headers.get("host", ""), client.headers.get("origin"), self._settings
         if settings.hosts and host not in settings.hosts:
-            return f"this server is not called {host[:80]!r}"
+            return f"this server is not called {host[:80]!r}", False
         asks = client.scope["type"] == "websocket" or client.scope["method"] not in ("GET", "HEAD")
         if origin is not None and asks and origin.partition("://")[2] != host:
-            return "another site's page may not use this server"
-        if not settings.token or client.scope["path"].startswith("/static/"):
-            return ""
+            return "another site's page may not use this server", False
+        if not settings.token:
+            return "", False
         token = client.query_params.get("token", "")
         if self._once and _same(token, self._once):
             self._once = ""
-            return ""
-        bearer = client.headers.get("authorization", "").removeprefix("Bearer ")
-        if _same(token, settings.token) or _same(bearer, settings.token):
-            return ""
-        return "" if _same(client.cookies.get(cookie, ""), settings.key or settings.token) else NO_TOKEN
+            return "", True
+        if _same(token, settings.token):
+            return "", True
+        bearer, kept = client.headers.get("authorization", "").removeprefix("Bearer "), client.cookies.get(cookie, "")
+        allowed = _same(bearer, settings.token) or _same(kept, settings.key or settings.token)
+        return "" if allowed or client.scope["path"].startswith("/static/") else NO_TOKEN, False
 
 
 def _same(given: str, wanted: str) -> bool:

@@ -37,6 +37,7 @@ OUTCOMES = (FOUND, "refused", "failed", *LOST)
 JOB = re.compile(r"\w+")  # that was found: the name of its folder
 KINDS = {"status": str, "verdict": str, "results": dict}  # of what is kept of a job; all else are numbers
 ROW = 20e6  # bytes of what is kept of a job
+MOST_OF_SQLITE = 1e9  # bytes of a value that SQLite can be asked for
 REMEDY = "move it to compute all designs again, or choose another folder"
 
 
@@ -270,7 +271,7 @@ class Store:
 def _opened(path: Path, mode: str) -> sqlite3.Connection:
     """A database; `mode` as of its URIs."""
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", isolation_level=None, uri=True, timeout=30)
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, int(limit(ROW)))
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, int(min(limit(ROW), MOST_OF_SQLITE)))
     return connection
 
 
@@ -320,7 +321,7 @@ def _whole(text: str) -> int:
 def _read_row(packed: bytes) -> dict[str, Any]:
     """What is kept of a job."""
     unpacking = zlib.decompressobj()
-    content = unpacking.decompress(packed, int(limit(ROW)))
+    content = unpacking.decompress(packed, int(min(limit(ROW), MOST_OF_SQLITE)))
     if unpacking.unconsumed_tail:
         raise ValueError(f"a job has more than {limit(ROW) / 1e6:.4g} MB, {raised(ROW, 2 * limit(ROW))}")
     row: dict[str, Any] = read_json(content, dict)
