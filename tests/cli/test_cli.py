@@ -696,7 +696,7 @@ def test_an_earlier_result_that_cannot_be_read_is_refused(
     assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
     result = {"format": "rodshell-result", "version": 1, "rods": []}
     (dome / "result.json").write_text(json.dumps(result))
-    assert "dome has no rods" in refused(capsys, "popup", "dome")
+    assert "there are no rods in result.json" in refused(capsys, "popup", "dome")
     (dome / "result.json").write_text(json.dumps({**result, "rods": [{"id": "U01"}]}))
     assert "dome/result.json: rods[0].family is missing" in refused(capsys, "popup", "dome")
     (dome / "result.json").unlink()

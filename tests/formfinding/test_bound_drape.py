@@ -151,7 +151,7 @@ def test_rods_that_cross_no_axis_end_on_a_rectangle(name, spacing):
 def held_ends(draped):
     """Node and direction (3,) on the net of each rod end that no other node is close to."""
     mesh, net = draped.mesh, draped.net.node_positions(draped.mesh)
-    close = 0.2 * np.median(mesh.edge_lengths)
+    close = 0.1 * np.median(mesh.edge_lengths)
     for piece in draped.net.rods:
         for k, rod in enumerate(mesh.grid.rods):
             s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)

@@ -391,7 +391,7 @@ def _off_the_end(trimmed: Trimmed) -> tuple[str, ...]:
     if draped.eccentricity or not isinstance(draped.method, Bound):
         return ()
     off = np.abs(draped.target.margin(points))
-    allowed, worst = min(ON_THE_END * draped.target.size, MOST_OFF), int(off.argmax())
+    allowed, worst = min(ON_THE_END * draped.target.size, MOST_OFF), int(np.argmax(off > (1 - 1e-6) * off.max()))
     if off[worst] <= allowed:
         return ()
     edge = length_text(0.9 * draped.layout.edge * sqrt(allowed / off[worst]))  # the error is of second order
