@@ -68,6 +68,7 @@ class BendTwist:
     source_directors: Floats
     source_twist: Floats
 
+    angle_columns = 1, 3
     __repr__ = brief
 
     @classmethod

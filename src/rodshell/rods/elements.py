@@ -16,6 +16,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
@@ -71,6 +72,14 @@ class Stressed(Elements, Protocol):
         hessians : (m, 3k, 3k), which are filled.
         """
         ...
+
+
+def twist_angles(sets: Sequence[Elements], count: int) -> NDArray[np.bool_]:
+    """(count,) which blocks are twist angles: those in the columns of `blocks` that elements name `angle_columns`."""
+    result = np.zeros(count, dtype=bool)
+    for elements in sets:
+        result[elements.blocks[:, getattr(elements, "angle_columns", ())]] = True
+    return result
 
 
 def with_frames(element: Elements, like: Elements) -> Elements:

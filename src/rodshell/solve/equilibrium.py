@@ -115,7 +115,7 @@ STRAIN_TOLERANCE = 2e-6
 REPEATED, ALIKE = 12, 1e-3  # steps; and how near to each other
 MOST_ITERATIONS = 60
 LONGEST_SLIDE = 120  # iterations off a saddle
-NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
+NUDGE = 0.01  # largest motion along the mode of an unstable equilibrium
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +130,8 @@ class Equilibrium:
     forces : (e,) axial forces [N].
     gradient : (n, 3) of energy and load, without constraint forces [N].
     report : figures of the solve.
-    mode : (n, 3) where the state is not stable, the direction of the most negative curvature, its largest displacement
-        being 1; else None.
+    mode : (n, 3) where the state is not stable, the direction of the most negative curvature, its largest motion being
+        1 (`Problem.unit`); else None.
     """
 
     problem: Problem
@@ -187,7 +187,7 @@ def find_equilibrium(
         are shortened instead.
     most_modes : where the start has more negative modes, it is given up at once (BUCKLED); None: never.
     most_iterations : chord steps in a row count as one.
-    progress : called with the number and the length of each step, over the characteristic length; an OutOfTimeError
+    progress : called with the number and the length of each step, as the solver measures it; an OutOfTimeError
         that it raises ends the solve with that status.
     """
     begin = time.perf_counter()
@@ -209,7 +209,7 @@ def find_equilibrium(
         state, forces = state_next, forces_next
         if progress is not None and counted:
             try:
-                progress(step.iterations, moved / problem.length)
+                progress(step.iterations, moved)
             except OutOfTimeError as late:
                 reason = str(late)
         if step.settled and mismatch < STRAIN_TOLERANCE:
@@ -282,7 +282,7 @@ def find_stable(
     tries = [first]
     if first.mode is not None:
         for side in (1.0, -1.0):
-            start = first.state + side * NUDGE * problem.length * first.mode
+            start = first.state + side * NUDGE * first.mode
             tries.append(
                 find_equilibrium(
                     first.problem,

@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
-from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Shell
-from rodshell.rods.elements import Elements, Stretch
+from rodshell.rods.elements import Elements, Stretch, twist_angles
 from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl, product, upper_triangle
 from rodshell.validation import array, finite, instance, number, vector
 
@@ -154,7 +153,7 @@ class Problem:
     elements : every energy but the stretch.
     stretch : the edges.
     constraint : supports or a surface.
-    length : characteristic length of the shape [m]: steps are measured by it.
+    length : characteristic length of the shape [m], by which motions are measured, see `unit`.
     inextensible : the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
     load : (n, 3) dead forces [N], or None.
     flat_coordinates : (n, 2) where the blocks lie in the flat grid [m], from which the order of elimination follows,
@@ -207,6 +206,12 @@ class Problem:
         block with itself, for the curvature of the constraint."""
         return (*(element.blocks for element in self.elements), self.stretch.blocks, np.arange(count)[:, None])
 
+    def unit(self, count: int) -> Floats:
+        """(count, 1) what the motion of each block is measured by: the length [m], or a turn of twist angles [rad]. So
+        neither the unit of length nor the size of a structure decides how a solve goes. (By 1 rad, twists bound steps
+        that nodes do not: two fifths of all pop-ups take more factorisations, up to three times as many.)"""
+        return np.where(twist_angles(self.elements, count), 2.0 * np.pi, self.length)[:, None]
+
     def pattern_at(self, state: Floats) -> Pattern:
         """The pattern of this problem: the one that comes with it where it serves, or a new one.
 
@@ -252,9 +257,11 @@ def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | 
 
 
 def half_width(points: Floats) -> float:
-    """Half of the largest extent of points (k, 3) along x, y or z [m]: the characteristic length of a shape."""
-    low, high = bounds(points)
-    return 0.5 * float((high - low).max())
+    """Largest distance of points (k, 3) from their mean in plan, or half of their height [m]: the characteristic length
+    of a shape, whichever way it is turned about z."""
+    x, y, z = points.T
+    apart = (x - x.mean()) ** 2 + (y - y.mean()) ** 2
+    return max(float(np.sqrt(apart.max())), 0.5 * float(z.max() - z.min()))
 
 
 class Force(Protocol):
