@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
+from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.elements import Elements, Stretch, twist_angles
 from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl, product, upper_triangle
@@ -185,7 +186,7 @@ class Problem:
 
         Parameters
         ----------
-        points : (k, 3) points of the shape [m], whose width gives the characteristic length.
+        points : (k, 3) the rods' ends [m], whose mean radius is the characteristic length.
         goals : (k, 3) where the ends, and the ghost nodes of clamps after them, go [m]; None: they stay.
         elements : the shell's own energies, with their source frames elsewhere; None: those of the shell.
         pattern : of an earlier solve of this shell.
@@ -196,7 +197,7 @@ class Problem:
             shell.elements if elements is None else elements,
             shell.stretch,
             supports,
-            half_width(points),
+            mean_radius(points),
             flat_coordinates=shell.flat_coordinates,
             pattern=pattern,
         )
@@ -256,12 +257,16 @@ def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | 
     )
 
 
+def mean_radius(points: Floats) -> float:
+    """Root mean square distance of points (k, 3) from their mean [m], whichever way they are turned: the characteristic
+    length of a shape with these ends."""
+    return float(np.sqrt(np.square(points - points.mean(axis=0)).sum() / len(points)))
+
+
 def half_width(points: Floats) -> float:
-    """Largest distance of points (k, 3) from their mean in plan, or half of their height [m]: the characteristic length
-    of a shape, whichever way it is turned about z."""
-    x, y, z = points.T
-    apart = (x - x.mean()) ** 2 + (y - y.mean()) ** 2
-    return max(float(np.sqrt(apart.max())), 0.5 * float(z.max() - z.min()))
+    """Half of the largest extent of points (k, 3) along x, y or z [m]."""
+    low, high = bounds(points)
+    return 0.5 * float((high - low).max())
 
 
 class Force(Protocol):
