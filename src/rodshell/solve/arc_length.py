@@ -24,7 +24,7 @@ from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
 from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, negative_mode, orthonormal, subspace_iteration
+from rodshell.solve.tangent import Tangent, generic, negative_mode, orthonormal, subspace_iteration
 
 MODES = 4  # lowest ones that are looked at
 MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative error of the lowest eigenvalue: modes only say how far to go
@@ -312,7 +312,7 @@ class ArcLength:
         def inverse(row: Floats) -> Floats:
             return tangent.factors.solve(row / scale) / scale
 
-        start = self._generic(size, MODES) if point.modes is None else point.modes / scale
+        start = generic(size, MODES) if point.modes is None else point.modes / scale
         mode = tangent.freedom.expand(negative_mode(inverse, start, tolerance=LOSING_CLOSE) * scale)
         return np.asarray(mode / self.reach(mode))
 
@@ -384,17 +384,12 @@ class ArcLength:
         scale, size = self._scale, tangent.freedom.size
         inverse, rows, _ = subspace_iteration(
             lambda row: tangent.factors.solve(row / scale) / scale,
-            self._generic(size, MODES) if start is None else start / scale,
+            generic(size, MODES) if start is None else start / scale,
             settled=1,
             tolerance=MODES_CLOSE,
             most_sweeps=MOST_SWEEPS,
         )
         return 1.0 / inverse, orthonormal(rows) * scale
-
-    @staticmethod
-    def _generic(size: int, count: int) -> Floats:
-        """(count, size) rows, or fewer, to begin an iteration with: no symmetry of the shell is one of them."""
-        return np.asarray(np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None]))
 
 
 def _products(a: Sequence[Floats] | Floats, b: Floats) -> Floats:

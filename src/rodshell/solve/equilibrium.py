@@ -115,7 +115,9 @@ STRAIN_TOLERANCE = 2e-6
 REPEATED, ALIKE = 12, 1e-3  # steps; and how near to each other
 MOST_ITERATIONS = 60
 LONGEST_SLIDE = 120  # iterations off a saddle
-NUDGE = 0.01  # largest motion along the mode of an unstable equilibrium
+NUDGE = 0.01  # motion along the mode of an unstable equilibrium where the search for the lowest energy begins
+FARTHEST = 0.16  # where it ends
+PROBE = 1e-3  # motion of the differences of gradients
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,6 +224,7 @@ def find_equilibrium(
         if _repeats(steps):
             break
         step.refresh(state)
+    mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     gradient = step.gradient(state, forces)
     residual = problem.constraint.freedom(state).reduce(gradient)
     report = SolveReport(
@@ -235,7 +238,6 @@ def find_equilibrium(
         negative_modes=step.negative_modes,
         reason=reason if status is Status.OUT_OF_TIME else "",
     )
-    mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     step.refresh(state)
     solved = replace(problem, elements=step.elements, pattern=step.pattern)
     return Equilibrium(solved, state, forces, gradient, report, mode)
@@ -245,6 +247,51 @@ def _repeats(steps: list[float]) -> bool:
     """Whether the last `REPEATED` steps are as long as those two before: back and forth between two states."""
     last = np.array(steps[-REPEATED - 2 :])
     return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
+
+
+def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
+    """Where the energy is lowest along the valley that leaves an unstable equilibrium along its mode.
+
+    The valley is x = x0 + q v + q^2 w / 2 + ..., K w = -E'''[v, v] across v [Koiter 1945]: of thin rods the mode alone
+    would stretch the edges, which hides how deep it is.
+
+    Parameters
+    ----------
+    saddle : the unstable equilibrium.
+    mode : (n, 3) v, its largest motion 1.
+
+    Returns
+    -------
+    State (n, 3) and axial forces (e,) there; `NUDGE` along the mode where the valley is not seen.
+    """
+    problem, state, stretch = saddle.problem, saddle.state, saddle.problem.stretch
+    shares = mode / problem.unit(len(state)) ** 2
+    second = np.zeros_like(state)
+    for step in (PROBE, -PROBE):
+        for element in (*problem.elements, stretch):
+            element.evaluate(state + step * mode, second)
+    for element in (*problem.elements, stretch):
+        at = np.zeros_like(state)
+        element.evaluate(state, at)
+        second -= 2.0 * at
+    bend = saddle.tangent.solve(-second / PROBE**2)
+    bend -= np.vdot(shares, bend) / np.vdot(shares, mode) * mode
+
+    def at_share(q: float) -> tuple[float, Floats]:
+        there = problem.constraint.retract(state + q * mode + 0.5 * q**2 * bend)
+        return problem.potential(there), there
+
+    q, (energy, there) = NUDGE, at_share(NUDGE)
+    here = saddle.energy
+    while energy >= here and q > NUDGE / 4**6: 
+        q *= 0.25
+        energy, there = at_share(q)
+    if energy >= here:
+        return state + NUDGE * mode, saddle.forces
+    for factor in (2.0, 0.5):
+        while q * factor <= FARTHEST and (further := at_share(q * factor))[0] < energy:
+            q, (energy, there) = q * factor, further
+    return there, stretch.stiffness * stretch.strains(there)
 
 
 def find_stable(
@@ -282,12 +329,12 @@ def find_stable(
     tries = [first]
     if first.mode is not None:
         for side in (1.0, -1.0):
-            start = first.state + side * NUDGE * first.mode
+            start, forces_there = beside(first, side * first.mode)
             tries.append(
                 find_equilibrium(
                     first.problem,
                     start,
-                    first.forces,
+                    forces_there,
                     descend=True,
                     most_iterations=min(2 * most_iterations, LONGEST_SLIDE),
                     progress=progress,

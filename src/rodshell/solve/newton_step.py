@@ -19,7 +19,7 @@ from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all
 from rodshell.solve.problem import NO_CURVATURE, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
-from rodshell.solve.tangent import subspace_iteration
+from rodshell.solve.tangent import generic, negative_mode, orthonormal, subspace_iteration
 
 # A motion is measured by `Problem.unit`: shares of the length, or turns
 TOLERANCE = 1e-13  # motion: estimate of the error that is left
@@ -38,6 +38,8 @@ AGAIN = 3.0  # times as much of the last change as that was of the one before: t
 CHORD = 5e-3  # motion: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
+CLOSE, BESIDE = 1e-3, 3  # accuracy of a single negative eigenvalue; vectors that are iterated for it
+SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
 TINY = 1e-300  # no step is shorter, except zero
 
 
@@ -86,6 +88,7 @@ class NewtonStep:
         self.factorizations = 0
         self.negative_modes = 0
         self._shift = 0.0
+        self._mode: Floats | None = None  # the only negative one, that was found last
         self._longest = LONGEST_STEP
         self._nearest = np.inf  # the last step that was near
         self._shifted = False  # the last step was one of the shifted Hessian
@@ -246,10 +249,15 @@ class NewtonStep:
         return result
 
     def lowest_mode(self) -> Floats:
-        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated, its largest motion 1."""
-        self._shift_until_definite()
-        mode = self._free.expand(self._inverse_iteration(12)[0])
-        return np.asarray(mode / self._reach(mode))
+        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated, its largest motion 1; to the
+        side on which it goes up on the whole, so that every run, size and heading of a structure has the same."""
+        regular = self._count_negative_modes()
+        row = self._single_mode(regular)[0]
+        if row is None:
+            self._shift_until_definite()
+            row = self._inverse_iteration(12)[0]
+        mode = self._free.expand(row)
+        return upwards(mode / self._reach(mode))
 
     def _direction(self, right: Floats, descend: bool) -> Floats | None:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
@@ -270,7 +278,9 @@ class NewtonStep:
         self._longest = min(LONGER * self._longest, LONGEST_STEP)
         self._shifted = self.negative_modes > 0
         if self.negative_modes:
-            self._shift_until_definite()
+            lowest = self._single_mode(regular)[1]
+            if not lowest or self._factor_shifted(-2.0 * lowest):
+                self._shift_until_definite()
         return self._solve(right)
 
     def _count_negative_modes(self) -> bool:
@@ -285,16 +295,41 @@ class NewtonStep:
             return False
         return True
 
+    def _single_mode(self, factored: bool) -> tuple[Floats | None, float]:
+        """Eigenvector (dofs,) of the only negative eigenvalue, by the factors of the Hessian itself, and a bound from
+        below, next to it however near to zero it is [J]; None and 0 where there are several, or it is not `factored`."""
+        if not factored or self.negative_modes != 1:
+            return None, 0.0
+
+        energy = self._softest
+
+        def inverse(x: Floats) -> Floats:
+            return energy / self._units * self._solve(x / self._units)
+
+        start = generic(self._free.size, BESIDE)
+        if self._mode is not None:
+            start[0] = self._mode
+        try:
+            self._mode = row = orthonormal(negative_mode(inverse, start, tolerance=CLOSE)[None])[0]
+        except RuntimeError:  # ARPACK's
+            return None, 0.0
+        softness = float(np.vdot(row, inverse(row)))
+        return (row * self._units, energy / softness) if softness < 0 else (None, 0.0)
+
+    @property
+    def _softest(self) -> float:
+        """How soft a wave as long as the shell is against the bending of an edge [J]."""
+        bending, units = np.einsum("mii->mi", self._hessians[0]), self._unit[self._blocks[0], 0].repeat(3, axis=1)
+        slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
+        return slender**4 * float((bending * units**2).mean())
+
     def _shift_until_definite(self) -> None:
         """Factorise with the diagonal shifted by about twice the most negative eigenvalue, motions in their units.
 
         A Newton step then doubles what the state has of its mode. The search begins where a wave as long as the
         shell is soft against the bending of an edge, or below the last shift that sufficed.
         """
-        bending, units = np.einsum("mii->mi", self._hessians[0]), self._unit[self._blocks[0], 0].repeat(3, axis=1)
-        slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
-        softest = slender**4 * float((bending * units**2).mean())
-        shift, tries = max(softest, self._shift / SHIFT_GROWTH), 0
+        shift, tries = max(self._softest, self._shift / SHIFT_GROWTH), 0
         while self._factor_shifted(shift) and tries < 40:
             shift, tries = SHIFT_GROWTH * shift, tries + 1
         lowest = self._inverse_iteration(4)[1] - shift
@@ -318,13 +353,24 @@ class NewtonStep:
         assert self._factors is not None
         return self._factors.solve(right)
 
-    def _inverse_iteration(self, steps: int) -> tuple[Floats, float]:
+    def _inverse_iteration(self, sweeps: int) -> tuple[Floats, float]:
         """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue [J]."""
-        start = np.sin(1.0 + np.arange(self._free.size) ** 2)[None]  # no symmetry of the shell is one of this start
+        start = generic(self._free.size, 1)
         values, (row, *_), _ = subspace_iteration(
-            lambda x: self._solve(x / self._units) / self._units, start, settled=1, tolerance=0.0, most_sweeps=steps
+            lambda x: self._solve(x / self._units) / self._units, start, settled=1, tolerance=0.0, most_sweeps=sweeps
         )
         return row * self._units, 1.0 / float(values[0])
+
+
+def upwards(mode: Floats) -> Floats:
+    """A mode (n, 3), or its opposite: that which goes up on the whole, or first, where it goes up and down by as much;
+    along x or y where it does not go up."""
+    size = np.abs(mode).max(axis=0)
+    along = mode[:, 2 if size[2] > SIDEWAYS * size.max() else int(np.argmax(size))]
+    whole = float(along.sum())
+    if abs(whole) <= SIDEWAYS * float(np.abs(along).sum()):
+        whole = float(along[np.argmax(np.abs(along) > 0.5 * np.abs(along).max())])
+    return np.asarray(np.copysign(1.0, whole) * mode)
 
 
 @njit()
