@@ -20,7 +20,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import Elements, twist_angles
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
 from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.sparse_ldl import SingularError
@@ -83,8 +83,9 @@ class ArcLength:
         problem = self._loaded.problem
         self.length = problem.length
         self.is_node = np.isin(np.arange(len(unloaded.state)), problem.stretch.blocks)
-        edge = float(problem.stretch.rest_lengths.mean()) if len(problem.stretch.blocks) else 1.0
-        self._unit = np.where(self.is_node, 1.0, edge)[:, None]  # other blocks are angles: they count as small lengths
+        edge = float(problem.stretch.rest_lengths.mean()) if len(problem.stretch.blocks) else self.length
+        angles = twist_angles(problem.elements, len(unloaded.state))
+        self._unit = np.where(angles, edge, 1.0)[:, None]  # angles count as small lengths
         self._weight = self._unit**2 / max(1, int(self.is_node.sum()))
         self._per_factor = PER_FACTOR * self.length
         self._scale = np.empty(0)
@@ -251,7 +252,7 @@ class ArcLength:
                     off = self.inner(normal, first - state - motion) + rise * (begin - factor)
                     more = off / (self.inner(normal, along) + rise)
                     motion = motion + more * along
-                moved = float(np.abs(motion).max()) / length
+                moved = self.reach(motion) / length
                 if not self.reach(state + motion - first) <= near:
                     return None
                 stalled = chord and moved > SLOW * last
@@ -266,7 +267,7 @@ class ArcLength:
                 elements = loaded.load.elements(elements, state, factor)
                 last, chord = moved, moved < CHORD
                 if (moved < SETTLED or at_round_off) and changed < SETTLED_FORCE:
-                    since = float(np.abs(state - at).max()) / length, float(np.abs(forces - axial).max()) / size
+                    since = self.reach(state - at) / length, float(np.abs(forces - axial).max()) / size
                     if since[0] > SAME_STIFFNESS[0] or since[1] > SAME_STIFFNESS[1]:
                         tangent, along = self._tangent(elements, state, forces, factor)
                     return factor, state, forces, elements, tangent, along

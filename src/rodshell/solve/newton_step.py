@@ -19,7 +19,7 @@ from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all
 from rodshell.solve.problem import NO_CURVATURE, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
-from rodshell.solve.tangent import generic, negative_mode, orthonormal, subspace_iteration
+from rodshell.solve.tangent import generic, subspace_iteration
 
 # A motion is measured by `Problem.unit`: shares of the length, or turns
 TOLERANCE = 1e-13  # motion: estimate of the error that is left
@@ -38,7 +38,8 @@ AGAIN = 3.0  # times as much of the last change as that was of the one before: t
 CHORD = 5e-3  # motion: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
-CLOSE, BESIDE = 1e-3, 3  # accuracy of a single negative eigenvalue; vectors that are iterated for it
+CLOSE, SWEEPS, BESIDE = 1e-3, 12, 3  # accuracy of a single negative eigenvalue; iterations; vectors that are iterated
+LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eigenvalues may be round-off
 SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
 TINY = 1e-300  # no step is shorter, except zero
 
@@ -252,9 +253,9 @@ class NewtonStep:
         """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated, its largest motion 1; to the
         side on which it goes up on the whole, so that every run, size and heading of a structure has the same."""
         regular = self._count_negative_modes()
-        row = self._single_mode(regular)[0]
+        row = self._single_mode(regular, 0.0)[0]
         if row is None:
-            self._shift_until_definite()
+            self._shift_until_definite(True)
             row = self._inverse_iteration(12)[0]
         mode = self._free.expand(row)
         return upwards(mode / self._reach(mode))
@@ -278,9 +279,9 @@ class NewtonStep:
         self._longest = min(LONGER * self._longest, LONGEST_STEP)
         self._shifted = self.negative_modes > 0
         if self.negative_modes:
-            lowest = self._single_mode(regular)[1]
-            if not lowest or self._factor_shifted(-2.0 * lowest):
-                self._shift_until_definite()
+            lowest = self._single_mode(regular, CLOSE)[1]
+            if not lowest or self._factor_shifted(max(-2.0 * lowest, LEAST_SHIFT * self._softest)):
+                self._shift_until_definite(descend)
         return self._solve(right)
 
     def _count_negative_modes(self) -> bool:
@@ -295,26 +296,22 @@ class NewtonStep:
             return False
         return True
 
-    def _single_mode(self, factored: bool) -> tuple[Floats | None, float]:
+    def _single_mode(self, factored: bool, accuracy: float) -> tuple[Floats | None, float]:
         """Eigenvector (dofs,) of the only negative eigenvalue, by the factors of the Hessian itself, and a bound from
         below, next to it however near to zero it is [J]; None and 0 where there are several, or it is not `factored`."""
         if not factored or self.negative_modes != 1:
             return None, 0.0
 
-        energy = self._softest
-
-        def inverse(x: Floats) -> Floats:
-            return energy / self._units * self._solve(x / self._units)
-
         start = generic(self._free.size, BESIDE)
         if self._mode is not None:
             start[0] = self._mode
-        try:
-            self._mode = row = orthonormal(negative_mode(inverse, start, tolerance=CLOSE)[None])[0]
-        except RuntimeError:  # ARPACK's
+        softness, (row, *_), _ = subspace_iteration(
+            lambda x: -self._solve(x / self._units) / self._units, start, settled=1, tolerance=accuracy, most_sweeps=SWEEPS
+        )
+        if softness[0] <= 0:
             return None, 0.0
-        softness = float(np.vdot(row, inverse(row)))
-        return (row * self._units, energy / softness) if softness < 0 else (None, 0.0)
+        self._mode = row
+        return row * self._units, -1.0 / float(softness[0])
 
     @property
     def _softest(self) -> float:
@@ -323,18 +320,28 @@ class NewtonStep:
         slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
         return slender**4 * float((bending * units**2).mean())
 
-    def _shift_until_definite(self) -> None:
+    def _shift_until_definite(self, down: bool) -> None:
         """Factorise with the diagonal shifted by about twice the most negative eigenvalue, motions in their units.
 
         A Newton step then doubles what the state has of its mode. The search begins where a wave as long as the
-        shell is soft against the bending of an edge, or below the last shift that sufficed.
+        shell is soft against the bending of an edge, or below the last shift that sufficed, and goes up; first `down`,
+        next to a saddle, whose mode may be much softer.
         """
-        shift, tries = max(self._softest, self._shift / SHIFT_GROWTH), 0
-        while self._factor_shifted(shift) and tries < 40:
+        softest = self._softest
+        shift, tries = max(softest, self._shift / SHIFT_GROWTH), 0
+        negative = self._factor_shifted(shift)
+        while down and not negative and shift > LEAST_SHIFT * softest:
+            shift /= SHIFT_GROWTH
+            negative = self._factor_shifted(shift)
+        while negative and tries < 40:
             shift, tries = SHIFT_GROWTH * shift, tries + 1
-        lowest = self._inverse_iteration(4)[1] - shift
-        if 0.0 < -2.0 * lowest < 0.5 * shift and not self._factor_shifted(-2.0 * lowest):
-            shift = -2.0 * lowest
+            negative = self._factor_shifted(shift)
+        less = 2.0 * (shift - self._inverse_iteration(4)[1])  # of an eigenvalue that may be too high
+        if 0.0 < less < 0.5 * shift:
+            if self._factor_shifted(less):
+                self._factor_shifted(shift)
+            else:
+                shift = less
         self._shift = shift
 
     def _factor_shifted(self, shift: float) -> int:
