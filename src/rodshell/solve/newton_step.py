@@ -255,7 +255,7 @@ class NewtonStep:
         regular = self._count_negative_modes()
         row = self._single_mode(regular, 0.0)[0]
         if row is None:
-            self._shift_until_definite(True)
+            self._shift_until_definite(down=True)
             row = self._inverse_iteration(12)[0]
         mode = self._free.expand(row)
         return upwards(mode / self._reach(mode))
@@ -279,9 +279,7 @@ class NewtonStep:
         self._longest = min(LONGER * self._longest, LONGEST_STEP)
         self._shifted = self.negative_modes > 0
         if self.negative_modes:
-            lowest = self._single_mode(regular, CLOSE)[1]
-            if not lowest or self._factor_shifted(max(-2.0 * lowest, LEAST_SHIFT * self._softest)):
-                self._shift_until_definite(descend)
+            self._shift_until_definite()
         return self._solve(right)
 
     def _count_negative_modes(self) -> bool:
@@ -320,7 +318,7 @@ class NewtonStep:
         slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
         return slender**4 * float((bending * units**2).mean())
 
-    def _shift_until_definite(self, down: bool) -> None:
+    def _shift_until_definite(self, *, down: bool = False) -> None:
         """Factorise with the diagonal shifted by about twice the most negative eigenvalue, motions in their units.
 
         A Newton step then doubles what the state has of its mode. The search begins where a wave as long as the
