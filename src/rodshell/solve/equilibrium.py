@@ -265,7 +265,11 @@ def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
     State (n, 3) and axial forces (e,) there; `NUDGE` along the mode where the valley is not seen.
     """
     problem, state, stretch = saddle.problem, saddle.state, saddle.problem.stretch
-    shares = mode / problem.unit(len(state)) ** 2
+    shares, nudged = mode / problem.unit(len(state)) ** 2, (state + NUDGE * mode, saddle.forces)
+    try:
+        tangent = saddle.tangent
+    except SingularError:
+        return nudged
     second = np.zeros_like(state)
     for step in (PROBE, -PROBE):
         for element in (*problem.elements, stretch):
@@ -274,7 +278,7 @@ def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
         at = np.zeros_like(state)
         element.evaluate(state, at)
         second -= 2.0 * at
-    bend = saddle.tangent.solve(-second / PROBE**2)
+    bend = tangent.solve(-second / PROBE**2)
     bend -= np.vdot(shares, bend) / np.vdot(shares, mode) * mode
 
     def at_share(q: float) -> tuple[float, Floats]:
@@ -283,11 +287,11 @@ def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
 
     q, (energy, there) = NUDGE, at_share(NUDGE)
     here = saddle.energy
-    while energy >= here and q > NUDGE / 4**6: 
+    while energy >= here and q > NUDGE / 4**6:
         q *= 0.25
         energy, there = at_share(q)
     if energy >= here:
-        return state + NUDGE * mode, saddle.forces
+        return nudged
     for factor in (2.0, 0.5):
         while q * factor <= FARTHEST and (further := at_share(q * factor))[0] < energy:
             q, (energy, there) = q * factor, further
@@ -328,7 +332,10 @@ def find_stable(
     )
     tries = [first]
     if first.mode is not None:
+        counted = replace(first.report, factorizations=first.report.factorizations + 1)  # that of the tangent
+        tries[0] = first = replace(first, report=counted)
         for side in (1.0, -1.0):
+            assert first.mode is not None
             start, forces_there = beside(first, side * first.mode)
             tries.append(
                 find_equilibrium(

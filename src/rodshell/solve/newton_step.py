@@ -258,7 +258,7 @@ class NewtonStep:
             self._shift_until_definite(down=True)
             row = self._inverse_iteration(12)[0]
         mode = self._free.expand(row)
-        return upwards(mode / self._reach(mode))
+        return upwards(mode / self._unit) * self._unit / self._reach(mode)
 
     def _direction(self, right: Floats, descend: bool) -> Floats | None:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
@@ -368,7 +368,7 @@ class NewtonStep:
 
 
 def upwards(mode: Floats) -> Floats:
-    """A mode (n, 3), or its opposite: that which goes up on the whole, or first, where it goes up and down by as much;
+    """A mode (n, 3) in its units, or its opposite: that which goes up on the whole, or first, where it goes up and down by as much;
     along x or y where it does not go up."""
     size = np.abs(mode).max(axis=0)
     along = mode[:, 2 if size[2] > SIDEWAYS * size.max() else int(np.argmax(size))]
