@@ -198,7 +198,11 @@ class _Stages:
         return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
 
     def shell(self, ends: Ends) -> Shell:
-        return Shell.of(self.footprint.mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
+        mesh = self.footprint.mesh
+        shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
+        if not shell.angles:
+            return shell
+        return shell.turned(PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], self.boundary.points).turn)
 
     @property
     def length(self) -> float:

@@ -99,6 +99,25 @@ def with_frames(element: Elements, like: Elements) -> Elements:
     return replace(element, **sources)
 
 
+def turned(element: Elements, turn: Floats) -> Elements:
+    """An energy with its source frames turned about z.
+
+    Parameters
+    ----------
+    element : whose frames are turned.
+    turn : (2, 2), of rows x, y.
+    """
+    assert is_dataclass(element)
+    sources: dict[str, Any] = {}
+    for name in ("source_tangents", "source_directors"):
+        if hasattr(element, name):
+            sources[name] = getattr(element, name).copy()
+            sources[name][..., :2] @= turn
+    if hasattr(element, "bends"):
+        sources["bends"] = turned(element.bends, turn)
+    return replace(element, **sources)
+
+
 def each_gradient(elements: Elements, state: Floats) -> Floats:
     """(m, k, 3) gradient of each element alone [N, for angles N m].
 
