@@ -1,5 +1,5 @@
-"""Two fans of straight rods, rigidly joined, which no support holds. Joints that are opened bend the rods in their plane
-until, past a bifurcation, they bulge out of it to either side."""
+"""Two fans of straight rods, rigidly joined, which no support holds. Joints that are opened bend the rods in their
+plane until, past a bifurcation, they bulge out of it to either side."""
 
 from dataclasses import replace
 

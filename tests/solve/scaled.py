@@ -10,8 +10,8 @@ from math import cos, sin
 import numpy as np
 
 import rodshell as rs
-from rodshell.joints import Joint
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
+from rodshell.joints import Joint
 
 
 @dataclass(frozen=True)
@@ -66,5 +66,22 @@ def form(kind: str, joint: str, placed: Placed) -> rs.Form:
     return rs.find_form(placed.target, layout, rod(kind, size), joint=placed.joint(joint), anchor=(0.0, 0.0))
 
 
+@cache
+def cap(size: float) -> rs.PopUp:
+    """A cap over a plane edge, of tubes on pins, its ends pinned."""
+    target, layout = rs.Cap(radius=1.25 * size, base=size), rs.GridLayout.orthogonal(spacing=0.2 * size, edge=size / 15)
+    return rs.find_form(target, layout, rod(TUBE, size), joint=rs.Pin(), ends="pinned").popped["pinned"]
+
+
 def others(found: rs.PopUp, most_factorizations: int) -> OtherShapes:
     return other_shapes(found.shell, found.equilibrium, most_factorizations=most_factorizations)
+
+
+def boundary_placed(boundary: rs.Boundary, turned: float, moved: float) -> rs.Boundary:
+    """A boundary turned about z [rad], and moved along x [m]."""
+    turn = Placed(turned=turned)
+    given = {name: getattr(boundary, name) for name in ("points", "tangents", "draped", "normals")}
+    placed = {name: None if rows is None else turn(rows) for name, rows in given.items()}
+    for name in ("points", "draped"):
+        placed[name] = placed[name] + (moved, 0.0, 0.0)
+    return rs.Boundary(**placed)

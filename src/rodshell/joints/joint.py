@@ -381,7 +381,9 @@ def _to_middle(
     p, corner = _bisectors(rod_nodes, pairs, directions)
     root = np.zeros_like(compliance)  # of twice the joint's stiffness, over `firm`: this rod has half of the joint
     for k, joint in enumerate(joints):
-        shear, out, twist = (min(2.0 * value / firm[k, 0, 0], 1.0) for value in (joint.shear, joint.out_of_plane, joint.twist))
+        shear, out, twist = (
+            min(2.0 * value / firm[k, 0, 0], 1.0) for value in (joint.shear, joint.out_of_plane, joint.twist)
+        )
         if not corner[k]:
             out = twist = 0.5 * (out + twist)
         q = np.cross(UP, p[k])

@@ -38,7 +38,6 @@ AGAIN = 3.0  # times as much of the last change as that was of the one before: t
 CHORD = 5e-3  # motion: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
-CLOSE, SWEEPS, BESIDE = 1e-3, 12, 3  # accuracy of a single negative eigenvalue; iterations; vectors that are iterated
 LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eigenvalues may be round-off
 SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
 TINY = 1e-300  # no step is shorter, except zero
@@ -89,7 +88,6 @@ class NewtonStep:
         self.factorizations = 0
         self.negative_modes = 0
         self._shift = 0.0
-        self._mode: Floats | None = None  # the only negative one, that was found last
         self._longest = LONGEST_STEP
         self._nearest = np.inf  # the last step that was near
         self._shifted = False  # the last step was one of the shifted Hessian
@@ -132,7 +130,8 @@ class NewtonStep:
 
         Returns
         -------
-        Length of the step (largest motion of a block, over its unit), the next state and forces, and how far these are from matching the strains [-].
+        Length of the step (`Problem.unit`), the next state and forces, and how far these are from matching the strains
+        [-].
 
         Raises
         ------
@@ -250,14 +249,10 @@ class NewtonStep:
         return result
 
     def lowest_mode(self) -> Floats:
-        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated, its largest motion 1; to the
-        side on which it goes up on the whole, so that every run, size and heading of a structure has the same."""
-        regular = self._count_negative_modes()
-        row = self._single_mode(regular, 0.0)[0]
-        if row is None:
-            self._shift_until_definite(down=True)
-            row = self._inverse_iteration(12)[0]
-        mode = self._free.expand(row)
+        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated, its largest motion 1; to
+        the side on which it goes up on the whole, so that every run, size and heading of a structure has the same."""
+        self._shift_until_definite(down=True)
+        mode = self._free.expand(self._inverse_iteration(12)[0])
         return upwards(mode / self._unit) * self._unit / self._reach(mode)
 
     def _direction(self, right: Floats, descend: bool) -> Floats | None:
@@ -294,30 +289,6 @@ class NewtonStep:
             return False
         return True
 
-    def _single_mode(self, factored: bool, accuracy: float) -> tuple[Floats | None, float]:
-        """Eigenvector (dofs,) of the only negative eigenvalue, by the factors of the Hessian itself, and a bound from
-        below, next to it however near to zero it is [J]; None and 0 where there are several, or it is not `factored`."""
-        if not factored or self.negative_modes != 1:
-            return None, 0.0
-
-        start = generic(self._free.size, BESIDE)
-        if self._mode is not None:
-            start[0] = self._mode
-        softness, (row, *_), _ = subspace_iteration(
-            lambda x: -self._solve(x / self._units) / self._units, start, settled=1, tolerance=accuracy, most_sweeps=SWEEPS
-        )
-        if softness[0] <= 0:
-            return None, 0.0
-        self._mode = row
-        return row * self._units, -1.0 / float(softness[0])
-
-    @property
-    def _softest(self) -> float:
-        """How soft a wave as long as the shell is against the bending of an edge [J]."""
-        bending, units = np.einsum("mii->mi", self._hessians[0]), self._unit[self._blocks[0], 0].repeat(3, axis=1)
-        slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
-        return slender**4 * float((bending * units**2).mean())
-
     def _shift_until_definite(self, *, down: bool = False) -> None:
         """Factorise with the diagonal shifted by about twice the most negative eigenvalue, motions in their units.
 
@@ -325,7 +296,9 @@ class NewtonStep:
         shell is soft against the bending of an edge, or below the last shift that sufficed, and goes up; first `down`,
         next to a saddle, whose mode may be much softer.
         """
-        softest = self._softest
+        bending, units = np.einsum("mii->mi", self._hessians[0]), self._unit[self._blocks[0], 0].repeat(3, axis=1)
+        slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
+        softest = slender**4 * float((bending * units**2).mean())
         shift, tries = max(softest, self._shift / SHIFT_GROWTH), 0
         negative = self._factor_shifted(shift)
         while down and not negative and shift > LEAST_SHIFT * softest:
@@ -368,8 +341,8 @@ class NewtonStep:
 
 
 def upwards(mode: Floats) -> Floats:
-    """A mode (n, 3) in its units, or its opposite: that which goes up on the whole, or first, where it goes up and down by as much;
-    along x or y where it does not go up."""
+    """A mode (n, 3) in its units, or its opposite: that which goes up on the whole, or first, where it goes up and
+    down by as much; along x or y where it does not go up."""
     size = np.abs(mode).max(axis=0)
     along = mode[:, 2 if size[2] > SIDEWAYS * size.max() else int(np.argmax(size))]
     whole = float(along.sum())
