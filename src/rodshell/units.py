@@ -139,7 +139,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "kg/m": (1e-18, 1e9),
     "kgm": (1e-30, 1e9),
     "kg/m2": (1e-9, 1e9),
-    "kg/m3": (1e-6, 1e6),
+    "kg/m3": (1e-6, 1e12),
     "m/s2": (1e-9, 1e6),
     "N": (1e-18, 1e18),
     "N/m": (1e-12, 1e15),

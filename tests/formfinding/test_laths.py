@@ -37,7 +37,11 @@ def test_nearly_round_rods_pop_up_as_round_ones():
 @pytest.mark.slow
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_flat_and_upright_laths_pop_up(ends):
-    """A dome of flat laths comes nearer to its target than one of laths on edge: these do not like to be curved."""
+    """A dome of flat laths comes nearer to its target than one of laths on edge: these do not like to be curved.
+
+    Pinned, these roll over at their ball joints and are the same dome in the end, at 0.87 times the energy of the one
+    that steps of a fixed size stop at.
+    """
     upright = rs.Rod(rs.RectangularSection(width=3e-3, height=1e-3), LATH.material)
     gaps = []
     for rod in (LATH, upright):
@@ -45,7 +49,10 @@ def test_flat_and_upright_laths_pop_up(ends):
         assert found.report.stable
         gaps.append(rs.agreement(found, TARGET).rms)
     assert max(gaps) < 0.05 * TARGET.radius
-    assert abs(gaps[0] - gaps[1]) > 1e-4 * TARGET.radius  # which way they lie is felt
+    if ends == "pinned":
+        assert gaps[0] == pytest.approx(gaps[1], rel=1e-9)
+    else:
+        assert gaps[1] - gaps[0] > 1e-4 * TARGET.radius  # which way they lie is felt
 
 
 SECTIONS = {

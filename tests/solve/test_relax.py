@@ -98,7 +98,7 @@ def test_shell_that_newtons_method_loses_pops_up_by_sliding(monkeypatch):
     monkeypatch.setattr(popup_module, "MOST_AT_ONCE", 10)
     rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
     layout = rs.GridLayout.orthogonal(rods="auto", spacing=0.03, length="auto", edge=0.01)
-    trimmed = rs.trim(rs.drape(layout, rod, rs.Paraboloid(radius=0.1, height=0.35)))
+    trimmed = rs.trim(rs.drape(layout, rod, rs.Paraboloid(radius=0.1, height=0.4)))
     footprint = rs.map_back(trimmed)
     popped = rs.pop_up(footprint, trimmed.boundary, rod, ends="pinned")
     assert popped.report.stable

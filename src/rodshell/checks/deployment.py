@@ -341,7 +341,7 @@ class _Path:
 
     def _problem(self, share: float, elements: tuple[Elements, ...]) -> Problem:
         goals = (1 - share) * self._first + share * self._last
-        return Problem.of_shell(self.shell, self._positions, goals=goals, elements=elements, pattern=self._pattern)
+        return Problem.of_shell(self.shell, self._last, goals=goals, elements=elements, pattern=self._pattern)
 
 
 def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
@@ -366,7 +366,7 @@ def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
 
     def problem_at(t: float) -> Problem:
         goals = np.vstack([ends, ends + reach * turned(now, outward, t)])
-        return Problem.of_shell(shell, pinned.positions, goals=goals, elements=elements, pattern=pattern)
+        return Problem.of_shell(shell, ends, goals=goals, elements=elements, pattern=pattern)
 
     first = find_equilibrium(problem_at(0.0), start, pinned.forces)
     if not first.report.stable:

@@ -145,13 +145,13 @@ class _Search:
         for size in KICKS:
             for mode in modes:
                 for side in (1.0, -1.0):
-                    yield size, self.found.state + side * size * self.length * mode
+                    yield size, self.found.state + side * size * mode
             if self.image is None and size == KICKS[0]:
                 yield 0.0, self._through()
         for _ in range(MIXTURES):
             mixture = np.tensordot(random.standard_normal(len(modes)), modes, 1)
-            mixture /= np.linalg.norm(mixture[nodes], axis=2).max()
-            yield KICKS[-1], self.found.state + KICKS[-1] * self.length * mixture
+            mixture *= self.found.problem.length / np.linalg.norm(mixture[nodes], axis=2).max()
+            yield KICKS[-1], self.found.state + KICKS[-1] * mixture
 
     def go(self, start: Floats, kick: float, most: int) -> None:
         """Down from a start; keeps a shape that is new. The mirror image has the same axial forces."""
@@ -170,11 +170,12 @@ class _Search:
             self.shapes.append(OtherShape(self._apart(positions, self.positions), energy, from_flat, mirror, positions))
 
     def _modes(self) -> list[Floats]:
-        """The softest modes, the farthest node going by 1."""
+        """The softest modes, the farthest node going by the shell's mean radius."""
         mass = self.shell.mass if self.shell.mass.any() else None
         modes = self.found.tangent.lowest_modes(MODES, mass=mass, tolerance=0.0, most_sweeps=MODE_SWEEPS, guards=2)
         self.factorizations += MODES_COST
-        return [mode / np.linalg.norm(mode[self.shell.stretch.blocks], axis=2).max() for mode in modes.shapes]
+        nodes, length = self.shell.stretch.blocks, self.found.problem.length
+        return [mode * (length / np.linalg.norm(mode[nodes], axis=2).max()) for mode in modes.shapes]
 
     def _through(self) -> Floats:
         """Each node mirrored in the surface that the supports span, across their plane; the supports stay. So are the

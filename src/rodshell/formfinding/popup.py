@@ -29,7 +29,7 @@ from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
-from rodshell.solve.problem import Pattern, Problem, Supports, half_width
+from rodshell.solve.problem import Pattern, Problem, Supports, mean_radius
 from rodshell.units import length_text
 from rodshell.validation import choice, instance, whole
 
@@ -178,10 +178,9 @@ def pop_up(
         if ends == "clamped" and found.report.converged:
             shell, found = stages.turn_clamps(shell, found)
     shell = shell.with_elements(found.elements)
-    held = replace(found.problem, length=half_width(shell.positions(found.state)))
     if start == "flat":  # the ends have arrived
-        held = replace(held, constraint=Supports(shell.held_ends()))
-    return PopUp(ends, start, footprint, boundary, shell, replace(found, problem=held))
+        found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
+    return PopUp(ends, start, footprint, boundary, shell, found)
 
 
 @dataclass(frozen=True)
@@ -200,12 +199,16 @@ class _Stages:
         return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
 
     def shell(self, ends: Ends) -> Shell:
-        return Shell.of(self.footprint.mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
+        mesh = self.footprint.mesh
+        shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
+        if not shell.angles:
+            return shell
+        return shell.turned(PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], self.boundary.points).turn)
 
     @property
     def length(self) -> float:
-        """Characteristic length: half the boundary's width [m]."""
-        return half_width(self.boundary.points)
+        """Characteristic length: the boundary's mean radius [m]."""
+        return mean_radius(self.boundary.points)
 
     @property
     def most_modes(self) -> int | None:

@@ -405,6 +405,7 @@ class LinkerBend:
     signs: Floats
     bends: BendTwist
 
+    angle_columns = 1, 3
     __repr__ = brief
 
     @staticmethod

@@ -368,18 +368,20 @@ def _to_middle(
 ) -> Floats:
     """(m, 3, 3) stiffness between the edges of the joint's rod `side` and the joint's middle, in x, y, z [N m]."""
     compliance = _compliance(rod_nodes, pairs[:, side], directions[:, side], rod_stiffness)
-    firm = FIRM / np.linalg.eigvalsh(compliance)[:, 0]
+    firm = (FIRM / np.linalg.eigvalsh(compliance)[:, 0])[:, None, None]
     p, corner = _bisectors(rod_nodes, pairs, directions)
-    root = np.zeros_like(compliance)  # square root of twice the joint's stiffness: this rod has half of the joint
+    root = np.zeros_like(compliance)  # of twice the joint's stiffness, over `firm`: this rod has half of the joint
     for k, joint in enumerate(joints):
-        shear, out, twist = (min(2.0 * value, firm[k]) for value in (joint.shear, joint.out_of_plane, joint.twist))
+        shear, out, twist = (
+            min(2.0 * value / firm[k, 0, 0], 1.0) for value in (joint.shear, joint.out_of_plane, joint.twist)
+        )
         if not corner[k]:
             out = twist = 0.5 * (out + twist)
         q = np.cross(UP, p[k])
         root[k] = (
             np.sqrt(shear) * np.outer(UP, UP) + np.sqrt(twist) * np.outer(p[k], p[k]) + np.sqrt(out) * np.outer(q, q)
         )
-    return np.asarray(root @ np.linalg.inv(np.eye(3) + root @ compliance @ root) @ root)
+    return np.asarray(firm * (root @ np.linalg.inv(np.eye(3) + root @ (firm * compliance) @ root) @ root))
 
 
 def _compliance(rod_nodes: RodNodes, here: Ints, along: Floats, rod_stiffness: Floats) -> Floats:

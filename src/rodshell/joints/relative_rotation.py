@@ -99,6 +99,10 @@ class RelativeRotation:
             )
         )  # fmt: skip
 
+    @property
+    def angle_columns(self) -> Ints:
+        return self.legs[:, 2]
+
     def refreshed(self, state: Floats) -> Self:
         """The same joints with their source frames at `state` (N, 3)."""
         return with_source(self, state)

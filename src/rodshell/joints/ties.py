@@ -186,6 +186,10 @@ class OffsetTie:
             )
         )  # fmt: skip
 
+    @property
+    def angle_columns(self) -> Ints:
+        return self.legs[:, 2]
+
     def refreshed(self, state: Floats) -> Self:
         """The same ties with their source frames at `state` (N, 3)."""
         return with_source(self, state)

@@ -11,7 +11,7 @@ Eccentric joints lay the rods in two layers, whose mesh gives each rod its own n
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -40,7 +40,7 @@ from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
 from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements, Stretch, with_frames
+from rodshell.rods.elements import Elements, Stretch, turned, with_frames
 from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.section import Rod
 from rodshell.validation import flag, instance
@@ -72,6 +72,7 @@ class Shell:
     edge_mass : (e,) mass of each edge [kg].
     edge_inertia : (e,) moment of inertia of each edge about its tangent [kg m2].
     joint_mass : (c,) mass of each crossing's joint [kg].
+    turn : (2, 2) how the flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
 
     mesh: GridMesh
@@ -88,6 +89,7 @@ class Shell:
     edge_mass: Floats
     edge_inertia: Floats
     joint_mass: Floats
+    turn: Floats = field(default_factory=lambda: np.eye(2))
 
     def __repr__(self) -> str:
         ends = "clamped" if len(self.ghosts) else "pinned"
@@ -229,6 +231,17 @@ class Shell:
         count = len(self.within)
         return replace(self, within=elements[:count], between=elements[count:])
 
+    def turned(self, turn: Floats) -> "Shell":
+        """The same shell of a flat grid that is turned in its plane, so that no edge of a shell that lies the other way
+        round has to be turned right round from there.
+
+        Parameters
+        ----------
+        turn : (2, 2), of rows x, y.
+        """
+        frames = self.with_elements(tuple(turned(element, turn) for element in self.elements))
+        return replace(frames, turn=self.turn @ turn)
+
     def with_frames_of(self, elements: tuple[Elements, ...]) -> "Shell":
         """The same shell with the source frames of another one, so that twist angles mean the same in both.
 
@@ -246,6 +259,7 @@ class Shell:
         """Set the twist angles so that the first directors are as near to the normals as they can be."""
         flat = self.mesh.flat[self.mesh.edges]
         before, now = (unit(np.diff(ends, axis=1)[:, 0]) for ends in (flat, state[self.stretch.blocks]))
+        before[:, :2] @= self.turn
         moved = parallel_transport(adapted(np.broadcast_to(UP, before.shape), before), before, now)
         wanted = adapted(unit(normals[self.mesh.edges].sum(axis=1)), now)
         self.turn_edges(state, signed_angle(moved, wanted, now))

@@ -22,7 +22,7 @@ from rodshell.refining.structure import Point
 from rodshell.rods.elements import Elements, Stressed, Stretch, add_product
 from rodshell.solve.modes import LinearBuckling, linear_buckling
 
-STEP, MOST_MOVED = 1e-3, 1e-4  # of a logarithm, and of the length: differences of fourth order are then exact to 1e-7
+STEP, MOST_MOVED = 1e-3, 1e-4  # of a logarithm, and a motion: differences of fourth order are then exact to 1e-7
 Energies = tuple[Elements, ...]
 LARGEST = 1e3  # times a load: factors above are not looked for
 
@@ -144,8 +144,8 @@ class _Loaded:
         """Derivative by parameter k of a function of the energies, the edges and the state a step ahead, and that step;
         by differences of fourth order."""
         here, rows, motion = self.here, self._rows[k], self.here.response.motions[k]
-        farthest, length = float(np.abs(motion).max()), here.equilibrium.problem.length
-        unit = min(STEP / max(float(np.abs(rows).max()), 1e-12), MOST_MOVED * length / max(farthest, 1e-300))
+        farthest = float(np.abs(motion / here.equilibrium.problem.unit(len(motion))).max())
+        unit = min(STEP / max(float(np.abs(rows).max()), 1e-12), MOST_MOVED / max(farthest, 1e-300))
         result = 0.0
         for count, weight in ((1.0, 8.0), (2.0, -1.0)):
             for step in (count * unit, -count * unit):

@@ -68,6 +68,7 @@ class BendTwist:
     source_directors: Floats
     source_twist: Floats
 
+    angle_columns = 1, 3
     __repr__ = brief
 
     @classmethod
@@ -196,7 +197,7 @@ class BendTwist:
         return type(self)(*same, tangents, directors, twist)  # not `replace`, which is slow at each step of a motion
 
 
-PROBE = 1e-5  # of the shortest edge: displacement over which the change of strains is taken; good to 1e-9
+PROBE = 1e-5  # of the shortest edge, or rad: motion over which the change of strains is taken; good to 1e-9
 
 
 def strain_rates(elements: BendTwist, state: Floats, motion: Floats) -> Floats:
@@ -207,11 +208,12 @@ def strain_rates(elements: BendTwist, state: Floats, motion: Floats) -> Floats:
     elements : their source frames being at, or near, the state.
     state, motion : (N, 3) [m, rad].
     """
-    largest = float(np.abs(motion[elements.blocks]).max(initial=0.0))
+    apart, moved = state[elements.blocks[:, 2:5:2]] - state[elements.blocks[:, 0:3:2]], np.abs(motion[elements.blocks])
+    moved[:, ::2] /= np.linalg.norm(apart, axis=2).min(initial=np.inf)
+    largest = float(moved.max(initial=0.0))
     if largest == 0:
         return np.zeros((len(elements.blocks), 3))
-    apart = state[elements.blocks[:, 2:5:2]] - state[elements.blocks[:, 0:3:2]]
-    step = PROBE * float(np.linalg.norm(apart, axis=2).min()) / largest
+    step = PROBE / largest
     ahead, behind = (elements.strains(state + side * step * motion) for side in (1.0, -1.0))
     return np.asarray((ahead - behind) / (2 * step))
 

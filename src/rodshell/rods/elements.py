@@ -16,6 +16,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.dataclass import dataclass
@@ -73,6 +74,14 @@ class Stressed(Elements, Protocol):
         ...
 
 
+def twist_angles(sets: Sequence[Elements], count: int) -> NDArray[np.bool_]:
+    """(count,) which blocks are twist angles: those in the columns of `blocks` that elements name `angle_columns`."""
+    result = np.zeros(count, dtype=bool)
+    for elements in sets:
+        result[elements.blocks[:, getattr(elements, "angle_columns", ())]] = True
+    return result
+
+
 def with_frames(element: Elements, like: Elements) -> Elements:
     """An energy with the source frames of another one.
 
@@ -87,6 +96,25 @@ def with_frames(element: Elements, like: Elements) -> Elements:
     }
     if hasattr(element, "bends"):
         sources["bends"] = with_frames(element.bends, like.bends)
+    return replace(element, **sources)
+
+
+def turned(element: Elements, turn: Floats) -> Elements:
+    """An energy with its source frames turned about z.
+
+    Parameters
+    ----------
+    element : whose frames are turned.
+    turn : (2, 2), of rows x, y.
+    """
+    assert is_dataclass(element)
+    sources: dict[str, Any] = {}
+    for name in ("source_tangents", "source_directors"):
+        if hasattr(element, name):
+            sources[name] = getattr(element, name).copy()
+            sources[name][..., :2] @= turn
+    if hasattr(element, "bends"):
+        sources["bends"] = turned(element.bends, turn)
     return replace(element, **sources)
 
 

@@ -20,11 +20,11 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import Elements, twist_angles
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
 from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, negative_mode, orthonormal, subspace_iteration
+from rodshell.solve.tangent import Tangent, generic, negative_mode, orthonormal, subspace_iteration
 
 MODES = 4  # lowest ones that are looked at
 MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative error of the lowest eigenvalue: modes only say how far to go
@@ -83,8 +83,9 @@ class ArcLength:
         problem = self._loaded.problem
         self.length = problem.length
         self.is_node = np.isin(np.arange(len(unloaded.state)), problem.stretch.blocks)
-        edge = float(problem.stretch.rest_lengths.mean()) if len(problem.stretch.blocks) else 1.0
-        self._unit = np.where(self.is_node, 1.0, edge)[:, None]  # other blocks are angles: they count as small lengths
+        edge = float(problem.stretch.rest_lengths.mean()) if len(problem.stretch.blocks) else self.length
+        angles = twist_angles(problem.elements, len(unloaded.state))
+        self._unit = np.where(angles, edge, 1.0)[:, None]  # angles count as small lengths
         self._weight = self._unit**2 / max(1, int(self.is_node.sum()))
         self._per_factor = PER_FACTOR * self.length
         self._scale = np.empty(0)
@@ -251,7 +252,7 @@ class ArcLength:
                     off = self.inner(normal, first - state - motion) + rise * (begin - factor)
                     more = off / (self.inner(normal, along) + rise)
                     motion = motion + more * along
-                moved = float(np.abs(motion).max()) / length
+                moved = self.reach(motion) / length
                 if not self.reach(state + motion - first) <= near:
                     return None
                 stalled = chord and moved > SLOW * last
@@ -266,7 +267,7 @@ class ArcLength:
                 elements = loaded.load.elements(elements, state, factor)
                 last, chord = moved, moved < CHORD
                 if (moved < SETTLED or at_round_off) and changed < SETTLED_FORCE:
-                    since = float(np.abs(state - at).max()) / length, float(np.abs(forces - axial).max()) / size
+                    since = self.reach(state - at) / length, float(np.abs(forces - axial).max()) / size
                     if since[0] > SAME_STIFFNESS[0] or since[1] > SAME_STIFFNESS[1]:
                         tangent, along = self._tangent(elements, state, forces, factor)
                     return factor, state, forces, elements, tangent, along
@@ -312,7 +313,7 @@ class ArcLength:
         def inverse(row: Floats) -> Floats:
             return tangent.factors.solve(row / scale) / scale
 
-        start = self._generic(size, MODES) if point.modes is None else point.modes / scale
+        start = generic(size, MODES) if point.modes is None else point.modes / scale
         mode = tangent.freedom.expand(negative_mode(inverse, start, tolerance=LOSING_CLOSE) * scale)
         return np.asarray(mode / self.reach(mode))
 
@@ -384,17 +385,12 @@ class ArcLength:
         scale, size = self._scale, tangent.freedom.size
         inverse, rows, _ = subspace_iteration(
             lambda row: tangent.factors.solve(row / scale) / scale,
-            self._generic(size, MODES) if start is None else start / scale,
+            generic(size, MODES) if start is None else start / scale,
             settled=1,
             tolerance=MODES_CLOSE,
             most_sweeps=MOST_SWEEPS,
         )
         return 1.0 / inverse, orthonormal(rows) * scale
-
-    @staticmethod
-    def _generic(size: int, count: int) -> Floats:
-        """(count, size) rows, or fewer, to begin an iteration with: no symmetry of the shell is one of them."""
-        return np.asarray(np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None]))
 
 
 def _products(a: Sequence[Floats] | Floats, b: Floats) -> Floats:

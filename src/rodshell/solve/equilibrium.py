@@ -115,7 +115,9 @@ STRAIN_TOLERANCE = 2e-6
 REPEATED, ALIKE = 12, 1e-3  # steps; and how near to each other
 MOST_ITERATIONS = 60
 LONGEST_SLIDE = 120  # iterations off a saddle
-NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
+NUDGE = 0.01  # motion along the mode of an unstable equilibrium where the search for the lowest energy begins
+FARTHEST = 0.16  # where it ends
+PROBE = 1e-3  # motion of the differences of gradients
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +132,8 @@ class Equilibrium:
     forces : (e,) axial forces [N].
     gradient : (n, 3) of energy and load, without constraint forces [N].
     report : figures of the solve.
-    mode : (n, 3) where the state is not stable, the direction of the most negative curvature, its largest displacement
-        being 1; else None.
+    mode : (n, 3) where the state is not stable, the direction of the most negative curvature, its largest motion being
+        1 (`Problem.unit`); else None.
     """
 
     problem: Problem
@@ -187,7 +189,7 @@ def find_equilibrium(
         are shortened instead.
     most_modes : where the start has more negative modes, it is given up at once (BUCKLED); None: never.
     most_iterations : chord steps in a row count as one.
-    progress : called with the number and the length of each step, over the characteristic length; an OutOfTimeError
+    progress : called with the number and the length of each step, as the solver measures it; an OutOfTimeError
         that it raises ends the solve with that status.
     """
     begin = time.perf_counter()
@@ -209,7 +211,7 @@ def find_equilibrium(
         state, forces = state_next, forces_next
         if progress is not None and counted:
             try:
-                progress(step.iterations, moved / problem.length)
+                progress(step.iterations, moved)
             except OutOfTimeError as late:
                 reason = str(late)
         if step.settled and mismatch < STRAIN_TOLERANCE:
@@ -222,6 +224,7 @@ def find_equilibrium(
         if _repeats(steps):
             break
         step.refresh(state)
+    mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     gradient = step.gradient(state, forces)
     residual = problem.constraint.freedom(state).reduce(gradient)
     report = SolveReport(
@@ -235,7 +238,6 @@ def find_equilibrium(
         negative_modes=step.negative_modes,
         reason=reason if status is Status.OUT_OF_TIME else "",
     )
-    mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     step.refresh(state)
     solved = replace(problem, elements=step.elements, pattern=step.pattern)
     return Equilibrium(solved, state, forces, gradient, report, mode)
@@ -245,6 +247,55 @@ def _repeats(steps: list[float]) -> bool:
     """Whether the last `REPEATED` steps are as long as those two before: back and forth between two states."""
     last = np.array(steps[-REPEATED - 2 :])
     return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
+
+
+def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
+    """Where the energy is lowest along the valley that leaves an unstable equilibrium along its mode.
+
+    The valley is x = x0 + q v + q^2 w / 2 + ..., K w = -E'''[v, v] across v [Koiter 1945]: of thin rods the mode alone
+    would stretch the edges, which hides how deep it is.
+
+    Parameters
+    ----------
+    saddle : the unstable equilibrium.
+    mode : (n, 3) v, its largest motion 1.
+
+    Returns
+    -------
+    State (n, 3) and axial forces (e,) there; `NUDGE` along the mode where the valley is not seen.
+    """
+    problem, state, stretch = saddle.problem, saddle.state, saddle.problem.stretch
+    shares, nudged = mode / problem.unit(len(state)) ** 2, (state + NUDGE * mode, saddle.forces)
+    try:
+        tangent = saddle.tangent
+    except SingularError:
+        return nudged
+    second = np.zeros_like(state)
+    for step in (PROBE, -PROBE):
+        for element in (*problem.elements, stretch):
+            element.evaluate(state + step * mode, second)
+    for element in (*problem.elements, stretch):
+        at = np.zeros_like(state)
+        element.evaluate(state, at)
+        second -= 2.0 * at
+    bend = tangent.solve(-second / PROBE**2)
+    bend -= np.vdot(shares, bend) / np.vdot(shares, mode) * mode
+
+    def at_share(q: float) -> tuple[float, Floats]:
+        there = problem.constraint.retract(state + q * mode + 0.5 * q**2 * bend)
+        return problem.potential(there), there
+
+    q, (energy, there) = NUDGE, at_share(NUDGE)
+    here = saddle.energy
+    while energy >= here and q > NUDGE / 4**6:
+        q *= 0.25
+        energy, there = at_share(q)
+    if energy >= here:
+        return nudged
+    for factor in (2.0, 0.5):
+        while q * factor <= FARTHEST and (further := at_share(q * factor))[0] < energy:
+            q, (energy, there) = q * factor, further
+    return there, stretch.stiffness * stretch.strains(there)
 
 
 def find_stable(
@@ -281,13 +332,16 @@ def find_stable(
     )
     tries = [first]
     if first.mode is not None:
+        counted = replace(first.report, factorizations=first.report.factorizations + 1)  # that of the tangent
+        tries[0] = first = replace(first, report=counted)
         for side in (1.0, -1.0):
-            start = first.state + side * NUDGE * problem.length * first.mode
+            assert first.mode is not None
+            start, forces_there = beside(first, side * first.mode)
             tries.append(
                 find_equilibrium(
                     first.problem,
                     start,
-                    first.forces,
+                    forces_there,
                     descend=True,
                     most_iterations=min(2 * most_iterations, LONGEST_SLIDE),
                     progress=progress,

@@ -27,11 +27,11 @@ from rodshell.model import Assembly, Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.sparse_ldl import Factors, Qdldl, SingularError
+from rodshell.solve.tangent import FIRST_SHIFT, generic
 
 NO_NODES = np.empty(0, dtype=np.intp)
 LONGEST, SHORTEST = 1e6, 1e-15  # [s]; what is stable beyond has no limit, what is not even below never is
 DIGITS = 1e-10  # of the limit
-SHIFT = 10.0  # [1/s2]: first guess of a shift below all slowest modes
 GROWTH = 10.0  # of the shift, until nothing is below it
 
 
@@ -167,14 +167,14 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     stiffness = tangent_stiffness(elements, state, free)
     root = 1.0 / np.sqrt(free.reduce_diagonal(motion.mass))
     scaled = csc_matrix(diags(root) @ stiffness @ diags(root))
-    identity, shift = eye(free.size, format="csc"), SHIFT
+    identity, shift = eye(free.size, format="csc"), FIRST_SHIFT * float(np.abs(scaled.diagonal()).mean())
     upper = triu(scaled + shift * identity, format="csc")
     solver = Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64))
     while (factors := solver.factor(upper.data)).negative:
         shift *= GROWTH
         upper = triu(scaled + shift * identity, format="csc")
     inverse = LinearOperator(scaled.shape, matvec=factors.solve, dtype=float)
-    start = np.sin(1.0 + np.arange(free.size) ** 2)  # the same at every run
+    start = generic(free.size, 1)[0]
     values = eigsh(scaled, k=count, sigma=-shift, OPinv=inverse, v0=start, tol=1e-6, return_eigenvectors=False)
     return np.sort(values)
 

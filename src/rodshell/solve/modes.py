@@ -26,7 +26,7 @@ from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.problem import Pattern
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, TangentAssembly, orthonormal, subspace_iteration
+from rodshell.solve.tangent import Tangent, TangentAssembly, generic, orthonormal, subspace_iteration
 
 DENSE = 24  # unknowns up to which LAPACK solves the whole problem
 SPARE = 2  # modes that are computed beyond those asked for, so that the count has a gap to stand in
@@ -151,7 +151,7 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
         shifted = values.copy()
         shifted[assembly.pattern.assembly.diagonal] += ROUND_OFF * scale**2
         factors = assembly.pattern.solver.factor(shifted)
-    start = np.sin(1.0 + np.arange(len(scale)) ** 2)[None]
+    start = generic(len(scale), 1)
     values, rows, _ = subspace_iteration(
         lambda row: scale * factors.solve(scale * row), start, settled=1, tolerance=0.0, most_sweeps=SOFTEST
     )
@@ -254,7 +254,7 @@ def _lanczos(tangent: Tangent, matrix: csc_matrix, stiffness: csc_matrix, count:
 
     size = tangent.freedom.size
     inverse = LinearOperator((size, size), matvec=tangent.factors.solve, dtype=float)
-    start = np.sin(1.0 + np.arange(size) ** 2)  # the same at every run, and no symmetry of the structure is one of it
+    start = generic(size, 1)[0]
     try:
         with threadpool_limits(limits=1, user_api="blas"):  # others would keep ours from the processors
             values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=start, tol=ACCURACY)

@@ -19,31 +19,34 @@ from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all
 from rodshell.solve.problem import NO_CURVATURE, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
-from rodshell.solve.tangent import subspace_iteration
+from rodshell.solve.tangent import generic, subspace_iteration
 
-TOLERANCE = 1e-13  # of the length: estimate of the error that is left
+# A motion is measured by `Problem.unit`: shares of the length, or turns
+TOLERANCE = 1e-13  # motion: estimate of the error that is left
 FORCE_TOLERANCE = 1e-9  # of the largest axial force: the same for the forces, of which round-off leaves as much
 LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
 CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
 MULTIPLIERS = 5e-3  # of the last change is left in forces that are multipliers of a penalty: 2e-4 to 1e-3 measured
-LONGEST_STEP = 0.15  # of the length
+LONGEST_STEP = 0.15  # motion
 PART = 0.25  # of a step that was too long is taken
 LONGER = 2.0  # growth of the longest step after one that was not
-NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand, be it a saddle,
+NEAR = 0.02  # motion: a step this short leads to the equilibrium at hand, be it a saddle,
 NEARER = 0.5  # and at most so much of the last ones: past a limit point nothing is near, and steps do not shrink
 STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
 ELASTIC = 1 / 3  # of their last change: the next one of elastic forces after a step of Newton's, at most
 AGAIN = 3.0  # times as much of the last change as that was of the one before: the next one after a chord step, at most
-CHORD = 5e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
+CHORD = 5e-3  # motion: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
+LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eigenvalues may be round-off
+SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
 TINY = 1e-300  # no step is shorter, except zero
 
 
 @dataclass(frozen=True, eq=False)
 class _LastStep:
     """The last step, so that less of it can be taken: from where, at how many negative modes; the whole motion (n, 3),
-    `reach` [m] long, with the change (e,) of the forces; and the share taken of both."""
+    `reach` far, with the change (e,) of the forces; and the share taken of both."""
 
     state: Floats
     forces: Floats
@@ -68,6 +71,8 @@ class NewtonStep:
         self._problem, self._limit_steps, self._most_modes = problem, limit_steps, most_modes
         self.elements = problem.elements
         self._free = problem.constraint.freedom(state)
+        self._unit = problem.unit(len(state))
+        self._units = self._unit[:, 0].repeat(self._free.count)  # of the unknowns
         self._blocks = problem.blocks(len(state))
         self.pattern = problem.pattern_at(state)
         self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
@@ -125,7 +130,8 @@ class NewtonStep:
 
         Returns
         -------
-        Length of the step [m], the next state and forces, and how far these are from matching the strains [-].
+        Length of the step (`Problem.unit`), the next state and forces, and how far these are from matching the strains
+        [-].
 
         Raises
         ------
@@ -162,18 +168,18 @@ class NewtonStep:
         motion = free.expand(direction)
         if prescribed is not None:
             motion += prescribed
-        reach = float(np.sqrt(dot(motion, motion).max()))
-        if self._chord and not reach <= SLOW * self._last[0] * problem.length:  # of no use: Newton's step instead
+        reach = self._reach(motion)
+        if self._chord and not reach <= SLOW * self._last[0]:  # of no use: Newton's step instead
             self._chord = False
             return self.take(state, forces, descend)
-        share = min(1.0, self._longest * problem.length / reach) if reach > 0 else 1.0
+        share = min(1.0, self._longest / reach) if reach > 0 else 1.0
         change = base + stretch.stiffness * (strains + stretch.elongation(at, motion)) - forces
         last = _LastStep(state, forces, self.elements, self.negative_modes, motion, change, reach, share)
         state_next, forces_next = self._after(last)
         left = self.strains(state_next)
         if not problem.inextensible:
             left = left - forces_next / stretch.stiffness
-        self._judge(reach / problem.length, forces, forces_next)
+        self._judge(reach, forces, forces_next)
         return reach, state_next, forces_next, float(np.abs(left).max())
 
     def strains(self, state: Floats) -> Floats:
@@ -181,6 +187,11 @@ class NewtonStep:
         if state is not self._strained[0]:
             self._strained = state, self._problem.stretch.strains(state)
         return self._strained[1]
+
+    def _reach(self, motion: Floats) -> float:
+        """Largest motion of a block (n, 3), over its unit."""
+        shares = motion / self._unit
+        return float(np.sqrt(dot(shares, shares).max()))
 
     def _after(self, last: _LastStep) -> tuple[Floats, Floats]:
         """State and forces after a step."""
@@ -192,8 +203,8 @@ class NewtonStep:
         """As `take`, for a part of the last step in its place: no iteration of its own."""
         assert self._last_step is not None
         last = replace(self._last_step, share=PART * self._last_step.share)
-        moved, self.elements = last.share * last.reach, last.elements
-        self._longest = moved / self._problem.length
+        self._longest = moved = last.share * last.reach
+        self.elements = last.elements
         return moved, *self._after(last), np.inf
 
     def _near(self, moved: float) -> bool:
@@ -210,7 +221,7 @@ class NewtonStep:
         last = self._last_step
         if last is None or not self._limit_steps or self.negative_modes <= last.negative_modes + 1:
             return False
-        return last.share * last.reach > NEAR * self._problem.length
+        return last.share * last.reach > NEAR
 
     def _judge(self, moved: float, before: Floats, after: Floats) -> None:
         """Whether the error that is left is small enough, and whether the factorisation serves for another step.
@@ -238,10 +249,11 @@ class NewtonStep:
         return result
 
     def lowest_mode(self) -> Floats:
-        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated."""
-        self._shift_until_definite()
+        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated, its largest motion 1; to
+        the side on which it goes up on the whole, so that every run, size and heading of a structure has the same."""
+        self._shift_until_definite(down=True)
         mode = self._free.expand(self._inverse_iteration(12)[0])
-        return np.asarray(mode / np.sqrt(dot(mode, mode).max()))
+        return upwards(mode / self._unit) * self._unit / self._reach(mode)
 
     def _direction(self, right: Floats, descend: bool) -> Floats | None:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
@@ -254,7 +266,7 @@ class NewtonStep:
             raise TooManyModesError
         if self.negative_modes and regular and not descend:
             step = self._solve(right)
-            if self._near(float(np.abs(step).max()) / self._problem.length):
+            if self._near(self._reach(self._free.expand(step))):
                 self._shifted = False
                 return step
         if self._too_far():
@@ -277,26 +289,35 @@ class NewtonStep:
             return False
         return True
 
-    def _shift_until_definite(self) -> None:
-        """Factorise with the diagonal shifted by about twice the most negative eigenvalue.
+    def _shift_until_definite(self, *, down: bool = False) -> None:
+        """Factorise with the diagonal shifted by about twice the most negative eigenvalue, motions in their units.
 
         A Newton step then doubles what the state has of its mode. The search begins where a wave as long as the
-        shell is soft against the bending of an edge, or below the last shift that sufficed.
+        shell is soft against the bending of an edge, or below the last shift that sufficed, and goes up; first `down`,
+        next to a saddle, whose mode may be much softer.
         """
-        bending = self._hessians[0]
+        bending, units = np.einsum("mii->mi", self._hessians[0]), self._unit[self._blocks[0], 0].repeat(3, axis=1)
         slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
-        softest = slender**4 * float(np.trace(bending, axis1=1, axis2=2).mean()) / bending.shape[1]
+        softest = slender**4 * float((bending * units**2).mean())
         shift, tries = max(softest, self._shift / SHIFT_GROWTH), 0
-        while self._factor_shifted(shift) and tries < 40:
+        negative = self._factor_shifted(shift)
+        while down and not negative and shift > LEAST_SHIFT * softest:
+            shift /= SHIFT_GROWTH
+            negative = self._factor_shifted(shift)
+        while negative and tries < 40:
             shift, tries = SHIFT_GROWTH * shift, tries + 1
-        lowest = self._inverse_iteration(4)[1] - shift
-        if 0.0 < -2.0 * lowest < 0.5 * shift and not self._factor_shifted(-2.0 * lowest):
-            shift = -2.0 * lowest
+            negative = self._factor_shifted(shift)
+        less = 2.0 * (shift - self._inverse_iteration(4)[1])  # of an eigenvalue that may be too high
+        if 0.0 < less < 0.5 * shift:
+            if self._factor_shifted(less):
+                self._factor_shifted(shift)
+            else:
+                shift = less
         self._shift = shift
 
     def _factor_shifted(self, shift: float) -> int:
         shifted = self._data.copy()
-        shifted[self._assembly.diagonal] += shift
+        shifted[self._assembly.diagonal] += shift / self._units**2
         self.factorizations += 1
         return self._factor(shifted)
 
@@ -310,11 +331,24 @@ class NewtonStep:
         assert self._factors is not None
         return self._factors.solve(right)
 
-    def _inverse_iteration(self, steps: int) -> tuple[Floats, float]:
-        """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue."""
-        start = np.sin(1.0 + np.arange(self._free.size) ** 2)[None]  # no symmetry of the shell is one of this start
-        values, (row, *_), _ = subspace_iteration(self._solve, start, settled=1, tolerance=0.0, most_sweeps=steps)
-        return row, 1.0 / float(values[0])
+    def _inverse_iteration(self, sweeps: int) -> tuple[Floats, float]:
+        """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue [J]."""
+        start = generic(self._free.size, 1)
+        values, (row, *_), _ = subspace_iteration(
+            lambda x: self._solve(x / self._units) / self._units, start, settled=1, tolerance=0.0, most_sweeps=sweeps
+        )
+        return row * self._units, 1.0 / float(values[0])
+
+
+def upwards(mode: Floats) -> Floats:
+    """A mode (n, 3) in its units, or its opposite: that which goes up on the whole, or first, where it goes up and
+    down by as much; along x or y where it does not go up."""
+    size = np.abs(mode).max(axis=0)
+    along = mode[:, 2 if size[2] > SIDEWAYS * size.max() else int(np.argmax(size))]
+    whole = float(along.sum())
+    if abs(whole) <= SIDEWAYS * float(np.abs(along).sum()):
+        whole = float(along[np.argmax(np.abs(along) > 0.5 * np.abs(along).max())])
+    return np.asarray(np.copysign(1.0, whole) * mode)
 
 
 @njit()

@@ -38,7 +38,7 @@ SAME = 1e-3  # of the length: equilibria further apart are different ones
 FINER = 10  # steps on the way back after a snap, at most, for each of the shortest ahead
 MOST_BACK = 300  # factorisations of the way back: 2 are usual
 TINY = 1e-300
-DISTURBANCE = 1e-3  # of the length, along the mode of an unstable equilibrium, from where the energy falls
+DISTURBANCE = 1e-3  # largest motion along the mode of an unstable equilibrium, from where the energy falls
 
 
 def follow(
@@ -261,7 +261,7 @@ def _fallen(
     supports, state, forces = problem.constraint, here.state, here.forces
     assert isinstance(supports, Supports)
     if found.mode is not None:
-        state, forces = found.state + DISTURBANCE * problem.length * found.mode, found.forces
+        state, forces = found.state + DISTURBANCE * found.mode, found.forces
         problem = replace(problem, elements=found.elements)
     down = find_equilibrium(problem, state, forces, descend=True)
     if down.report.stable and surplus(here, down) < UNACCOUNTED:
@@ -278,7 +278,7 @@ def _fallen(
 FIRST = 6.0  # the first step leaves 1/36 of D in the matrix
 GROWTH, SHRINKAGE = 3.0, 0.25
 LONG, SHORT = 1e4, 1e-3  # steps that are long enough to have arrived; too short to be going anywhere
-STILL = 1e-5  # of the length: a long step that moves by less has arrived near enough for Newton's method
+STILL = 1e-5  # motion: a long step that moves by less has arrived near enough for Newton's method
 MOST_STEPS = 400
 
 
@@ -307,7 +307,7 @@ def relax(
     if problem.load is not None:
         motion = replace(motion, forces=(_Dead(problem.load),))
     stepper = ImplicitEuler(lambda blocks, free: SparseSum(blocks, free, problem.flat_coordinates))
-    still, length, factorizations, number = np.zeros_like(state), FIRST, 0, 0
+    still, unit, length, factorizations, number = np.zeros_like(state), problem.unit(len(state)), FIRST, 0, 0
     for number in range(1, MOST_STEPS + 1):
         taken = stepper.take(motion, state, still, time=0.0, step=length)
         factorizations += taken.factorizations
@@ -316,15 +316,15 @@ def relax(
             if length < SHORT:
                 break
             continue
-        moved = float(np.abs(taken.state - state).max())
+        moved = float(np.abs((taken.state - state) / unit).max())
         state = taken.state
         motion = motion.refreshed(state)
         try:
             if progress is not None:
-                progress(number, moved / problem.length)
+                progress(number, moved)
         except OutOfTimeError:
             break  # the solve that follows ends at its first iteration, and says so
-        if length > LONG and moved < STILL * problem.length:
+        if length > LONG and moved < STILL:
             break
         if most_factorizations is not None and factorizations >= most_factorizations:
             break
@@ -354,5 +354,6 @@ def _pace(problem: Problem, state: Floats) -> Floats:
         element.evaluate(state, np.zeros_like(state), hessians)
         largest = np.abs(np.einsum("mii->mi", hessians)).reshape(count, width, 3).max(axis=2)
         np.add.at(diagonal, element.blocks, largest)
-    least = 1e-6 * float(diagonal.max())
-    return np.repeat(np.maximum(diagonal, least)[:, None], 3, axis=1)
+    square = problem.unit(len(state))[:, 0] ** 2
+    least = 1e-6 * float((diagonal * square).max())
+    return np.repeat(np.maximum(diagonal, least / square)[:, None], 3, axis=1)

@@ -26,7 +26,7 @@ from rodshell.rods.elements import add_product
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.tangent import Modes, Tangent
 
-PROBE = 3e-5  # of the length: half the largest displacement of the differences in `_change_of_stiffness`
+PROBE = 3e-5  # motion: half the largest one of the differences in `_change_of_stiffness`
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +166,7 @@ class Sensitivity:
 
     def _change_of_stiffness(self, shape: Floats) -> Floats:
         """(N, 3) gradient of v'Kv by the state, for a mode v (N, 3)."""
-        step = PROBE * self.here.problem.length / float(np.abs(shape).max())
+        step = PROBE / float(np.abs(shape / self.here.problem.unit(len(shape))).max())
 
         def difference(step: float) -> Floats:
             ahead = self._product(shape, self.here.state + step * shape)

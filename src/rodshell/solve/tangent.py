@@ -323,6 +323,12 @@ def subspace_iteration(
     return values, rows, done
 
 
+def generic(size: int, count: int) -> Floats:
+    """(count, size) rows to begin an iteration with, or fewer: the same at every run, and no symmetry of a structure is
+    one of theirs."""
+    return np.asarray(np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None]))
+
+
 def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, tolerance: float) -> Floats:
     """(n,) direction of the negative eigenvalue of a symmetric matrix that is nearest to zero.
 
