@@ -577,11 +577,14 @@ def test_a_job_without_memory_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch
         rs.Job.load("hemisphere").run()
 
 
+FINE = {"layout.spacing": "20 um", "layout.edge": "auto", "rod.section.radius": "3 um"}
+
+
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
         ({"layout.rods": "4000x4000"}, "a grid of 8000 rods; at most 5000 are joined: .*, or set RODSHELL_LIMITS=2"),
-        ({"layout.spacing": "1 um", "layout.edge": "auto"}, "the net needs more than 6\\d+ x 6\\d+ lines, .*, or set"),
+        (FINE, "the net needs more than 3\\d+ x 3\\d+ lines, .*, or set"),
         ({"layout.edge": "1 um"}, "the net would have 7\\d+ x 7\\d+ nodes, .*, or set RODSHELL_LIMITS="),
     ],
 )

@@ -105,13 +105,14 @@ class Run:
 
     def table_form(self) -> Form:
         """Of a table of rods."""
-        from rodshell.checks.sizing import Fit
+        from rodshell.checks.sizing import Fit, require_likely_sizes
 
         case = self.asked
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
         fit, stages = Fit.between(ends.lengths, ends.final), None
         rod = case.rod.held.value if case.rod.held else case.rod.build(lambda: fit, strength=case.permanent_strength)
+        require_likely_sizes(rod, fit.width, ends.grid.span)
         if self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, self._table_stages)
         self._announce_rod(rod, fit)
