@@ -31,6 +31,7 @@ from rodshell.case.stage_tables import (
 from rodshell.case.target_tables import HemisphereTable, TargetTable
 from rodshell.case.values import Held, Table
 from rodshell.errors import InputError
+from rodshell.progress import Progress, silent
 from rodshell.units import length_text, shown
 
 if TYPE_CHECKING:
@@ -201,12 +202,13 @@ class Case(Table):
             return ()
         return ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
 
-    def build(self, target: "Target | None" = None) -> Built:
+    def build(self, target: "Target | None" = None, progress: Progress = silent) -> Built:
         """The objects.
 
         Parameters
         ----------
         target : the target, where it was built before.
+        progress : called before the net by whose bends the rod is chosen.
 
         Raises
         ------
@@ -238,6 +240,8 @@ class Case(Table):
             raise InputError(
                 f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
             )
+        if self.rod.left_open:
+            progress("net", "for the size of the rods", 0.0)
         rod = self.rod_on(target, layout, anchor=anchor)
         require_likely_sizes(rod, 2 * target.size, shortest)
         self.require_strength(rod, joint)

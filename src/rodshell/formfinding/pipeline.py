@@ -349,6 +349,7 @@ def pop_up_stages(
             f"the joints' eccentricity {length_text(joint.eccentricity)} would lay the rods in two layers, and a "
             "table's rods are joined at one point: leave it out"
         )
+    progress("pop-up", "meshing the rods", 0.0)
     joined = FlatGrid.of(grid.rods, margin=NEAREST_JOINT * grid.span).with_common_joints()
     kept, swinging = joined.without(lambda some: some.joint_counts() < FEWEST_JOINTS)
     if not kept.rods:
