@@ -577,11 +577,30 @@ def test_a_job_without_memory_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch
         rs.Job.load("hemisphere").run()
 
 
+def test_the_time_limit_holds_before_the_rod_is_sized_and_within_the_net(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, calls = [0.0], list[tuple[str, str]]()
+    monkeypatch.setattr("rodshell.progress.monotonic", lambda: now[-1])
+
+    def told(stage: str, detail: str, residual: float) -> None:
+        calls.append((stage, detail))
+        now.append(now[-1] + 1.0)
+
+    roof = rs.Job.load("heightfield", target__formula="1 - x^2/9 - y^2/9", target__radius="2 m")
+    for k, detail in enumerate(("for the size of the rods", "marching", "marching in long steps")):
+        now.append(0.0)
+        with pytest.raises(OutOfTimeError, match=rf"out of time after .* s in stage net \({detail}\)"):
+            roof.run(progress=told, time_limit=k + 0.5)
+    assert [detail for _, detail in calls].count("for the size of the rods") == 3
+
+
+FINE = {"layout.spacing": "20 um", "layout.edge": "auto", "rod.section.radius": "3 um"}
+
+
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
         ({"layout.rods": "4000x4000"}, "a grid of 8000 rods; at most 5000 are joined: .*, or set RODSHELL_LIMITS=2"),
-        ({"layout.spacing": "1 um", "layout.edge": "auto"}, "the net needs more than 6\\d+ x 6\\d+ lines, .*, or set"),
+        (FINE, "the net needs more than 3\\d+ x 3\\d+ lines, .*, or set"),
         ({"layout.edge": "1 um"}, "the net would have 7\\d+ x 7\\d+ nodes, .*, or set RODSHELL_LIMITS="),
     ],
 )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rodshell.case import Case
 from rodshell.case.case import Built, built
 from rodshell.case.rod_ends import RodEnds
+from rodshell.errors import OutOfTimeError
 from rodshell.form import Form, Stages
 from rodshell.formfinding import Bound, Fall, PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
@@ -87,7 +88,7 @@ class Run:
         same_target = earlier is not None and self._same(earlier, ("target",))
         if same_target and earlier is not None:
             self.target = earlier.target
-        case, found = self.asked, self.asked.build(self.target)
+        case, found = self.asked, self.asked.build(self.target, self.progress)
         self._announce_sizes(found)
         case, found, searched = self._decided(case, found)
         rod, fit, stages, tried = found.rod, None, None, found._replace(method=Bound())
@@ -105,13 +106,14 @@ class Run:
 
     def table_form(self) -> Form:
         """Of a table of rods."""
-        from rodshell.checks.sizing import Fit
+        from rodshell.checks.sizing import Fit, require_likely_sizes
 
         case = self.asked
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
         fit, stages = Fit.between(ends.lengths, ends.final), None
         rod = case.rod.held.value if case.rod.held else case.rod.build(lambda: fit, strength=case.permanent_strength)
+        require_likely_sizes(rod, fit.width, ends.grid.span)
         if self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, self._table_stages)
         self._announce_rod(rod, fit)
@@ -151,10 +153,14 @@ class Run:
             if popped_before + 1 == MOST_SIZES:
                 break
             following = Rod(section, rod.material)
-            found = stages_of(following)
-            if found.status != "converged":  # what was found before is kept
+            try:
+                found = stages_of(following)
+                status = found.status
+            except OutOfTimeError as late:
+                status = str(late)
+            if status != "converged":  # what was found before is kept
                 if self.announce is not None:
-                    self.announce(f"rods of {size_text(section)} fit better, but were not popped up: {found.status}")
+                    self.announce(f"rods of {size_text(section)} fit better, but were not popped up: {status}")
                 break
             rod, stages = following, found
         return rod, fit, stages

@@ -84,6 +84,7 @@ def ply_binary() -> bytes:
 def gltf_tree(uri: str | None) -> tuple[dict[str, object], bytes]:
     """The JSON of a glTF file, and its buffer."""
     x, faces = dome(5)
+    x = x[:, [0, 2, 1]] * [1.0, 1.0, -1.0]  # y points upwards
     index, position = faces.astype("<u4").tobytes(), x.astype("<f4").tobytes()
     buffer: dict[str, object] = {"byteLength": len(index) + len(position)}
     tree = {

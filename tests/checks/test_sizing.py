@@ -443,3 +443,57 @@ def test_a_rod_fits_the_heading_that_a_search_finds(tmp_path: Path) -> None:
     )
     across = rs.GridLayout.orthogonal(spacing=1.5)
     assert rod.section.depth > Fit.on(target, across).section(rs.Material.preset("larch"), strength=14e6).depth
+
+
+# Sizes of which one was given in another unit than was meant
+
+
+@pytest.mark.parametrize(
+    ("case", "keys", "said"),
+    [
+        (
+            "pavilion",
+            {"rod.section": {"kind": "rectangle", "width": 35, "height": 50}, "rod.material.preset": "larch"},
+            "the section of 50 m is as wide as the shell of 12 m: check its unit .a section of 50 mm would be usual",
+        ),
+        (
+            "pavilion",
+            {"rod.section.radius": 0.7, "rod.section.thickness": 0.001},
+            "the section of 1.4 m is as thick as the spacing of the rods, 800 mm: check its unit .a section of 14 mm",
+        ),
+        (
+            "hemisphere",
+            {"target.radius": 200, "layout.spacing": "auto", "layout.edge": "auto"},
+            "the section of 2 mm is thin for the shell of 400 m, .*: check its unit .a shell of 400 mm would be.* to",
+        ),
+        (
+            "hemisphere",
+            {"target.radius": "0.2 mm", "layout.spacing": "auto", "layout.edge": "auto"},
+            "the section of 2 mm is as wide as the shell of 0.4 mm: .*a section of 0.002 mm or a shell of 400 mm would",
+        ),
+    ],
+)  # fmt: skip
+def test_sizes_that_do_not_suit_each_other_are_refused_before_the_net(
+    case: str, keys: dict[str, Any], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rodshell.run.find_stages", None)
+    whole = {"layout.rods": "auto", "layout.length": "auto"}
+    with pytest.raises(InputError, match=said):
+        rs.Job.load(case, whole | keys).run()
+
+
+def test_sizes_are_compared_for_objects_and_tables_too(tmp_path: Path) -> None:
+    larch = rs.Material.preset("larch")
+    with pytest.raises(InputError, match="the section of 50 m is as wide as the shell of 10 m"):
+        rs.find_form(*half_sphere(5.0), rs.Rod(rs.RectangularSection(35.0, 50.0), larch))
+    table = table_of_rods(tmp_path / "rods.csv", 4, 0.92)
+    with pytest.raises(InputError, match="the section of 16 m is as wide as the shell of"):
+        rs.Job.of_table(table, unit="m", rod=rs.Rod(rs.Circle(8.0), larch)).run()
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 40.0])
+@pytest.mark.parametrize("slender", [12, 200, 20_000])  # width of the shell over the diameter of its rods
+def test_sizes_that_suit_each_other_are_taken_at_every_scale(scale: float, slender: float) -> None:
+    rod = rs.Rod(rs.Circle(scale / slender), rs.Material.preset("gfrp"))
+    target = rs.Hemisphere(scale)
+    rs.Job(target, rs.GridLayout.orthogonal(spacing=scale / 5), rod).case.build(target)

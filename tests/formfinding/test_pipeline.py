@@ -14,6 +14,7 @@ import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.formfinding import bound_drape, pipeline
 from rodshell.formfinding.finite_sections import section_rotation
+from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.results import read
 from rodshell.results.records import json_text
 from rodshell.results.verdict import verdict
@@ -522,6 +523,29 @@ def test_table_by_default_takes_six_edges_between_joints(tmp_path):
     assert list(result["pop_up"]) == ["pinned"]
     assert result["pop_up"]["pinned"]["stable"] is True
     assert [rod["id"] for rod in result["rods"]] == [rod.name for rod in hemisphere_form().footprint.rods]
+
+
+@pytest.mark.parametrize("digits", [3, 4, 16])
+def test_rods_that_cross_in_threes_are_meshed_by_their_spans_however_they_are_rounded(monkeypatch, digits):
+    popped = []
+
+    def pop_up(footprint, *_, **__):
+        popped.append(footprint.mesh)
+        raise InputError("the mesh is enough")
+
+    monkeypatch.setattr("rodshell.formfinding.pipeline.pop_up", pop_up)
+    degrees, offsets = np.radians([0, 60, 120]), np.arange(-2, 3) * 0.5 * np.sqrt(3)
+    middles = [offset * np.array([-np.sin(a), np.cos(a)]) for a in degrees for offset in offsets]
+    along = np.array([[np.cos(a), np.sin(a)] for a in degrees for _ in offsets])
+    flat = np.stack([middles - 2.2 * along, middles + 2.2 * along], axis=1).round(digits)
+    finals = np.concatenate([0.9 * flat, np.zeros((15, 2, 1))], axis=2)
+    with pytest.raises(InputError, match="enough"):
+        rs.pop_up_table(rs.straight_rods(flat), finals, ROD)
+    [mesh] = popped
+    assert np.count_nonzero(np.bincount(mesh.rod_nodes) == 3) == 19
+    spans = 3 * (4 + 2 * 3 + 2 * 2)  # of a family five rods with five, four and three joints
+    tails = 3 * 2 * (1 + 2 * 4 + 2 * 7)  # nodes within the ends of 0.2, 0.7 and 1.2 m
+    assert mesh.node_count == 19 + len(mesh.ends.ravel()) + spans * (EDGES_A_SPAN - 1) + tails
 
 
 def test_rods_of_a_table_need_no_order_and_no_right_angles():

@@ -176,6 +176,37 @@ def test_triangular_grid_has_one_node_at_each_lattice_point():
     assert_is_a_mesh_of(mesh, mesh.grid, 0.02)
 
 
+@pytest.mark.parametrize("digits", [2, 3, 4, 5, 16])
+def test_three_rods_that_cross_at_one_point_as_rounded_share_a_node(digits):
+    """Rounding to `digits` after the point of numbers of about 1: the points come to within a hundredth of a span."""
+    exact = triangular_grid(1.0, 3)
+    grid = straight_rods(exact.round(digits)).with_common_joints()
+    assert grid.span == pytest.approx(1.0, abs=0.02)
+    mesh = mesh_grid(grid, 0.4)
+    rods_at = np.bincount(mesh.rod_nodes, minlength=mesh.node_count)
+    assert np.count_nonzero(rods_at == 3) == 37
+    assert mesh.edge_lengths.min() > 0.2
+    joints = grid.crossings.rods == 0
+    along = np.sort(np.unique(grid.crossings.at[joints].round(9)))
+    assert np.diff(along).min() > 0.4  # each joint at one place of a rod, also where holes are listed
+
+
+def test_rods_side_by_side_are_not_joined_to_each_other():
+    """Two parallel rods 2 mm apart, which cross a third: each crosses it at a point of its own."""
+    rods = [[[-1, y], [1, y]] for y in (0.0, 0.002, 1.0, 2.0)] + [[[x, -0.5], [x, 2.5]] for x in (-0.7, 0.0, 0.7)]
+    grid = straight_rods(rods)
+    assert grid.with_common_joints() == grid
+
+
+def test_the_usual_span_is_that_of_rods_whose_crossings_nearly_coincide():
+    """A small triangle at each lattice point, of a twentieth of the span: not one joint, and no measure of the mesh."""
+    rods = triangular_grid(1.0, 3)
+    rods[:7] += [0.0, 0.05]
+    grid = straight_rods(rods)
+    assert grid.with_common_joints() == grid
+    assert grid.span == pytest.approx(1.0, abs=0.06)
+
+
 # Random rods
 
 

@@ -632,10 +632,11 @@ def test_a_mesh_without_a_unit_closed_or_with_y_upwards_becomes_a_target_by_butt
         page.set_input_files("#file", tmp_path / f"{name}.obj")
         page.get_by_role("button", name="m: 10 \u00d7", exact=False).last.click()
         if name == "upwards":
-            page.click("#upright")
+            page.locator("#verdict.failed button", has_text="y is up").click()  # of the sentence that asks
             page.wait_for_selector("#upright[aria-pressed=true]")
         page.wait_for_selector(CURRENT)
         assert page.inner_text("#controls .lil-title >> nth=0").endswith(f"Case of {name}.obj")
+        assert linked(page)["target"].get("up") == ("y" if name == "upwards" else None)
         totals.append(float(page.inner_text("#figures td >> nth=1").split()[0]))
     assert totals[1] == pytest.approx(totals[0], rel=0.01)  # the same surface, its net from another heading
     assert studio.errors() == []

@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from PIL import Image
 
 import rodshell as rs
+from rodshell.arrays import Floats
 from rodshell.case import load_case
 from rodshell.cli import main
 from rodshell.targets import Freeform
@@ -25,6 +27,11 @@ def bowl() -> Mesh:
     return 1e3 * x, faces
 
 
+def y_up(x: Floats) -> Floats:
+    """Points whose z pointed upwards, as programs write them in which y does, and as glTF has them."""
+    return x[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
+
+
 def write_glb(path: Path, mesh: Mesh) -> None:
     import trimesh
 
@@ -35,7 +42,7 @@ def write_glb(path: Path, mesh: Mesh) -> None:
 def test_every_format_gives_the_same_surface(kind, bowl, tmp_path):
     path = tmp_path / f"bowl.{kind}"
     if kind == "glb":
-        write_glb(path, bowl)
+        write_glb(path, (y_up(bowl[0]), bowl[1]))
     else:
         path.write_bytes(WRITERS[kind](*bowl))
     target = rs.surface_from(path, unit=MM)
@@ -46,7 +53,7 @@ def test_every_format_gives_the_same_surface(kind, bowl, tmp_path):
 
 
 def test_gltf_is_in_metres_and_others_must_say_their_unit(bowl, tmp_path):
-    write_glb(tmp_path / "bowl.glb", (MM * bowl[0], bowl[1]))
+    write_glb(tmp_path / "bowl.glb", (y_up(MM * bowl[0]), bowl[1]))
     assert rs.surface_from(tmp_path / "bowl.glb").size == pytest.approx(0.2, rel=1e-5)
     (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
     with pytest.raises(
@@ -58,12 +65,48 @@ def test_gltf_is_in_metres_and_others_must_say_their_unit(bowl, tmp_path):
         rs.surface_from(tmp_path / "wide.obj")
 
 
+@pytest.mark.parametrize(("kind", "usual", "other"), [("obj", "z", "y"), ("glb", "y", "z")])
+def test_a_surface_that_stands_on_its_edge_asks_which_axis_points_upwards(kind, usual, other, bowl, tmp_path):
+    """Of an OBJ z is taken to point upwards, of a glTF y; the boundary is turned with its surface."""
+    path, x, edge = tmp_path / f"bowl.{kind}", MM * bowl[0], tmp_path / "edge.obj"
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    circle = np.column_stack([0.1 * np.cos(angle), 0.1 * np.sin(angle), np.zeros(60)])
+    given, drawn = (y_up(x), y_up(circle)) if kind == "obj" else (x, circle)
+    if kind == "obj":
+        path.write_bytes(WRITERS["obj"](given, bowl[1]))
+    else:
+        write_glb(path, (given, bowl[1]))
+    edge.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in drawn) + f"l {' '.join(map(str, range(1, 61)))} 1\n")
+    read = partial(rs.surface_from, path, unit=1.0)
+    with pytest.raises(
+        rs.InputError, match=rf"steeper than 60 degrees .*: does {other} .* --up {other};.* otherwise .{usual}"
+    ):
+        read()
+    turned = read(boundary=edge, placement=rs.Placement(up=other))
+    np.testing.assert_allclose(turned.surface.vertices, x, atol=1e-6)
+    np.testing.assert_allclose(turned.curves[0][:60], circle, atol=1e-12)
+    assert turned.parameters()["up"] == other
+    assert read(placement=rs.Placement(up=usual)).parameters()["up"] == usual  # it is to stand so
+
+
+def test_deep_domes_on_level_ground_do_not_ask(tmp_path):
+    """Nine tenths of it are steeper than 60 degrees."""
+    radius, angle = np.linspace(0.1, 1.0, 40), np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+    x = np.array([(r * np.cos(a), r * np.sin(a), 4.0 * (1 - r**2)) for r in radius for a in angle])
+    k = np.arange(39)[:, None] * 64 + np.arange(64)
+    right = np.arange(39)[:, None] * 64 + (np.arange(64) + 1) % 64
+    corners = (k, k + 64, right), (right, k + 64, right + 64)
+    faces = np.concatenate([np.stack(three, axis=-1).reshape(-1, 3) for three in corners])
+    (tmp_path / "dome.obj").write_bytes(WRITERS["obj"](x, faces))
+    assert rs.surface_from(tmp_path / "dome.obj", unit=1.0).size == pytest.approx(2.0, rel=0.05)
+
+
 def test_of_several_objects_one_is_chosen_by_its_name(bowl, tmp_path):
     import trimesh
 
     scene = trimesh.Scene()
-    scene.add_geometry(trimesh.Trimesh(MM * bowl[0], bowl[1], process=False), geom_name="roof")
-    scene.add_geometry(trimesh.Trimesh(MM * bowl[0] + 2, bowl[1], process=False), geom_name="wall")
+    scene.add_geometry(trimesh.Trimesh(y_up(MM * bowl[0]), bowl[1], process=False), geom_name="roof")
+    scene.add_geometry(trimesh.Trimesh(y_up(MM * bowl[0] + 2), bowl[1], process=False), geom_name="wall")
     scene.export(tmp_path / "house.glb")
     with pytest.raises(rs.InputError, match="2 separate pieces"):
         rs.surface_from(tmp_path / "house.glb")

@@ -31,6 +31,7 @@ from rodshell.case.stage_tables import (
 from rodshell.case.target_tables import HemisphereTable, TargetTable
 from rodshell.case.values import Held, Table
 from rodshell.errors import InputError
+from rodshell.progress import Progress, silent
 from rodshell.units import length_text, shown
 
 if TYPE_CHECKING:
@@ -201,18 +202,21 @@ class Case(Table):
             return ()
         return ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
 
-    def build(self, target: "Target | None" = None) -> Built:
+    def build(self, target: "Target | None" = None, progress: Progress = silent) -> Built:
         """The objects.
 
         Parameters
         ----------
         target : the target, where it was built before.
+        progress : called before the net by whose bends the rod is chosen.
 
         Raises
         ------
         InputError : values that are fine alone do not fit together, the formula or the file cannot be used; with seams,
             also keys that a form in patches does not have.
         """
+        from rodshell.checks.sizing import require_likely_sizes
+
         if self.seams.lines:
             self._require_keys_of_patches()
         elif self.drape.objective != "shear" and not self.undecided:
@@ -224,7 +228,8 @@ class Case(Table):
         joint, method = built(self.joint), built(self.drape)
         target = target or built(self.target)
         layout = built(self.layout, target)
-        self._require_stock(layout)
+        shortest = min(map(min, (layout.spacing, *(p.spacing for p in self.seams.patches if p.spacing is not None))))
+        self._require_stock(shortest)
         self._require_allowance(target)
         self.bracing.build()
         loads = self.built_loads()
@@ -235,7 +240,10 @@ class Case(Table):
             raise InputError(
                 f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
             )
+        if self.rod.left_open:
+            progress("net", "for the size of the rods", 0.0)
         rod = self.rod_on(target, layout, anchor=anchor)
+        require_likely_sizes(rod, 2 * target.size, shortest)
         self.require_strength(rod, joint)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
 
@@ -260,10 +268,9 @@ class Case(Table):
                 "target's size: give the length that the support holds, such as 50 mm"
             )
 
-    def _require_stock(self, layout: "GridLayout") -> None:
+    def _require_stock(self, shortest: float) -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
-        spacings = [patch.spacing for patch in self.seams.patches if patch.spacing is not None]
-        shortest, stock = min(map(min, (layout.spacing, *spacings))), self.fabrication.stock_length
+        stock = self.fabrication.stock_length
         if stock is not None and stock < shortest:
             raise InputError(
                 f"fabrication.stock_length = {shown(stock)}: shorter than the {length_text(shortest)} between joints, "

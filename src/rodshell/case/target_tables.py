@@ -107,7 +107,7 @@ class PlacedTable(Table):
         """Keyword arguments that all files have."""
         from rodshell.targets import Placement
 
-        placement = Placement(scale=self.scale, turn=self.turn, move=self.move)
+        placement = Placement(up=getattr(self, "up", None), scale=self.scale, turn=self.turn, move=self.move)
         return {"base": self.base, "boundary": self.boundary, "placement": placement}
 
 
@@ -115,6 +115,9 @@ class SurfaceTable(PlacedTable):
     unit: Unit | None = Field(default=None, description="the file's unit, such as mm")
     object: str | None = Field(
         default=None, description="name of an object or layer; of a STEP face: its name or number"
+    )
+    up: Literal["z", "y"] | None = Field(
+        default=None, description="axis of the file that points upwards; default: y of glTF, z of others"
     )
 
     def build(self) -> "Target":

@@ -13,6 +13,7 @@ arc over a single rod's chord is right only where the ends of all rods belong to
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import cache
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -30,6 +31,7 @@ from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, Tube, scaled, size_text
 from rodshell.targets import Target
 from rodshell.units import length_text, rounded_down
+from rodshell.untrusted import limit, raised
 
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
 SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker
@@ -39,6 +41,10 @@ SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is 
 AIM = 3 / 4
 ROOM = 1 / 6  # depth of a rod over the spacing: joints need room
 PLAN = 41  # points each way at which a target without a net is sampled
+MOST_SLENDER = 100_000  # width of a shell over the depth of its rods; known ones have 50 to 5000
+USUAL = (20, 5000)  # the same of the sizes that are proposed
+UNITS = (1e-3, 0.01, 0.0254)  # by which lengths are wrong that were given as metres
+THICKEST, WIDEST = 0.5, 1e3  # m: a section and a shell that are proposed
 
 
 class Bends(NamedTuple):
@@ -105,6 +111,7 @@ class Fit:
         slender = SLENDER * target.size
         room = ROOM * min(layout.spacing)
 
+        @cache
         def bends() -> Bends:
             found = bends_of(target, layout, anchor)
             return found if (joint or Ball()).holds_normals else found.rolled()
@@ -243,6 +250,45 @@ class Fit:
         if self._strain(scaled(section, self.thickest / section.depth), material) > AIM * bears:
             return said + "a thicker one would use more at the sharpest bend"
         return f"{said}the next step would be wider than {self.thickest_of}, {length_text(self.thickest)}"
+
+
+def require_likely_sizes(rod: Rod, width: float, spacing: float) -> None:
+    """Refuse sizes of which one was given in another unit than was meant.
+
+    Parameters
+    ----------
+    rod : with a section whose size is known; others are not judged.
+    width : of the shell [m].
+    spacing : the smallest between rods [m].
+
+    Raises
+    ------
+    InputError : the rods are as thick as the spacing or the shell, or far thinner than those of any shell.
+    """
+    section = rod.section
+    depth = 2 * max(section.fibre_distances or (0.0,)) if isinstance(section, GivenSection) else section.depth
+    allowed = ""
+    if 0 < depth * limit(MOST_SLENDER) < width:
+        what = f"thin for the shell of {length_text(width)}, which is more than {limit(MOST_SLENDER):.0f} times as wide"
+        allowed = f", {raised(MOST_SLENDER, width / depth)}"
+    elif depth >= width:
+        what = f"as wide as the shell of {length_text(width)}"
+    elif depth >= spacing:
+        what = f"as thick as the spacing of the rods, {length_text(spacing)}"
+    else:
+        return
+    raise InputError(f"the section of {length_text(depth)} is {what}: {_other_unit(depth, width)}{allowed}")
+
+
+def _other_unit(depth: float, width: float) -> str:
+    """What to check, and sizes of section and shell [m] in another unit that would suit each other."""
+    for unit in UNITS:
+        factor = unit if width < USUAL[0] * depth else 1 / unit
+        pairs = ("a section", depth * factor, THICKEST), ("a shell", width / factor, WIDEST)
+        meant = [f"{what} of {length_text(length)}" for what, length, most in pairs if length <= most]
+        if USUAL[0] <= width / (depth * factor) <= USUAL[1] and meant:
+            return f"check its unit ({' or '.join(meant)} would be usual)"
+    return "check their units"
 
 
 def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:

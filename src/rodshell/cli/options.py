@@ -18,6 +18,7 @@ ALIASES = {
     "target.radius": "--radius",
     "target.formula": "--formula",
     "target.unit": "--unit",
+    "target.up": "--up",
     "target.base": "--base",
     "target.boundary": "--boundary",
     "layout.rods": "--rods",

@@ -22,6 +22,7 @@ from rodshell.errors import InputError
 from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
 from rodshell.printed import Printed, say
+from rodshell.progress import limited
 
 if TYPE_CHECKING:
     from rodshell.case import Case
@@ -197,31 +198,28 @@ def run_and_deliver(
         from rodshell.job import Job
 
         progress = Progress(quiet=output.quiet)
-        form = Job.of_case(case).run(
-            progress=progress,
-            time_limit=output.limit,
-            announce=None if output.quiet else say,
-            frames_in=place.new,
-        )
+        in_time = limited(progress, output.limit)
+        with progress:
+            form = Job.of_case(case).run(progress=in_time, announce=None if output.quiet else say, frames_in=place.new)
         refused = "" if form.known_loaded is None else form.known_loaded.refused
         if refused and formed_before:
             raise InputError(refused)
         archive = form.archive()
         if form.search is not None and not (output.quiet or output.as_json):
             click.echo(form.search.table())
-        offer = "" if output.quiet or output.as_json else _offer(form, progress)
+        offer = "" if output.quiet or output.as_json else _offer(form, progress, in_time)
         kept = Kept(archive, output.kinds, pictures(form), offer, refused)
         return deliver(kept, kept.save, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
 
 
-def _offer(form: "Form", progress: Progress) -> str:
+def _offer(form: "Form", progress: Progress, in_time: Callable[[str, str, float], None]) -> str:
     """What double laths would gain, of a form that is not refined, unless the case switches it off."""
     if form.case.refine.offer == "off" or form.refined is not None or form.from_table:
         return ""
     from rodshell.refining.offer import offer
 
     with progress:
-        found = offer(form.stages, progress=progress)
+        found = offer(form.stages, progress=in_time)
     return "" if found is None else found.words
 
 

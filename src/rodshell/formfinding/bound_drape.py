@@ -63,10 +63,9 @@ def bound_drape(
     ------
     NetLimitError : no net covers the target from this anchor and heading.
     """
-    progress("net", "marching", 0.0)
     eccentricity = joint.eccentricity if joint else 0.0
     near = warm_start.net if warm_start else None
-    net = chebyshev_net(target, layout, anchor=anchor, warm_start=near, eccentricity=eccentricity)
+    net = chebyshev_net(target, layout, anchor=anchor, warm_start=near, eccentricity=eccentricity, progress=progress)
     grid, whole = with_apron(net.rods, net.net, net.lines, CLEARANCE * layout.edge)
     marks: list[list[float]] = [[] for _ in grid.rods]
     for rod_of, piece in zip(whole.tolist(), net.rods, strict=True):

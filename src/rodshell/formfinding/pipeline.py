@@ -9,7 +9,7 @@ from math import degrees, pi, sqrt
 
 import numpy as np
 
-from rodshell.arrays import Floats, median
+from rodshell.arrays import Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding.drape import drape
@@ -29,6 +29,7 @@ from rodshell.formfinding.trim import (
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
+from rodshell.layout.flatgrid import TOGETHER
 from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
@@ -348,8 +349,8 @@ def pop_up_stages(
             f"the joints' eccentricity {length_text(joint.eccentricity)} would lay the rods in two layers, and a "
             "table's rods are joined at one point: leave it out"
         )
-    spans = _spans(grid)
-    joined = FlatGrid.of(grid.rods, margin=NEAREST_JOINT * spans)
+    progress("pop-up", "meshing the rods", 0.0)
+    joined = FlatGrid.of(grid.rods, margin=NEAREST_JOINT * grid.span).with_common_joints()
     kept, swinging = joined.without(lambda some: some.joint_counts() < FEWEST_JOINTS)
     if not kept.rods:
         raise InputError(
@@ -357,21 +358,13 @@ def pop_up_stages(
         )
     row = {rod.name: k for k, rod in enumerate(grid.rods)}
     rows = [row[rod.name] for rod in kept.rods]
-    footprint = Footprint(mesh_grid(kept, edge or spans / EDGES_A_SPAN))
+    even = (1 + TOGETHER) * grid.span / EDGES_A_SPAN  # equal spans have as many edges, however they are rounded
+    footprint = Footprint(mesh_grid(kept, edge or even))
     points = finals[rows].reshape(-1, 3)
     boundary = Boundary(points, np.zeros_like(points))
     popped = pop_up(footprint, boundary, rod, ends="pinned", start="flat", joint=joint, progress=progress)
     dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
     return PatchForm("", rod, joint, ("pinned",), footprint, boundary, {"pinned": popped}, {}, dropped, None)
-
-
-def _spans(grid: FlatGrid) -> float:
-    """Median distance between neighbouring joints [m]."""
-    gaps = []
-    for rod in range(len(grid.rods)):
-        on_rod = grid.crossings.at[grid.crossings.rods == rod]
-        gaps += np.diff(np.sort(on_rod)).tolist()
-    return median(gaps) if gaps else min(rod.length for rod in grid.rods)
 
 
 def _stretched(draped: Draped) -> tuple[str, ...]:

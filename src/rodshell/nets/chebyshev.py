@@ -24,6 +24,7 @@ from rodshell.layout.gridlayout import rod_names
 from rodshell.nets.compass import ON_SURFACE, Axes, axes
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.targets import Target
 from rodshell.units import length_text, shown
 from rodshell.validation import instance, number, point
@@ -105,6 +106,7 @@ def chebyshev_net(
     anchor: tuple[float, float] | None = None,
     warm_start: ChebyshevNet | None = None,
     eccentricity: float = 0.0,
+    progress: Progress = silent,
 ) -> ChebyshevNet:
     """March the net of `layout` over `target` and cut it at the target's end.
 
@@ -118,6 +120,7 @@ def chebyshev_net(
         target and those of family v half of it above, each on the parallel surface there: a rod's material length is
         that of its own line, so that the flat grid is the layout's straight lattice, and its ends are over the
         target's end, along the normal.
+    progress : called before each march.
 
     Raises
     ------
@@ -131,6 +134,7 @@ def chebyshev_net(
     if anchor is not None:
         point("anchor", anchor)
     number("eccentricity", eccentricity, "m")
+    require_progress(progress)
     start = _start(target, layout, anchor)
     if max(layout.spacing) >= 2 * target.size:
         raise InputError(
@@ -145,8 +149,11 @@ def chebyshev_net(
     heights = (-0.5 * eccentricity, 0.5 * eccentricity) if eccentricity else ON_SURFACE
     similar = warm_start.net if warm_start else None
     for parts in SEARCHES:
+        progress("net", "marching", 0.0)
         lines, rough = find_lines(target, layout, start, similar, parts, heights)
+        progress("net", "marching in long steps", 0.0)
         coarse = march_lines(target, layout, lines, start, 2, rough, heights=heights)
+        progress("net", "marching in short steps", 0.0)
         fine = march_lines(target, layout, lines, start, 1, coarse, rough, heights=heights)
         if not (fine.inside[[0, -1]].any() or fine.inside[:, [0, -1]].any()):
             break

@@ -2,8 +2,11 @@
 
 import io
 import warnings
+from dataclasses import replace
+from math import cos, radians
 from os import PathLike
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -13,6 +16,7 @@ from rodshell.errors import InputError
 from rodshell.targets.apart import cause
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.mesh_files import (
+    IN_METRES,
     MESH_FILES,
     MOST_HEIGHTS,
     file_bytes,
@@ -25,7 +29,7 @@ from rodshell.targets.mesh_files import (
 from rodshell.targets.nurbs_files import RHINO_FILES, STEP_FILES, grid_triangles, read_3dm, read_step
 from rodshell.units import length_text, shown
 from rodshell.untrusted import read_text
-from rodshell.validation import file_path, instance, keep, number, numbers, positive
+from rodshell.validation import brief, choice, file_path, instance, keep, number, numbers, positive
 
 File = str | PathLike[str]
 
@@ -34,6 +38,8 @@ TABLES = (".csv", ".txt")
 IMAGES = ("PNG", "PPM", "JPEG", "TIFF")  # whatever a file is called, others, such as EPS, are never opened
 GRID_FILES = (*TABLES, ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff")
 LARGEST_TABLE = 100e6  # bytes: of 1.5 million points, written with 20 digits
+STEEP = 60.0  # degrees: a surface that is steeper than this on average may have been turned
+CLEAR = 0.3  # length of the mean of its normals from which it is judged: a hemisphere has 0.5, a closed mesh none
 FEWEST = 4  # heights each way
 POINT = 3  # numbers in a row of points x, y, z; heights need more each way
 EVEN = 0.02  # of a step: coordinates go in equal steps, except for rounding
@@ -278,20 +284,27 @@ class Placement:
 
     Parameters
     ----------
+    up : axis of the file that points upwards, which becomes z before anything else; None: y of glTF, as its standard
+        says, and z of other files.
     scale : factor, about the origin.
     turn : angles about x, y and z, applied in that order [rad].
     move : along x, y and z, applied last [m].
 
     Raises
     ------
-    InputError : the scale is not positive, or a number is missing or not finite.
+    InputError : the scale is not positive, or a number is missing or not finite; another axis points upwards.
     """
 
+    up: Literal["z", "y"] | None = None
     scale: float = 1.0
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
     move: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
+        if self.up is not None:
+            choice("target up", self.up, ("z", "y"))
         keep(self, positive, "", "scale", what="target {}")
         turn = numbers("target turn", self.turn, "three finite angles about x, y and z in rad", 3, "rad")
         move = numbers("target move", self.move, "three finite lengths along x, y and z in m", 3, "m")
@@ -300,6 +313,8 @@ class Placement:
 
     def __call__(self, x: Floats) -> Floats:
         """Place the points `x` (n, 3) [m]."""
+        if self.up == "y":
+            x = x[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
         for axis, angle in enumerate(self.turn):
             c, s = np.cos(angle), np.sin(angle)
             i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -310,9 +325,8 @@ class Placement:
 
     def parameters(self) -> dict[str, object]:
         """The values that differ from the defaults, as they are written in a case file."""
-        values: dict[str, object] = {"scale": self.scale, "turn": list(self.turn), "move": list(self.move)}
-        defaults = {"scale": 1.0, "turn": [0.0, 0.0, 0.0], "move": [0.0, 0.0, 0.0]}
-        return {key: value for key, value in values.items() if value != defaults[key]}
+        values = {key: list(value) if isinstance(value, tuple) else value for key, value in vars(self).items()}
+        return {key: value for key, value in values.items() if value not in (None, 1.0, [0.0, 0.0, 0.0])}
 
 
 UNMOVED = Placement()
@@ -429,7 +443,29 @@ def _placed(
         source["boundary"] = str(drawn.resolve())
     source |= {"file": str(path.resolve()), "base": base, **placement.parameters()}
     chosen = {key: value for key, value in source.items() if value is not None}
-    placed = tuple(placement(curve) for curve in curves)
+    usual: Literal["z", "y"] = "y" if path.suffix.lower() in IN_METRES else "z"
+    turned = placement if placement.up is not None else replace(placement, up=usual)
+    placed = tuple(turned(curve) for curve in curves)
     with np.errstate(over="ignore", invalid="ignore"):
-        vertices = placement(vertices)
+        vertices = turned(vertices)
+        if placement.up is None and _stands(vertices, faces):
+            other = "z" if usual == "y" else "y"
+            raise InputError(
+                f"{path} is steeper than {STEEP:.0f} degrees on average: does {other} point upwards in it? Then give "
+                f'target.up = "{other}" (--up {other}; in Python Placement(up="{other}")), and otherwise "{usual}"'
+            )
     return Freeform.of(vertices, faces, base=base, curves=placed, source=chosen, name=shown(path.name), notes=notes)
+
+
+def _stands(vertices: Floats, faces: Ints) -> bool:
+    """Whether the mean normal of a surface is more level than upright, as of one whose y points upwards.
+
+    The mean follows from the end alone: towers and deep domes on level ground do not stand so, and closed meshes have
+    none. What is steep here and there does not matter.
+    """
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    mean = normals.sum(axis=0)
+    length = float(np.linalg.norm(mean))
+    clear = length > CLEAR * np.linalg.norm(normals, axis=1).sum()
+    return bool(clear and abs(mean[2]) < cos(radians(STEEP)) * length)

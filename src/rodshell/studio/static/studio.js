@@ -85,7 +85,7 @@ function offer(ready) {
 // Buttons for what takes longer; each is a part of the case
 
 const DEPLOYMENT = 8;  // equilibria from flat
-const UPRIGHT = ["90 deg", "0 deg", "0 deg"];  // turns a surface whose y points upwards
+const yIsUp = next => (get(next, "target.up") ?? (/\.(glb|gltf)$/i.test(get(next, "target.file")) ? "y" : "z")) === "y";
 
 function showTools() {
   const press = (name, on) => byId(name).setAttribute("aria-pressed", String(Boolean(on)));
@@ -93,7 +93,7 @@ function showTools() {
   press("loads", Array.isArray(base.loads) ? base.loads.length : base.loads);
   press("erection", get(base, "checks.stages") ?? DEPLOYMENT);
   byId("upright").hidden = !takesOutline() || base.target.kind === "heights";
-  press("upright", same(get(base, "target.turn"), UPRIGHT));
+  press("upright", yIsUp(base));
   const drawn = get(base, "target.boundary");
   byId("outline").hidden = !takesOutline();
   byId("no-outline").hidden = !drawn;
@@ -167,7 +167,7 @@ function wireTools() {
   byId("refine").onclick = () => change(next => set(next, "refine.vary", get(next, "refine.vary")?.length ? undefined : ["taper"]));
   byId("upright").onclick = () => {
     pending = true;
-    change(next => set(next, "target.turn", same(get(next, "target.turn"), UPRIGHT) ? undefined : UPRIGHT));
+    change(next => set(next, "target.up", yIsUp(next) ? "z" : "y"));
     buildControls();
   };
   byId("erection").onclick = () => change(next => set(next, "checks.stages", (get(next, "checks.stages") ?? DEPLOYMENT) ? 0 : DEPLOYMENT));
@@ -314,6 +314,7 @@ function remedies(sentence) {
   const wide = /does not state its unit \(it is ([\d.e+-]+) x ([\d.e+-]+) x ([\d.e+-]+) units wide\)/.exec(sentence);
   const size = wide && Math.max(...wide.slice(1));
   if (wide) return Object.entries(UNITS).filter(([, metres]) => SMALLEST <= size * metres && size * metres <= LARGEST).map(([unit, metres]) => [`${unit}: ${wide.slice(1).map(side => short(side * metres)).join(" \u00d7 ")} m`, "target.unit", unit]);
+  if (/ point upwards in it\?/.test(sentence)) return ["y", "z"].map(axis => [`${axis} is up`, "target.up", axis]);
   const plane = /by a base plane between z = (\S+) and (\S+) m/.exec(sentence), middle = plane && short((Number(plane[1]) + Number(plane[2])) / 2);
   return plane ? [[`End it at half its height, z = ${middle} m`, "target.base", Number(middle)]] : [];
 }
