@@ -188,5 +188,12 @@ def test_how_far_the_shell_ends_from_what_is_drawn_is_said(dome):
     (words,) = bounded(dome, circle).warnings
     assert "the shell ends up to 5.89 mm from the boundary that is drawn" in words
     (words,) = bounded(dome, lifted(dome, along(polygon(4, 4.0), 3)) + [0.0, 0.0, 0.1]).warnings
-    assert "the shell ends up to 100 mm from the boundary that is drawn" in words
+    assert "the shell ends up to 96 mm from the boundary that is drawn" in words
     assert bounded(dome, lifted(dome, 4.0 * ring(1.0, 200)[:, :2])).warnings == ()
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_a_boundary_of_fewer_than_three_points_is_refused(dome, count):
+    few = np.repeat(lifted(dome, polygon(3, 2.0))[:count], 3, axis=0)
+    with pytest.raises(rs.InputError, match="fewer than three different points"):
+        Freeform.of(dome.surface.vertices, dome.surface.faces, curves=(few,))

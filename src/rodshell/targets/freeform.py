@@ -104,15 +104,12 @@ class Freeform(Target):
     def warnings(self) -> tuple[str, ...]:
         ends, moved = self._open_ends
         words, which = list(self.repairs), ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
-        offs = {given: rim.off for given, rim in zip(which, self.rims, strict=False)}
-        for curve in self.curves:
-            if not self._is_plan(curve):
-                aside = np.linalg.norm(self._settle(curve) - curve, axis=1)
-                offs[which[-1]] = max(offs[which[-1]], float(aside.max()))
+        offs = [rim.off for rim in self.rims]
+        offs[-1:] = [max([off, *map(self._off, filter(self._is_in_space, self.curves))]) for off in offs[-1:]]
         words += [
             f"the shell ends up to {length_text(off)} from {given}: on the smooth surface, in a smooth curve where six "
             "or more of its points turn by little; give more points, or corners"
-            for given, off in offs.items()
+            for given, off in zip(which, offs, strict=False)
             if off > TOLD * self.size
         ]
         if moved:
@@ -314,7 +311,7 @@ class Freeform(Target):
 
     def _over(self, curve: Floats) -> Floats:
         """A curve drawn in a horizontal plane, such as a plan, projected onto the surface; any other curve as it is."""
-        if not self._is_plan(curve) or self._off(curve) < ASIDE * self._extent:
+        if self._is_in_space(curve) or self._off(curve) < ASIDE * self._extent:
             return curve
         z = self.height_at(curve[:, :2])
         if not np.isfinite(z).all():
@@ -322,8 +319,8 @@ class Freeform(Target):
             raise InputError(f"the boundary curve leaves the surface in plan near ({x:.4g}, {y:.4g}) m: draw it inside")
         return np.column_stack([curve[:, :2], z])
 
-    def _is_plan(self, curve: Floats) -> bool:
-        return float(np.ptp(curve[:, 2])) <= 1e-6 * self._extent
+    def _is_in_space(self, curve: Floats) -> bool:
+        return float(np.ptp(curve[:, 2])) > 1e-6 * self._extent
 
     def _off(self, curve: Floats) -> float:
         """Largest distance of a curve from the surface [m]."""
@@ -342,6 +339,8 @@ class Freeform(Target):
             far = float(np.abs(curve).max(initial=0.0))
             if not far <= FARTHEST:
                 raise InputError(f"the boundary curve has coordinates up to {far:.3g} m: draw it on the surface")
+            if len(np.unique(curve, axis=0)) < 3:
+                raise InputError("the boundary curve has fewer than three different points: draw it around the shell")
         if self.base is None and not ends:
             x = self.surface.vertices
             raise InputError(

@@ -238,8 +238,7 @@ class Rim:
         onto : moves points (n, 3) onto the surface.
         normal : outward unit normals (n, 3) of the surface at points.
         """
-        points, edges, after, count = list[Floats](), list[Floats](), list[Ints](), 0
-        drawn = list[Floats]()
+        points, drawn, after, count = list[Floats](), list[Floats](), list[Ints](), 0
         for given in loops:
             length = np.linalg.norm(np.roll(given, -1, axis=0) - given, axis=1)
             loop = given[length > TOUCH * length.sum()]
@@ -250,11 +249,11 @@ class Rim:
             drawn.append(onto(straight[(straight != smooth).any(axis=1)]))
             x = x[np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1) > 0]
             points.append(x)
-            edges.append(np.roll(x, -1, axis=0) - x)
             after.append(count + (np.arange(len(x)) + 1) % len(x))
             count += len(x)
-        x, along = np.vstack(points), np.vstack(edges)
-        rim = Rim(x, unit(cross(normal(x + 0.5 * along), along)), np.concatenate(after))
+        x, onward = np.vstack(points), np.concatenate(after)
+        along = x[onward] - x
+        rim = Rim(x, unit(cross(normal(x + 0.5 * along), along)), onward)
         return replace(rim, off=float(np.abs(rim.distance(np.vstack(drawn))).max(initial=0.0)))
 
     def __repr__(self) -> str:
