@@ -6,7 +6,7 @@ import ezdxf
 import numpy as np
 from ezdxf import path as curves
 
-ARCS = 8  # cubics for a circle: within 4e-6 of the radius; with four, as ezdxf would have it, within 3e-4
+ARCS = 8  # cubics for a circle: within 4e-6 of the radius; with the four of ezdxf within 3e-4
 KINDS = "LINE LWPOLYLINE POLYLINE ARC CIRCLE ELLIPSE SPLINE"
 
 

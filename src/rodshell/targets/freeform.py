@@ -103,17 +103,17 @@ class Freeform(Target):
     @property
     def warnings(self) -> tuple[str, ...]:
         ends, moved = self._open_ends
-        words, which = list(self.repairs), ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
+        words, names = list(self.repairs), ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
         offs = [rim.off for rim in self.rims]
         offs[-1:] = [max([off, *map(self._off, filter(self._is_in_space, self.curves))]) for off in offs[-1:]]
         words += [
-            f"the shell ends up to {length_text(off)} from {given}: on the smooth surface, in a smooth curve where six "
+            f"the shell ends up to {length_text(off)} from {name}: on the smooth surface, in a smooth curve where six "
             "or more of its points turn by little; give more points, or corners"
-            for given, off in zip(which, offs, strict=False)
+            for name, off in zip(names, offs, strict=False)
             if off > TOLD * self.size
         ]
         if moved:
-            edges = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else f"{which[0]} is"
+            edges = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else f"{names[0]} is"
             words.append(
                 f"{edges} jagged where faces are missing: the shell ends at a smooth curve, up to "
                 f"{length_text(max(moved))} from the vertices there; to end it elsewhere give target.boundary"
