@@ -165,6 +165,28 @@ def test_a_nurbs_patch_is_met_and_its_trim_bounds_it(tmp_path):
     assert target.margin(0.17 * ring) == pytest.approx(-0.02, rel=1e-3)
 
 
+def test_arcs_and_splines_of_a_dxf_are_curves_and_its_lines_are_straight(tmp_path):
+    """Cubics that stand for a quarter of a circle, as ezdxf makes them, are 3e-4 of the radius off."""
+    import ezdxf
+
+    drawing = ezdxf.new()
+    model, half = drawing.modelspace(), 0.5**0.5
+    model.add_circle((0, 0), 4.0)
+    model.add_lwpolyline([(3, 0, 1), (-3, 0, 1)], format="xyb", close=True)
+    square = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)])
+    knots = [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]
+    model.add_rational_spline(2.0 * np.pad(square, ((0, 0), (0, 1))), [1, half] * 4 + [1], degree=2, knots=knots)
+    corners = np.array([(0.9, 0.0), (0.3, 0.4), (-0.5, 0.2), (-0.2, -0.6)])
+    for one, other in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        model.add_line(one, other)
+    drawing.saveas(tmp_path / "edge.dxf")
+    *curves, drawn = read_curves(tmp_path / "edge.dxf", 1.0)
+    for curve, radius in zip(curves, (4.0, 3.0, 2.0), strict=True):
+        assert np.hypot(*curve[:, :2].T) == pytest.approx(radius, rel=3e-5)
+        assert len(curve) > 300
+    assert sorted(map(tuple, drawn[:, :2])) == sorted(map(tuple, corners))
+
+
 @pytest.mark.slow
 def test_the_command_line_takes_a_mesh_and_writes_a_case_that_gives_it_again(bowl, tmp_path, capsys):
     (tmp_path / "roof.obj").write_bytes(WRITERS["obj"](20 * bowl[0], bowl[1]))

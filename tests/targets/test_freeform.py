@@ -46,8 +46,8 @@ def dome(rows: int = 30) -> Mesh:
     ],
 )
 def test_rod_ends_converge_to_those_of_the_analytic_target(kind, target):
-    """Two thousand and eight thousand faces; the error falls by 4^2 or more (fourth order in the edge is 16), until
-    it meets what is left of the rim's and the march's own errors, some 2e-6 of the size."""
+    """Two thousand and eight thousand faces; the error falls by 4^2 or more (fourth order in the edge is 16), until it
+    meets what is left of the rim's and the march's own errors, some 2e-6 of the size, 6e-6 where rods graze it."""
     exact, error = ends(target, anchor=(0.0, 0.0)), []
     for rows in (18, 36):
         x, faces = capped_sphere(rows, np.pi / 2)
@@ -55,7 +55,7 @@ def test_rod_ends_converge_to_those_of_the_analytic_target(kind, target):
         chosen = mesh.get(kind) or disc(lambda x, y: (x**2 - y**2) / 0.8, RADIUS, rows)
         error.append(apart(ends(Freeform.of(*chosen), anchor=(0.0, 0.0)), exact) / RADIUS)
     assert error[0] < 1e-3  # 1.3e-4, 7e-4 and 2e-6 measured
-    assert error[1] < max(error[0] / 8, 5e-6)
+    assert error[1] < max(error[0] / 8, 7e-6)
 
 
 def shuffled(x: Floats, faces: np.ndarray) -> Mesh:

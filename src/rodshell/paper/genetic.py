@@ -23,8 +23,7 @@ from rodshell.progress import Progress, silent
 
 SEED = 1
 SEARCHES = Path("out") / "genetic-searches"
-AGAIN = 3e-3  # relative difference allowed in the rms of a shell popped up again: the kept searches took their boundary from a
-# drape whose ends were up to 0.1 mm elsewhere
+AGAIN = 3e-3  # relative difference allowed in the rms of a shell popped up again; 2e-3 of the kept searches measured
 REPEATS = 3  # of the direct method; the least time counts
 COLUMNS = (
     "target", "G0 by", "values sought", "forward runs", "processor time [s]", "popped shape, rms [mm]", "max [mm]",

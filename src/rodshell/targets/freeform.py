@@ -12,7 +12,7 @@ from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.targets.field_fitting import cubic_spacing, fill_openings, fit_field, mesh_samples
-from rodshell.targets.rim import Rim, smooth_loop
+from rodshell.targets.rim import UPRIGHT, Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Gap, Implicit, Target
 from rodshell.targets.trianglemesh import FARTHEST, TriangleMesh, sound_mesh
@@ -25,6 +25,7 @@ PAST = 0.6  # of the size: how far the surface is continued past an open rim
 OFF = 0.005  # of the size: where a vertex is further off its smooth field, the field does not follow the mesh
 ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
+TOLD = 2e-4  # of the size: how far from what is given the shell may end without a word
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
 MOST_ALONG = 100_000  # points of all these curves
 MOST_ENDS = 200  # closed curves at which a surface ends: each is followed at 1,500 points
@@ -102,14 +103,22 @@ class Freeform(Target):
     @property
     def warnings(self) -> tuple[str, ...]:
         ends, moved = self._open_ends
-        if not moved:
-            return self.repairs
-        edges = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else "the edge of the mesh is"
-        return (
-            *self.repairs,
-            f"{edges} jagged where faces are missing: the shell ends at a smooth curve, up to "
-            f"{length_text(max(moved))} from the vertices there; to end it elsewhere give target.boundary",
-        )
+        words, names = list(self.repairs), ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
+        offs = [rim.off for rim in self.rims]
+        offs[-1:] = [max([off, *map(self._off, filter(self._is_in_space, self.curves))]) for off in offs[-1:]]
+        words += [
+            f"the shell ends up to {length_text(off)} from {name}: on the smooth surface, in a smooth curve where six "
+            "or more of its points turn by little; give more points, or corners"
+            for name, off in zip(names, offs, strict=False)
+            if off > TOLD * self.size
+        ]
+        if moved:
+            edges = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else f"{names[0]} is"
+            words.append(
+                f"{edges} jagged where faces are missing: the shell ends at a smooth curve, up to "
+                f"{length_text(max(moved))} from the vertices there; to end it elsewhere give target.boundary"
+            )
+        return tuple(words)
 
     def __repr__(self) -> str:
         widths = " x ".join(f"{width:.3g}" for width in np.ptp(self.surface.vertices, axis=0))
@@ -177,11 +186,30 @@ class Freeform(Target):
         return Rim.of(loops, self._settle, lambda x: unit(self.level(x)[1]))
 
     def _settle(self, x: Floats) -> Floats:
-        """As `retract`, for points very close to the surface; it does not need the size, which depends on the rims."""
+        """Points (n, 3) near the surface moved onto it: straight up or down, so that what is straight in plan stays so,
+        or to the closest where it is steep. Other than `retract` it does not need the size, which the rims decide."""
+        y = x
         for _ in range(3):
-            value, gradient = self.level(x)
-            x = x - (value / np.einsum("ij,ij->i", gradient, gradient))[:, None] * gradient
-        return x
+            value, gradient = self.level(y)
+            y = y - (value / dot(gradient, gradient))[:, None] * gradient
+        over = np.column_stack([x[:, :2], self._straight_up(np.column_stack([x[:, :2], y[:, 2]]))])
+        near = UPRIGHT * np.abs(over - x)[:, 2] <= np.linalg.norm(y - x, axis=1) + 1e-9 * self._extent
+        return np.where(near[:, None], over, y)
+
+    def _straight_up(self, x: Floats) -> Floats:
+        """z (n,) of the surface straight above or below points (n, 3) [m]; NaN where none is found."""
+        z, left, step = x[:, 2].copy(), np.flatnonzero(np.isfinite(x[:, 2])), np.empty(0)
+        for _ in range(20):
+            value, gradient = self.level(np.column_stack([x[left, :2], z[left]]))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = np.clip(-value / gradient[:, 2], -0.1 * self._extent, 0.1 * self._extent)
+            z[left] += step
+            busy = np.abs(step) > 1e-14 * self._extent
+            left, step = left[busy], step[busy]
+            if not len(left):
+                break
+        z[left[np.abs(step) > 1e-9 * self._extent]] = np.nan
+        return z
 
     def margin(self, x: Floats) -> Floats:
         """Distance (n,) [m] of the points `x` (n, 3) to the nearest of base plane, open boundary and curves."""
@@ -220,17 +248,8 @@ class Freeform(Target):
         z = self._heights_of_facets(xy)
         for k in np.flatnonzero(np.isnan(z)):
             z[k] = self._height_of_filling(*xy[k].tolist())
-        left = np.flatnonzero(np.isfinite(z))
-        for _ in range(20):  # from the facets to the smooth surface, straight up or down
-            value, gradient = self.level(np.column_stack([xy[left], z[left]]))
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = -value / gradient[:, 2]
-            near = np.abs(step) < 0.1 * self._extent
-            z[left] = np.where(near, z[left] + step, np.nan)
-            left = left[near & (np.abs(step) > 1e-14 * self._extent)]
-            if not len(left):
-                break
-        return z
+        smooth = self._straight_up(np.column_stack([xy, z]))
+        return np.where(np.abs(smooth - z) < 0.1 * self._extent, smooth, np.nan)
 
     def _heights_of_facets(self, xy: Floats) -> Floats:
         """z (n,) of the uppermost facet over points of the plan, or NaN."""
@@ -292,13 +311,16 @@ class Freeform(Target):
 
     def _over(self, curve: Floats) -> Floats:
         """A curve drawn in a horizontal plane, such as a plan, projected onto the surface; any other curve as it is."""
-        if np.ptp(curve[:, 2]) > 1e-6 * self._extent or self._off(curve) < ASIDE * self._extent:
+        if self._is_in_space(curve) or self._off(curve) < ASIDE * self._extent:
             return curve
         z = self.height_at(curve[:, :2])
         if not np.isfinite(z).all():
             x, y, _ = curve[int(np.argmin(np.isfinite(z)))]
             raise InputError(f"the boundary curve leaves the surface in plan near ({x:.4g}, {y:.4g}) m: draw it inside")
         return np.column_stack([curve[:, :2], z])
+
+    def _is_in_space(self, curve: Floats) -> bool:
+        return float(np.ptp(curve[:, 2])) > 1e-6 * self._extent
 
     def _off(self, curve: Floats) -> float:
         """Largest distance of a curve from the surface [m]."""
@@ -317,6 +339,8 @@ class Freeform(Target):
             far = float(np.abs(curve).max(initial=0.0))
             if not far <= FARTHEST:
                 raise InputError(f"the boundary curve has coordinates up to {far:.3g} m: draw it on the surface")
+            if len(np.unique(curve, axis=0)) < 3:
+                raise InputError("the boundary curve has fewer than three different points: draw it around the shell")
         if self.base is None and not ends:
             x = self.surface.vertices
             raise InputError(

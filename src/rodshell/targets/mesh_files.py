@@ -30,7 +30,7 @@ MOST_HEIGHTS = MOST_FACES // 2
 MOST_PARTS = 500  # nodes, solids, properties: readers need time for each pair of them
 MOST_STROKES = 5_000  # curves of a drawing: they are joined end to end
 NO_INDEX = re.compile(rb"^f[ \t](?:.*[ \t])?-?0+(?![^\s/]).*", re.MULTILINE)  # indices begin at 1
-SAG = 1e-4  # of a curve's extent: how finely arcs and splines of a DXF are divided
+SAG = 2e-5  # of a curve's extent: how finely arcs and splines of a DXF are divided
 
 
 def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = None) -> tuple[Floats, Ints]:

@@ -1,10 +1,13 @@
 """Where a target ends: regions of the plan, and closed curves on a surface.
 
 A region is the domain of a height field, or is enclosed by a rim in plan. A rim separates the shell from the rest of a
-surface; jagged edges of meshes are smoothed.
+surface. It is the polyline that a drawing or a mesh gives: its sides are straight seen from above, or along the normal
+where the surface is steep, and its corners are corners. It is a smooth curve only where six points or more turn by
+little, and alike (`Rim.of`). Jagged edges of meshes are smoothed.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
@@ -13,12 +16,15 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.dataclass import dataclass
-from rodshell.geometry.curves import on_curve
+from rodshell.geometry.curves import TOUCH, on_curve
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
 from rodshell.validation import keep, numbers, positive
 
-CORNER = 0.5  # cosine of 60 degrees: a loop is not rounded where its edges turn by more
+UPRIGHT = 0.2  # upward part of a normal: a steeper surface is not seen from above, and may overhang its edge
+CORNER = 0.25  # [rad], 14 degrees, as of 25 points on a circle: a loop is not rounded where its edges turn by more
+UNLIKE = 3.0  # times: curvatures of a polyline that differ by more from point to point are not those of one curve
+ON_A_CURVE = 6  # points in a row, at least: fewer are corners between straight sides
 POINTS = 1500  # on each loop
 IN_A_BALL = 32  # points in each bounding ball
 
@@ -210,15 +216,21 @@ class Rim:
     points : (n, 3) points of all loops, one loop after the other [m].
     inward : (n, 3) unit vectors in the surface, across the edge from each point to the next, towards the shell.
     after : (n,) index of the next point of the loop.
+    off : largest distance from the loops as they are given, with straight sides, along the surface [m].
     """
 
     points: Floats
     inward: Floats
     after: Ints
+    off: float = 0.0
 
     @staticmethod
     def of(loops: Sequence[Floats], onto: Callable[[Floats], Floats], normal: Callable[[Floats], Floats]) -> "Rim":
-        """Refine loops into a rim, by cubics between corners.
+        """Refine loops into a rim, as they are drawn, with cubics where their points are those of a smooth curve.
+
+        A point is a corner where the loop turns by more than 14 degrees, or curves three times as much as at both its
+        neighbours. A straight side ends where the loop curves three times as much beyond as before, and turns as at the
+        first of equal edges. Between corners and such ends six points or more are joined by cubics, and fewer by sides.
 
         Parameters
         ----------
@@ -226,16 +238,23 @@ class Rim:
         onto : moves points (n, 3) onto the surface.
         normal : outward unit normals (n, 3) of the surface at points.
         """
-        points, edges, after, count = list[Floats](), list[Floats](), list[Ints](), 0
-        for loop in loops:
-            x = onto(_rounded(loop))
+        points, drawn, after, count = list[Floats](), list[Floats](), list[Ints](), 0
+        for given in loops:
+            length = np.linalg.norm(np.roll(given, -1, axis=0) - given, axis=1)
+            loop = given[length > TOUCH * length.sum()]
+            up = normal(onto(loop))
+            upright = np.abs(up[:, 2:]) > UPRIGHT
+            straight, smooth = _refined(loop, np.where(upright, np.copysign([0.0, 0.0, 1.0], up[:, 2:]), up))
+            x = onto(smooth)
+            drawn.append(onto(straight[(straight != smooth).any(axis=1)]))
             x = x[np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1) > 0]
             points.append(x)
-            edges.append(np.roll(x, -1, axis=0) - x)
             after.append(count + (np.arange(len(x)) + 1) % len(x))
             count += len(x)
-        x, along = np.vstack(points), np.vstack(edges)
-        return Rim(x, unit(cross(normal(x + 0.5 * along), along)), np.concatenate(after))
+        x, onward = np.vstack(points), np.concatenate(after)
+        along = x[onward] - x
+        rim = Rim(x, unit(cross(normal(x + 0.5 * along), along)), onward)
+        return replace(rim, off=float(np.abs(rim.distance(np.vstack(drawn))).max(initial=0.0)))
 
     def __repr__(self) -> str:
         return f"Rim({len(self.points)} points in {self.loops} loop{'s' * (self.loops != 1)})"
@@ -349,27 +368,50 @@ def _edge(points, k, after):  # type: ignore[no-untyped-def]
     return points[after, 0] - points[k, 0], points[after, 1] - points[k, 1], points[after, 2] - points[k, 2]
 
 
-def _rounded(loop: Floats) -> Floats:
-    """A finer loop, by cubics through its points between corners."""
-    before, ahead = loop - np.roll(loop, 1, axis=0), np.roll(loop, -1, axis=0) - loop
-    cosine = dot(before, ahead) / np.maximum(np.linalg.norm(before, axis=1) * np.linalg.norm(ahead, axis=1), 1e-300)
-    corners = np.flatnonzero(cosine < CORNER)
-    pieces = max(1, int(np.ceil(POINTS / len(loop))))
-    if len(corners) == 0:
-        reach = min(3, len(loop))
-        return _piece(np.vstack([loop[-reach:], loop, loop[: reach + 1]]), pieces)[reach * pieces : -reach * pieces - 1]
-    turned = np.roll(loop, -corners[0], axis=0)
-    stops = np.append(corners - corners[0], len(loop))
-    closed = np.vstack([turned, turned[:1]])
-    return np.vstack([_piece(closed[a : b + 1], pieces)[:-1] for a, b in pairwise(stops.tolist())])
+def _turns(loop: Floats, sight: Floats) -> Floats:
+    """Angles (n,) by which a closed polyline turns to the left at its points, seen against `sight` (n, 3)."""
+    ahead = np.roll(loop, -1, axis=0) - loop
+    before = np.roll(ahead, 1, axis=0)
+    level = dot(before, ahead) - dot(before, sight) * dot(ahead, sight)
+    return np.arctan2(dot(cross(before, ahead), sight), level)
 
 
-def _piece(points: Floats, pieces: int) -> Floats:
-    s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    fine = np.interp(np.arange((len(s) - 1) * pieces + 1) / pieces, np.arange(len(s)), s)
-    if len(points) < 4:
-        return np.column_stack([np.interp(fine, s, points[:, k]) for k in range(3)])
-    return on_curve(s, points, fine)
+def _refined(loop: Floats, sight: Floats) -> tuple[Floats, Floats]:
+    """Some `POINTS` points of a loop or more, evenly spaced on each of its sides; and the same where it is smooth."""
+    ahead, number = np.roll(loop, -1, axis=0) - loop, len(loop)
+    length = np.linalg.norm(ahead, axis=1)
+    s = np.cumsum(length) - length
+    around = float(length.sum())
+    count = np.ceil(POINTS * np.maximum(length / around, 1 / number)).astype(np.intp)
+    begin, total = np.cumsum(count) - count, int(count.sum())
+    side = np.repeat(np.arange(number), count)
+    share = (np.arange(total) - begin[side]) / count[side]
+    straight = loop[side] + share[:, None] * ahead[side]
+    smooth, at = straight.copy(), s[side] + share * length[side]
+    stops = np.flatnonzero(_stops(_turns(loop, sight), length))
+    runs = list(pairwise([*stops.tolist(), *(stops[:1] + number).tolist()])) or [(-3, number + 3)]
+    for first, last in runs:
+        if last - first + 1 >= ON_A_CURVE:
+            lap, k = np.divmod(np.arange(first, last + 1), number)
+            rows = np.arange(total) if first < 0 else np.arange(begin[first], begin[k[-1]] + lap[-1] * total)
+            beyond, rows = np.divmod(rows, total)
+            smooth[rows] = on_curve(s[k] + lap * around, loop[k], at[rows] + beyond * around)
+    return straight, smooth
+
+
+def _stops(turn: Floats, length: Floats) -> Bools:
+    """(n,) which points of a loop are corners, or ends of straight sides; see `Rim.of`."""
+    turn, before = np.abs(turn), np.roll(length, 1)
+    curvature = 2 * turn / (length + before)
+    result = turn > CORNER
+    curvature[result] = 0.0
+    result |= curvature > UNLIKE * np.maximum(np.roll(curvature, 1), np.roll(curvature, -1))
+    curvature[result] = 0.0
+    for step, side in ((1, length), (-1, before)):
+        straight, curved, further = (np.roll(curvature, k * step) for k in (1, -1, -2))
+        foot = (UNLIKE * straight < curved) & (curvature < 0.7 * curved) & (further < 1.2 * curved)  # no inflection
+        result |= foot & (2 * turn / side > 0.5 * curved)  # it turns as half an edge of the curve
+    return result
 
 
 def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
@@ -407,10 +449,7 @@ def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
 
 def _jagged(loop: Floats, normals: Floats) -> Bools:
     """(n,) which vertices are in jagged parts: rows of jogs at short distances."""
-    count = len(loop)
-    ahead = np.roll(loop, -1, axis=0) - loop
-    before = np.roll(ahead, 1, axis=0)
-    turn = np.arctan2(dot(cross(before, ahead), normals), dot(before, ahead))
+    count, turn = len(loop), _turns(loop, normals)
     after = np.roll(turn, -1)
     jogs = np.flatnonzero((turn * after < 0) & (np.minimum(np.abs(turn), np.abs(after)) > SHARP))
     result = np.zeros(count, dtype=bool)

@@ -16,7 +16,7 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
-from rodshell.targets.rim import Domain, Rim
+from rodshell.targets.rim import CORNER, UPRIGHT, Domain, Rim
 from rodshell.targets.target import Gap, Implicit, Target, offset_shape
 
 if TYPE_CHECKING:
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 LEVEL = 1e-4  # of the size: an edge this even counts as a base
 FAR = 0.5  # of the field's reach
-UPRIGHT = 0.2  # upward part of a normal: where the edge is not level, a steeper surface may overhang it
-CORNER = 0.9  # cosine between edges of the rim: its points are close, and smooth curves turn by far less
+ROUND = np.cos(CORNER)  # between edges of the rim: a curve turns by less
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +130,7 @@ class RimPlan:
         after = self.rim.after
         along = unit((self.rim.points[after] - self.rim.points)[:, :2])
         across = np.column_stack([along[:, 1], -along[:, 0]])
-        ends_sharp = np.einsum("ni,ni->n", along, along[after]) < CORNER
+        ends_sharp = np.einsum("ni,ni->n", along, along[after]) < ROUND
         at_end = np.where(ends_sharp[:, None], across, unit(across + across[after]))
         at_start, begins_sharp = across.copy(), np.zeros_like(ends_sharp)
         at_start[after], begins_sharp[after] = np.where(ends_sharp[:, None], across[after], at_end), ends_sharp
