@@ -379,7 +379,7 @@ def _stretched(draped: Draped) -> tuple[str, ...]:
 
 
 def _off_the_end(trimmed: Trimmed) -> tuple[str, ...]:
-    """A warning where supports of the net's rods lie beside the target's end: edges are straight, rods are bent."""
+    """A warning where supports of the net's rods lie off the target's end: edges are straight, rods are bent."""
     draped, points = trimmed.draped, trimmed.boundary.points
     if draped.eccentricity or not isinstance(draped.method, Bound):
         return ()
