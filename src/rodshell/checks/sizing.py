@@ -13,6 +13,7 @@ arc over a single rod's chord is right only where the ends of all rods belong to
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import cache
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -105,6 +106,7 @@ class Fit:
         slender = SLENDER * target.size
         room = ROOM * min(layout.spacing)
 
+        @cache  # a net costs more than all that is asked of it
         def bends() -> Bends:
             found = bends_of(target, layout, anchor)
             return found if (joint or Ball()).holds_normals else found.rolled()

@@ -234,19 +234,29 @@ class Freeform(Target):
 
     def _heights_of_facets(self, xy: Floats) -> Floats:
         """z (n,) of the uppermost facet over points of the plan, or NaN."""
-        a, b, c = (self.surface.vertices[k] for k in self.surface.faces.T)
-        z, at_once = np.full(len(xy), np.nan), max(1, AT_ONCE // len(a))
-        for begin in range(0, len(xy), at_once):
-            x, y = (side[:, None] for side in xy[begin : begin + at_once].T)
+        from scipy.spatial import cKDTree
+
+        z, known = np.full(len(xy), np.nan), np.flatnonzero(np.isfinite(xy).all(axis=1))
+        if not len(known):
+            return z
+        corners = self.surface.vertices[self.surface.faces]
+        low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+        middle, radius = 0.5 * (low + high), (0.5 + 1e-9) * np.linalg.norm(high - low, axis=1)
+        tree = cKDTree(xy[known])
+        over = np.flatnonzero(((low <= xy[known].max(axis=0)) & (high >= xy[known].min(axis=0))).all(axis=1))
+        for some in np.array_split(over, -(-len(over) * len(known) // AT_ONCE) or 1):
+            near = tree.query_ball_point(middle[some], radius[some])
+            facet = np.repeat(some, [len(points) for points in near])
+            point = known[np.concatenate([*near, []]).astype(np.intp)]
+            x, y = xy[point].T
+            a, b, c = corners[facet].transpose(1, 0, 2)
             wedge = np.stack(
                 [(p[:, 0] - x) * (q[:, 1] - y) - (p[:, 1] - y) * (q[:, 0] - x) for p, q in ((b, c), (c, a), (a, b))]
             )
-            point, facet = np.nonzero((wedge >= 0).all(axis=0) | (wedge <= 0).all(axis=0))
-            weight = wedge[:, point, facet]
-            total = weight.sum(axis=0)
-            point, facet, weight, total = (part[..., total != 0] for part in (point, facet, weight, total))
-            height = (weight * [a[facet, 2], b[facet, 2], c[facet, 2]]).sum(axis=0) / total
-            np.fmax.at(z, begin + point, height)
+            total = wedge.sum(axis=0)
+            inside = ((wedge >= 0).all(axis=0) | (wedge <= 0).all(axis=0)) & (total != 0)
+            height = (wedge * [a[:, 2], b[:, 2], c[:, 2]]).sum(axis=0)[inside] / total[inside]
+            np.fmax.at(z, point[inside], height)
         return z
 
     def _height_of_filling(self, x: float, y: float) -> float:
