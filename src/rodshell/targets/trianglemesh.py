@@ -159,7 +159,7 @@ def _require_numbers(vertices: Floats, faces: Ints, name: str) -> None:
 
 
 def require_indices(vertices: Floats, faces: Ints, name: str) -> None:
-    """Refuse faces (m, 3) with vertices that are not there."""
+    """Refuse faces, of any shape, with vertices that are not there."""
     if faces.min(initial=0) < 0 or faces.max(initial=-1) >= len(vertices):
         wrong = int(faces.max() if faces.min() >= 0 else faces.min())
         raise InputError(f"{name} is damaged: a face refers to vertex {wrong} of {len(vertices)}: export it again")
