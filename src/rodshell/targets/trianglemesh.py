@@ -10,7 +10,8 @@ from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot
 
-CREASE = 40.0  # degrees between faces: a smooth piece ends there
+CREASE = 40.0  # degrees between faces, and between what is on either side: a smooth piece ends there
+STRAY = 0.01  # of the area: separate pieces with less in sum are left out
 WELD = 1e-6  # of the largest extent: vertices this close are merged; single precision has 1e-7
 MOST_FACES = 3_000_000
 FARTHEST = 1e9  # m: coordinates that are still known to a micrometre
@@ -125,15 +126,8 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, 
     InputError : the mesh is empty, not finite, not manifold, one-sided, creased or in several pieces; names the place.
     """
     _require_numbers(vertices, faces, name)
-    mesh, repairs = _welded(vertices, faces, name), list[str]()
+    mesh, repairs = _main_piece(_welded(vertices, faces, name), name)
     neighbours = _Neighbours.of(mesh, name)
-    pieces = neighbours.pieces(np.ones(len(neighbours.edges), dtype=bool), len(mesh.faces))
-    if pieces.max() > 0:
-        shares = np.sort(np.bincount(pieces, mesh.areas))[::-1] / mesh.areas.sum()
-        raise InputError(
-            f"{name} has {pieces.max() + 1} separate pieces (the largest two have {100 * shares[0]:.0f} and "
-            f"{100 * shares[1]:.0f} % of the area): keep one, or join them"
-        )
     turned = neighbours.turned(len(mesh.faces), name, mesh)
     if turned.any() and not turned.all():
         fewer = min(int(turned.sum()), int((~turned).sum()))
@@ -183,6 +177,32 @@ def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
     if len(mesh.faces) == 0 or mesh.areas.sum() < 1e-9 * extent**2:
         raise InputError(f"{name} has no area, all its faces are degenerate: export it again")
     return mesh
+
+
+def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]:
+    """The mesh without stray objects: faces that no edge connects to the rest."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    first, edge = unique_rows(np.column_stack([np.minimum(a, b), np.maximum(a, b)]).astype(np.int64))
+    count = len(mesh.faces)
+    graph = coo_matrix((np.ones(len(a)), (np.arange(len(a)) // 3, count + edge)), (count + len(first),) * 2)
+    pieces = connected_components(graph, directed=False)[1][:count]
+    shares = np.bincount(pieces, mesh.areas) / mesh.areas.sum()
+    if len(shares) == 1:
+        return mesh, []
+    if shares.max() < 1 - STRAY:
+        largest = 100 * np.sort(shares)[::-1]
+        raise InputError(
+            f"{name} has {len(shares)} separate pieces (the largest two have {largest[0]:.0f} and {largest[1]:.0f} % "
+            "of the area): keep one, or join them"
+        )
+    others = pieces != np.argmax(shares)
+    return mesh.only(~others), [
+        f"{len(shares) - 1} separate piece{'s' * (len(shares) > 2)} of {others.sum()} faces, with "
+        f"{100 * (1 - shares.max()):.2g} % of the area, was left out"
+    ]
 
 
 def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
@@ -294,10 +314,13 @@ def _smooth_piece(
 ) -> tuple[TriangleMesh, list[str]]:
     """The piece between creases that covers most of the plan, facing up."""
     i, j = neighbours.faces.T
-    length = 2 * mesh.areas
-    flat = (length[i] > 0) & (length[j] > 0)
-    cosine = dot(mesh.doubled[i], mesh.doubled[j]) / np.maximum(length[i] * length[j], 1e-300)
-    smooth = ~flat | (cosine > cos(radians(CREASE)))
+    # A sliver's own normal is noise: it is judged with the faces on its side of the edge, by their areas.
+    around = np.zeros_like(mesh.doubled)
+    np.add.at(around, i, mesh.doubled[j])
+    np.add.at(around, j, mesh.doubled[i])
+    sides = [mesh.doubled[one] + around[one] - mesh.doubled[other] for one, other in ((i, j), (j, i))]
+    cosine = np.maximum(_cosine(mesh.doubled[i], mesh.doubled[j]), _cosine(*sides))
+    smooth = cosine > cos(radians(CREASE))
     closed = not len(mesh.loops)
     pieces = neighbours.pieces(smooth, len(mesh.faces))
     plan = np.bincount(pieces, mesh.doubled[:, 2]) / 2
@@ -306,7 +329,7 @@ def _smooth_piece(
         within = np.flatnonzero(~smooth & (pieces[i] == chosen) & (pieces[j] == chosen))
         share = mesh.areas[pieces == chosen].sum() / mesh.areas.sum()
         if len(within) or share < 0.1:
-            worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(np.where(flat, cosine, 2.0)))
+            worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(cosine))
             angle, where = degrees(np.arccos(np.clip(cosine[worst], -1, 1))), place(mesh, neighbours.edges[worst, 0])
             raise InputError(
                 f"{name} is creased: faces meet at {angle:.0f} degrees near {where}, and a target must be smooth: "
@@ -321,6 +344,12 @@ def _smooth_piece(
     if not closed and plan[chosen] < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
     return mesh, repairs
+
+
+def _cosine(a: Floats, b: Floats) -> Floats:
+    """Of the angles between vectors (n, 3); 1 where one has no length."""
+    length = np.sqrt(dot(a, a) * dot(b, b))
+    return np.asarray(np.where(length > 0, dot(a, b) / np.maximum(length, 1e-300), 1.0))
 
 
 def place(mesh: TriangleMesh, vertex: int) -> str:
