@@ -11,19 +11,16 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.targets.field_fitting import cubic_spacing, fill_openings, fit_field, mesh_samples
+from rodshell.targets.field_fitting import OFF, Fit, fit_mesh
 from rodshell.targets.rim import Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
-from rodshell.targets.target import Gap, Implicit, Target
+from rodshell.targets.target import Deviation, Gap, Implicit, Target
 from rodshell.targets.trianglemesh import FARTHEST, TriangleMesh, sound_mesh
 from rodshell.targets.wall_below_rim import WalledSurface, walled_surface
 from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 from rodshell.validation import array, number
 
-PAST = 0.6  # of the size: how far the surface is continued past an open rim
-OFF = 0.005  # of the size: where a vertex is further off its smooth field, the field does not follow the mesh
-ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
 MOST_ALONG = 100_000  # points of all these curves
@@ -130,15 +127,18 @@ class Freeform(Target):
         return 0.5 * float(np.ptp(self.surface.vertices, axis=0).max())
 
     @cached_property
-    def _fitted(self) -> tuple[SmoothField, int]:
-        spacing = cubic_spacing(float(self.surface.areas.sum()), len(self.surface.vertices))
-        samples = fill_openings(self.surface, mesh_samples(self.surface, spacing), spacing)
-        return fit_field(samples, spacing, past=PAST * self._extent, reach=self._extent)
+    def _fitted(self) -> Fit:
+        return fit_mesh(self.surface, size=self._extent)
 
     @property
     def field(self) -> SmoothField:
         """The smooth implicit function that replaces the mesh."""
-        return self._fitted[0]
+        return self._fitted.field
+
+    @property
+    def deviation(self) -> Deviation:
+        off = self._fitted.off
+        return Deviation(float(off.max()), float(np.sqrt(np.mean(off**2))))
 
     def implicit(self, x: Floats) -> Implicit:
         return self.field.implicit(x)
@@ -149,7 +149,7 @@ class Freeform(Target):
 
     def covers(self, x: Floats) -> Bools:
         """Whether points `x` (n, 3) of the surface are inside the end, or where an opening was filled."""
-        return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted[1])
+        return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted.cubics)
 
     @cached_property
     def rims(self) -> tuple[Rim, ...]:
@@ -261,7 +261,7 @@ class Freeform(Target):
 
     def _height_of_filling(self, x: float, y: float) -> float:
         """z of the uppermost cubic that fills an opening over a point of the plan, or NaN."""
-        centres = self.field.centres[: self._fitted[1]]
+        centres = self.field.centres[: self._fitted.cubics]
         near = np.hypot(centres[:, 0] - x, centres[:, 1] - y) < self.field.spacing
         return float(centres[near, 2].max()) if near.any() else np.nan
 
@@ -347,14 +347,11 @@ class Freeform(Target):
 
     def _require_a_good_fit(self, name: str) -> None:
         """Refuse a mesh that its smooth field does not follow, as it is rough or two of its sheets are too close."""
-        x = self.surface.vertices
-        value, gradient = self.level(x)
-        cosine = dot(gradient, self.surface.normals) / np.linalg.norm(gradient, axis=1)
-        off = np.where(cosine > ASKEW, np.abs(value), np.inf)
-        k = int(np.argmax(np.where(np.isfinite(value), off, np.inf)))
+        off, x = self._fitted.off, self.surface.vertices
+        k = int(np.argmax(off))
         if not off[k] < OFF * self._extent:
             px, py, pz = x[k]
-            how = f"vertices lie {abs(value[k]):.2g} m off it" if np.isfinite(off[k]) else "normals point elsewhere"
+            how = f"vertices lie {off[k]:.2g} m off it" if np.isfinite(off[k]) else "normals point elsewhere"
             raise InputError(
                 f"{name} cannot be followed by a smooth surface near ({px:.4g}, {py:.4g}, {pz:.4g}) m, where its "
                 f"{how}: smooth it, mesh it more finely there, or separate sheets that touch or cross each other"

@@ -318,7 +318,7 @@ def _smooth_piece(
     around = np.zeros_like(mesh.doubled)
     np.add.at(around, i, mesh.doubled[j])
     np.add.at(around, j, mesh.doubled[i])
-    sides = [mesh.doubled[one] + around[one] - mesh.doubled[other] for one, other in ((i, j), (j, i))]
+    sides = [mesh.doubled[here] + around[here] - mesh.doubled[there] for here, there in ((i, j), (j, i))]
     cosine = np.maximum(_cosine(mesh.doubled[i], mesh.doubled[j]), _cosine(*sides))
     smooth = cosine > cos(radians(CREASE))
     closed = not len(mesh.loops)
