@@ -63,6 +63,7 @@ class Polygons:
         return np.vstack(parts)[np.argsort(np.concatenate(of), kind="stable")]
 
 
+@np.errstate(all="ignore")  # points that are not finite are refused later, with their place
 def _split(points: Floats, around: Ints) -> Ints:
     """Triangles (m, n - 2, 3) of faces with n corners `around` (m, n), by diagonals.
 
@@ -83,8 +84,7 @@ def _split(points: Floats, around: Ints) -> Ints:
         a, b, c = x[:, i], x[:, k], x[:, j]
         area = dot(cross(b - a, c - a), normal)
         squares = dot(b - a, b - a) + dot(c - b, c - b) + dot(a - c, a - c)
-        with np.errstate(all="ignore"):
-            total = np.where(area > FLAT * squares, squares / area, NEVER) + cost[:, i, k] + cost[:, k, j]
+        total = np.where(area > FLAT * squares, squares / area, NEVER) + cost[:, i, k] + cost[:, k, j]
         best = total.argmin(axis=2)[..., None]
         cost[:, i[:, 0], j[:, 0]] = np.take_along_axis(total, best, axis=2)[..., 0]
         middle[:, i[:, 0], j[:, 0]] = best[..., 0] + 1 + i[:, 0]

@@ -313,12 +313,17 @@ def _smooth_piece(
     mesh: TriangleMesh, neighbours: _Neighbours, name: str, repairs: list[str]
 ) -> tuple[TriangleMesh, list[str]]:
     """The piece between creases that covers most of the plan, facing up."""
+    from scipy.sparse import coo_matrix
+
     i, j = neighbours.faces.T
-    # A sliver's own normal is noise: it is judged with the faces on its side of the edge, by their areas.
-    around = np.zeros_like(mesh.doubled)
-    np.add.at(around, i, mesh.doubled[j])
-    np.add.at(around, j, mesh.doubled[i])
-    sides = [mesh.doubled[here] + around[here] - mesh.doubled[there] for here, there in ((i, j), (j, i))]
+    # A sliver's own normal is noise: it is judged with the two rows of faces behind it, by their areas near its edges.
+    ends = mesh.vertices[neighbours.edges]
+    square, double = np.sum((ends[:, 1] - ends[:, 0]) ** 2, axis=1), 2 * mesh.areas
+    share = [square / np.maximum(double[there], square) for there in (j, i)]
+    graph = coo_matrix((np.concatenate(share), (np.append(i, j), np.append(j, i))), (len(double),) * 2).tocsr()
+    near = mesh.doubled + graph @ mesh.doubled
+    wide = mesh.doubled + graph @ near
+    sides = wide[i] - share[0][:, None] * near[j], wide[j] - share[1][:, None] * near[i]
     cosine = np.maximum(_cosine(mesh.doubled[i], mesh.doubled[j]), _cosine(*sides))
     smooth = cosine > cos(radians(CREASE))
     closed = not len(mesh.loops)
