@@ -204,8 +204,8 @@ def _step_files() -> Iterator[tuple[Any, ...]]:
 
 def _crossing() -> tuple[Floats, Ints]:
     """A sheet whose two halves pass through each other."""
-    s, y = np.meshgrid(np.linspace(-2.2, 2.2, 60), np.linspace(-2, 2, 30), indexing="ij")
-    return _sheet(np.sin(2 * s) * 3, 2 * y, np.sin(s) * 3)
+    s, y = np.meshgrid(np.linspace(-3.3, 3.3, 60), np.linspace(-2, 2, 30), indexing="ij")
+    return _sheet(np.sin(2 * s) * 3, 2 * y, np.sin(s) * 6)
 
 
 def _folded() -> tuple[Floats, Ints]:

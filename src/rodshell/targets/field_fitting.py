@@ -238,7 +238,8 @@ class Fit:
     ----------
     field : the smooth implicit function.
     cubics : those of it that are on the surface (or fill an opening), which come first.
-    off : (n,) distance of each vertex of the mesh [m]; infinite where the field points elsewhere.
+    off : (n,) distance of each vertex of the mesh [m]; infinite where the field points elsewhere, or another sheet
+        crosses.
     """
 
     field: SmoothField
@@ -279,8 +280,21 @@ def _fit_at(mesh: TriangleMesh, spacing: float, size: float) -> Fit:
     field, cubics = fit_field(samples, spacing, past=PAST * size, reach=size)
     value, gradient, _ = field.implicit(mesh.vertices, second=False)
     slope = np.linalg.norm(gradient, axis=1)
-    follows = dot(gradient, mesh.normals) > ASKEW * slope
-    return Fit(field, cubics, np.where(follows & np.isfinite(value), np.abs(value), np.inf))
+    follows = (dot(gradient, mesh.normals) > ASKEW * slope) & np.isfinite(value)
+    follows[_crossed(mesh, samples, LONGEST * spacing)] = False
+    return Fit(field, cubics, np.where(follows, np.abs(value), np.inf))
+
+
+def _crossed(mesh: TriangleMesh, samples: Samples, reach: float) -> Ints:
+    """Vertices of a mesh where two sheets cross: samples closer than `reach` [m] face elsewhere, some as on a ridge and
+    some as in a groove."""
+    begin, near, _ = CellList.of(samples.points, reach).within(samples.points, reach)
+    here = np.repeat(np.arange(len(samples.points)), np.diff(begin))
+    turned = dot(samples.normals[here], samples.normals[near]) < SAME_SIDE
+    here, near = here[turned], near[turned]
+    bulge = dot(samples.normals[near] - samples.normals[here], samples.points[near] - samples.points[here])
+    both = np.intersect1d(here[bulge > 0], here[bulge < 0])
+    return CellList.of(mesh.vertices, reach).nearest(samples.points[both])[1][:, 0]
 
 
 def fit_field(samples: Samples, spacing: float, *, past: float, reach: float) -> tuple[SmoothField, int]:

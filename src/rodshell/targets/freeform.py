@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints, distinct
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
@@ -20,6 +21,9 @@ from rodshell.targets.wall_below_rim import WalledSurface, walled_surface
 from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 from rodshell.validation import array, number
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
@@ -218,8 +222,8 @@ class Freeform(Target):
         """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         z = self._heights_of_facets(xy)
-        for k in np.flatnonzero(np.isnan(z)):
-            z[k] = self._height_of_filling(*xy[k].tolist())
+        beside = np.flatnonzero(np.isnan(z) & np.isfinite(xy).all(axis=1))
+        z[beside] = self._heights_of_fillings(xy[beside])
         left = np.flatnonzero(np.isfinite(z))
         for _ in range(20):  # from the facets to the smooth surface, straight up or down
             value, gradient = self.level(np.column_stack([xy[left], z[left]]))
@@ -232,38 +236,45 @@ class Freeform(Target):
                 break
         return z
 
-    def _heights_of_facets(self, xy: Floats) -> Floats:
-        """z (n,) of the uppermost facet over points of the plan, or NaN."""
+    @cached_property
+    def _facets_by_size(self) -> "list[tuple[cKDTree, Ints, float]]":
+        """Trees of facets' centres in plan, one for each power of two of their widths; the facets; and that width."""
         from scipy.spatial import cKDTree
 
+        plan = self.surface.vertices[self.surface.faces, :2]
+        low, high = plan.min(axis=1), plan.max(axis=1)
+        reach = np.maximum(np.linalg.norm(high - low, axis=1), 1e-9 * self._extent)  # twice of what is enough
+        octave = np.ceil(np.log2(reach)).astype(int)
+        groups = [(np.flatnonzero(octave == k), 2.0**k) for k in distinct(octave).tolist()]
+        return [(cKDTree(0.5 * (low + high)[some]), some, far) for some, far in groups]
+
+    def _heights_of_facets(self, xy: Floats) -> Floats:
+        """z (n,) of the uppermost facet over points of the plan, or NaN."""
         z, known = np.full(len(xy), np.nan), np.flatnonzero(np.isfinite(xy).all(axis=1))
-        if not len(known):
-            return z
-        corners = self.surface.vertices[self.surface.faces]
-        low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
-        middle, radius = 0.5 * (low + high), (0.5 + 1e-9) * np.linalg.norm(high - low, axis=1)
-        tree = cKDTree(xy[known])
-        over = np.flatnonzero(((low <= xy[known].max(axis=0)) & (high >= xy[known].min(axis=0))).all(axis=1))
-        for some in np.array_split(over, -(-len(over) * len(known) // AT_ONCE) or 1):
-            near = tree.query_ball_point(middle[some], radius[some])
-            facet = np.repeat(some, [len(points) for points in near])
-            point = known[np.concatenate([*near, []]).astype(np.intp)]
-            x, y = xy[point].T
-            a, b, c = corners[facet].transpose(1, 0, 2)
-            wedge = np.stack(
-                [(p[:, 0] - x) * (q[:, 1] - y) - (p[:, 1] - y) * (q[:, 0] - x) for p, q in ((b, c), (c, a), (a, b))]
-            )
-            total = wedge.sum(axis=0)
-            inside = ((wedge >= 0).all(axis=0) | (wedge <= 0).all(axis=0)) & (total != 0)
-            height = (wedge * [a[:, 2], b[:, 2], c[:, 2]]).sum(axis=0)[inside] / total[inside]
-            np.fmax.at(z, point[inside], height)
+        for tree, facets, far in self._facets_by_size:
+            count = np.asarray(tree.query_ball_point(xy[known], 0.51 * far, return_length=True))
+            for some in np.split(np.arange(len(known)), np.flatnonzero(np.diff(np.cumsum(count) // AT_ONCE)) + 1):
+                near = tree.query_ball_point(xy[known[some]], 0.51 * far)
+                point = np.repeat(known[some], count[some])
+                facet = facets[np.concatenate([*near, []]).astype(np.intp)]
+                x, y = xy[point].T
+                a, b, c = self.surface.vertices[self.surface.faces[facet].T]
+                wedge = np.stack(
+                    [(p[:, 0] - x) * (q[:, 1] - y) - (p[:, 1] - y) * (q[:, 0] - x) for p, q in ((b, c), (c, a), (a, b))]
+                )
+                total = wedge.sum(axis=0)
+                inside = ((wedge >= 0).all(axis=0) | (wedge <= 0).all(axis=0)) & (total != 0)
+                height = (wedge * [a[:, 2], b[:, 2], c[:, 2]]).sum(axis=0)[inside] / total[inside]
+                np.fmax.at(z, point[inside], height)
         return z
 
-    def _height_of_filling(self, x: float, y: float) -> float:
-        """z of the uppermost cubic that fills an opening over a point of the plan, or NaN."""
+    def _heights_of_fillings(self, xy: Floats) -> Floats:
+        """z (n,) of the uppermost cubic on the surface, or filling an opening, near points of the plan, or NaN."""
+        from scipy.spatial import cKDTree
+
         centres = self.field.centres[: self._fitted.cubics]
-        near = np.hypot(centres[:, 0] - x, centres[:, 1] - y) < self.field.spacing
-        return float(centres[near, 2].max()) if near.any() else np.nan
+        near = cKDTree(centres[:, :2]).query_ball_point(xy, self.field.spacing)
+        return np.array([centres[found, 2].max() if found else np.nan for found in near])
 
     @cached_property
     def summit(self) -> tuple[float, float]:
@@ -351,7 +362,11 @@ class Freeform(Target):
         k = int(np.argmax(off))
         if not off[k] < OFF * self._extent:
             px, py, pz = x[k]
-            how = f"vertices lie {off[k]:.2g} m off it" if np.isfinite(off[k]) else "normals point elsewhere"
+            how = (
+                f"vertices lie {off[k]:.2g} m off it"
+                if np.isfinite(off[k])
+                else "normals, or those of another sheet, point elsewhere"
+            )
             raise InputError(
                 f"{name} cannot be followed by a smooth surface near ({px:.4g}, {py:.4g}, {pz:.4g}) m, where its "
                 f"{how}: smooth it, mesh it more finely there, or separate sheets that touch or cross each other"

@@ -13,6 +13,7 @@ from rodshell.geometry.frames import cross, dot
 CREASE = 40.0  # degrees between faces, and between what is on either side: a smooth piece ends there
 STRAY = 0.01  # of the area: separate pieces with less in sum are left out
 WELD = 1e-6  # of the largest extent: vertices this close are merged; single precision has 1e-7
+SPOILT = 0.7  # least cosine between a vertex's normal and the mean of the faces around it
 MOST_FACES = 3_000_000
 FARTHEST = 1e9  # m: coordinates that are still known to a micrometre
 
@@ -46,13 +47,20 @@ class TriangleMesh:
 
     @cached_property
     def normals(self) -> Floats:
-        """(n, 3) unit normals of the vertices, exact on a sphere [Max 1999, Weights for normals]."""
+        """(n, 3) unit normals of the vertices, exact on a sphere [Max 1999, Weights for normals].
+
+        Slivers count most there: where they turn a normal away from the mean of two rows of faces, that is taken.
+        """
         result = np.zeros_like(self.vertices)
         for k in range(3):
             here, after, before = (self.faces[:, (k + i) % 3] for i in range(3))
             p, q = self.vertices[after] - self.vertices[here], self.vertices[before] - self.vertices[here]
             scale = np.maximum(dot(p, p) * dot(q, q), 1e-300)
             np.add.at(result, here, self.doubled / scale[:, None])
+        mean, wide = np.zeros_like(result), np.zeros_like(result)
+        np.add.at(mean, self.faces, self.doubled[:, None])
+        np.add.at(wide, self.faces, mean[self.faces].sum(axis=1)[:, None])
+        result = np.where((_cosine(result, wide) < SPOILT)[:, None], wide, result)
         return np.asarray(result / np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None])
 
     @cached_property
