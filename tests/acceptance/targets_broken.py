@@ -119,7 +119,7 @@ def broken_files(folder: Path) -> Iterator[tuple[str, list[str]]]:
         )
         fin = np.vstack([x, [[0, 0, 9]]]), np.vstack([faces, [[100, 124, len(x)]]])
         yield case("a fin on an edge", f"fin.{kind}", write(*fin))
-        touching = np.vstack([x, [[0, 7, 0], [1, 7, 0]]]), np.vstack([faces, [[len(x) - 18, len(x), len(x) + 1]]])
+        touching = np.vstack([x, [[0, 9, 0], [4, 9, 0]]]), np.vstack([faces, [[len(x) - 18, len(x), len(x) + 1]]])
         yield case("two parts that touch in a point", f"touching.{kind}", write(*touching))
         yield case("wrong unit: too large", f"large.{kind}", write(1e4 * x, faces))
         yield case("wrong unit: too small", f"small.{kind}", write(x, faces), "--unit", "um")
@@ -204,8 +204,8 @@ def _step_files() -> Iterator[tuple[Any, ...]]:
 
 def _crossing() -> tuple[Floats, Ints]:
     """A sheet whose two halves pass through each other."""
-    s, y = np.meshgrid(np.linspace(-2.2, 2.2, 60), np.linspace(-2, 2, 30), indexing="ij")
-    return _sheet(np.sin(2 * s) * 3, 2 * y, np.sin(s) * 3)
+    s, y = np.meshgrid(np.linspace(-3.3, 3.3, 60), np.linspace(-2, 2, 30), indexing="ij")
+    return _sheet(np.sin(2 * s) * 3, 2 * y, np.sin(s) * 6)
 
 
 def _folded() -> tuple[Floats, Ints]:

@@ -9,6 +9,7 @@ import pytest
 import rodshell as rs
 from rodshell.case import load_case
 from rodshell.case.rod_ends import RodEnds
+from rodshell.checks import sizing
 from rodshell.checks.bending import bending_of
 from rodshell.checks.sizing import Bends, Fit, bends_of, bends_of_pop_ups, largest_strain, net_bends
 from rodshell.cli import main
@@ -47,6 +48,15 @@ def test_on_a_cylinder_a_rod_bends_by_its_heading() -> None:
     off = np.abs(bends.normal[:, None] - expected).min(axis=1)
     assert off.max() < 1e-3 / 5
     assert bends.geodesic.max() < 1e-3 / 5
+
+
+def test_the_net_is_found_once_while_a_section_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    marched = list[rs.Target]()
+    monkeypatch.setattr(sizing, "bends_of", lambda target, *_: marched.append(target) or Bends(np.ones(3), np.ones(3)))
+    fit = Fit.on(*half_sphere(5.0))
+    material = rs.Material.preset("larch")
+    fit.reason(fit.section(material), material)
+    assert len(marched) == 1
 
 
 # Over the characteristic strength: k_mod / gamma_M of covered timber, a third of GFRP's, half where no code was cited

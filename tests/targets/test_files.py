@@ -251,7 +251,7 @@ def test_broken_files_are_refused_in_one_sentence(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content"),
     [
-        ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999\n"),
+        ("word.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 x\n"),
         ("short.ply", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
                       b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0\n1\n"),
         ("noise.off", b"OFF\n3 1 0\n0 0 0\n1 0 x\n"),
@@ -275,10 +275,10 @@ def test_noise_in_an_stl_is_refused(tmp_path):
 
 
 def test_a_fault_of_the_reader_itself_is_not_hidden_behind_the_file(bowl, tmp_path, monkeypatch):
-    (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
+    (tmp_path / "bowl.stl").write_bytes(WRITERS["stl"](*bowl))
     monkeypatch.delattr("trimesh.load_scene")  # as in its versions before 4.6
     with pytest.raises(rs.InputError, match="module 'trimesh' has no attribute 'load_scene'"):
-        rs.surface_from(tmp_path / "bowl.obj", unit=1.0)
+        rs.surface_from(tmp_path / "bowl.stl", unit=1.0)
 
 
 @pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])

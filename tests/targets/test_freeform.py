@@ -312,6 +312,14 @@ def test_sheets_that_touch_are_refused_with_the_place():
         Freeform.of(*lattice(x[:, None] + 0 * y, y + 0 * x[:, None], z[:, None] + 0 * y))
 
 
+@pytest.mark.parametrize("count", [60, 150])
+def test_sheets_that_cross_are_refused(count):
+    """A figure of eight, 12 high and 6 wide, that goes on past its middle; finer patches fit either sheet alone."""
+    s, y = np.meshgrid(np.linspace(-3.3, 3.3, count), np.linspace(-4, 4, 30), indexing="ij")
+    with pytest.raises(rs.InputError, match=r"cannot be followed .* separate sheets that touch or cross each other"):
+        Freeform.of(*lattice(3 * np.sin(2 * s), y, 6 * np.sin(s)))
+
+
 def test_a_sound_mesh_is_returned_facing_up_and_whole():
     x, faces = PARTS["bowl"]()
     mesh, repairs = sound_mesh(x, faces[:, ::-1], "the mesh")

@@ -111,7 +111,7 @@ class Fit:
         slender = SLENDER * target.size
         room = ROOM * min(layout.spacing)
 
-        @cache
+        @cache  # a net costs more than all that is asked of it
         def bends() -> Bends:
             found = bends_of(target, layout, anchor)
             return found if (joint or Ball()).holds_normals else found.rolled()

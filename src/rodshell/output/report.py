@@ -231,6 +231,10 @@ _REACTIONS: tuple[Entry, ...] = (
     ("Sum of all moments over the largest", "moment_imbalance", wording.small),
 )
 _CLEARANCE: tuple[Entry, ...] = (("Clearance of the nearest rods", "clearance", wording.millimetres),)
+_DEVIATION: tuple[Entry, ...] = (
+    ("smooth surface against the mesh: max", "max", wording.millimetres),
+    ("smooth surface against the mesh: rms", "rms", wording.millimetres),
+)
 _NET_DEVIATION: tuple[Entry, ...] = (
     ("drape against net, rod ends: max", "max", wording.millimetres),
     ("drape against net, rod ends: median", "median", wording.millimetres),
@@ -318,8 +322,9 @@ def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]
     if by_design_strength(results):
         preset += _listed(results.strength, _DESIGN_STRENGTH, plan.rounding)
     deviation = _listed(drape.net_deviation if drape else None, _NET_DEVIATION, plan.rounding)
+    mesh = _listed(results.target.deviation if results.target else None, _DEVIATION, plan.rounding)
     groups = [
-        ("Target", wording.case_rows(results.target, plan.rounding)),
+        ("Target", wording.case_rows(results.target, plan.rounding) + mesh),
         ("Layout", wording.case_rows(results.layout, plan.rounding)),
         ("Cut list", _cut_list(plan, results)),
         ("Rod", [row for part in parts for row in wording.case_rows(part)] + preset),

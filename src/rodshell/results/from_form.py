@@ -262,6 +262,7 @@ def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
 def _target(target: TargetSurface, *, flat: bool) -> Target:
     """The target's parameters, its size, and whether it is too flat for its rods to bend."""
     known = {**plain(target.parameters()), "reference_size": target.size}
+    known |= {"deviation": target.deviation._asdict()} if target.deviation else {}
     return Target.model_validate(known | ({"flat": True} if flat else {}))
 
 

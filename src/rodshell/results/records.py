@@ -194,11 +194,19 @@ def far_apart(points: NDArray[Any]) -> str:
 # What was asked for
 
 
+class Deviation(Record):
+    """Distance of the smooth surface that is used from the vertices of the mesh that was given."""
+
+    max: Number = key("largest distance", "m")
+    rms: Number = key("root mean square", "m")
+
+
 class Target(Record):
     """The target surface: the parameters of the case file's [target], which depend on its kind, and its size."""
 
     kind: Text | None = key("kind of surface, as in the case file")
     reference_size: Number = key("half of the larger width, by which gaps are made relative", "m")
+    deviation: Deviation | None = key("distance of the smooth surface used from the mesh given")
     flat: Flag | None = key("true where it is too flat for its rods to bend, so that nothing pops up")
 
 

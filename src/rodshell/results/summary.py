@@ -154,7 +154,9 @@ def _patches(results: Results, length: Length) -> Iterator[str]:
 
 
 def _net_and_drape(results: Results, length: Length) -> Iterator[str]:
-    """How exact the net and the drape are."""
+    """How exact the surface, the net and the drape are."""
+    if results.target and (fit := results.target.deviation):
+        yield f"  target    smooth surface against the mesh: max {length(fit.max)}, rms {length(fit.rms)}"
     if net := results.net:
         angle = "not known" if net.min_angle_deg is None else f"{net.min_angle_deg:.1f} deg"
         yield f"  footprint error {length(net.error_estimate)} before extrapolation; smallest angle {angle}"

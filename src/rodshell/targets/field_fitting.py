@@ -34,7 +34,14 @@ FADE = 1.4  # spacings: radius of that weight
 SAME_SIDE = 0.3  # cosine between normals: points of another sheet of the surface are left out
 RIDGE = 1e-7  # of the sum of weights: keeps the least squares regular where points are few
 
+# how near
+CLOSE = 5e-4  # of the size: where a vertex is further off, more cubics are tried
+GAIN = 0.75  # of that distance: more cubics are taken where it becomes less; noise of a mesh leaves more than 0.8
+OFF = 0.005  # of the size: where a vertex is further off than that, the field does not follow the mesh
+ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there
+
 # past an open rim
+PAST = 0.6  # of the size: how far the surface is continued
 EASE = 1.5  # [rad] curvature fades as 1 / (1 + turned / EASE), so that the surface does not roll up
 DIRECTIONS = 12  # in which the next cubics are placed around a cubic past the rim
 STEEP = 5.0  # spacings: a cubic that rises by more over one spacing does not continue the surface
@@ -221,6 +228,73 @@ def _enclosed(points: Floats, loop: Floats) -> Bools:
 def cubic_spacing(area: float, count: int) -> float:
     """Distance between cubics [m] for a surface of `area` [m2] that is known at `count` points."""
     return sqrt(area / min(max(count / POINTS_EACH, FEWEST), MOST))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A smooth field that was fitted to a mesh.
+
+    Parameters
+    ----------
+    field : the smooth implicit function.
+    cubics : those of it that are on the surface (or fill an opening), which come first.
+    off : (n,) distance of each vertex of the mesh [m]; infinite where the field points elsewhere, or another sheet
+        crosses.
+    """
+
+    field: SmoothField
+    cubics: int
+    off: Floats
+
+
+def fit_mesh(mesh: TriangleMesh, *, size: float) -> Fit:
+    """Fit a field to a mesh, with as many cubics as its shape needs.
+
+    As many as suit a mesh that is as fine everywhere; where a vertex is further off than `CLOSE`, twice as many each
+    time, up to one for each vertex, as long as that helps: not where the mesh is rough, as no smooth surface follows
+    noise. A mesh that is still not followed, such as one that is fine only where it curves, gets up to `MOST`.
+
+    Parameters
+    ----------
+    mesh : the surface.
+    size : half of its largest extent [m].
+    """
+    area, count = float(mesh.areas.sum()), len(mesh.vertices)
+    spacing = cubic_spacing(area, count)
+    best = _fit_at(mesh, spacing, size)
+    while (largest := float(best.off.max())) > CLOSE * size:
+        finest = sqrt(area / (MOST if largest > OFF * size else min(MOST, count)))
+        if spacing <= finest:
+            break
+        spacing = max(spacing / sqrt(2), finest)
+        finer = _fit_at(mesh, spacing, size)
+        if finer.off.max() < GAIN * largest:
+            best = finer
+        elif largest <= OFF * size:
+            break
+    return best
+
+
+def _fit_at(mesh: TriangleMesh, spacing: float, size: float) -> Fit:
+    samples = fill_openings(mesh, mesh_samples(mesh, spacing), spacing)
+    field, cubics = fit_field(samples, spacing, past=PAST * size, reach=size)
+    value, gradient, _ = field.implicit(mesh.vertices, second=False)
+    slope = np.linalg.norm(gradient, axis=1)
+    follows = (dot(gradient, mesh.normals) > ASKEW * slope) & np.isfinite(value)
+    follows[_crossed(mesh, samples, LONGEST * spacing)] = False
+    return Fit(field, cubics, np.where(follows, np.abs(value), np.inf))
+
+
+def _crossed(mesh: TriangleMesh, samples: Samples, reach: float) -> Ints:
+    """Vertices of a mesh where two sheets cross: samples closer than `reach` [m] face elsewhere, some as on a ridge and
+    some as in a groove."""
+    begin, near, _ = CellList.of(samples.points, reach).within(samples.points, reach)
+    here = np.repeat(np.arange(len(samples.points)), np.diff(begin))
+    turned = dot(samples.normals[here], samples.normals[near]) < SAME_SIDE
+    here, near = here[turned], near[turned]
+    bulge = dot(samples.normals[near] - samples.normals[here], samples.points[near] - samples.points[here])
+    both = np.intersect1d(here[bulge > 0], here[bulge < 0])
+    return CellList.of(mesh.vertices, reach).nearest(samples.points[both])[1][:, 0]
 
 
 def fit_field(samples: Samples, spacing: float, *, past: float, reach: float) -> tuple[SmoothField, int]:

@@ -4,26 +4,27 @@ from collections.abc import Mapping
 from dataclasses import field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints, distinct
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.targets.field_fitting import cubic_spacing, fill_openings, fit_field, mesh_samples
+from rodshell.targets.field_fitting import OFF, Fit, fit_mesh
 from rodshell.targets.rim import UPRIGHT, Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
-from rodshell.targets.target import Gap, Implicit, Target
+from rodshell.targets.target import Deviation, Gap, Implicit, Target
 from rodshell.targets.trianglemesh import FARTHEST, TriangleMesh, sound_mesh
 from rodshell.targets.wall_below_rim import WalledSurface, walled_surface
 from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 from rodshell.validation import array, number
 
-PAST = 0.6  # of the size: how far the surface is continued past an open rim
-OFF = 0.005  # of the size: where a vertex is further off its smooth field, the field does not follow the mesh
-ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 TOLD = 2e-4  # of the size: how far from what is given the shell may end without a word
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
@@ -139,15 +140,18 @@ class Freeform(Target):
         return 0.5 * float(np.ptp(self.surface.vertices, axis=0).max())
 
     @cached_property
-    def _fitted(self) -> tuple[SmoothField, int]:
-        spacing = cubic_spacing(float(self.surface.areas.sum()), len(self.surface.vertices))
-        samples = fill_openings(self.surface, mesh_samples(self.surface, spacing), spacing)
-        return fit_field(samples, spacing, past=PAST * self._extent, reach=self._extent)
+    def _fitted(self) -> Fit:
+        return fit_mesh(self.surface, size=self._extent)
 
     @property
     def field(self) -> SmoothField:
         """The smooth implicit function that replaces the mesh."""
-        return self._fitted[0]
+        return self._fitted.field
+
+    @property
+    def deviation(self) -> Deviation:
+        off = self._fitted.off
+        return Deviation(float(off.max()), float(np.sqrt(np.mean(off**2))))
 
     def implicit(self, x: Floats) -> Implicit:
         return self.field.implicit(x)
@@ -158,7 +162,7 @@ class Freeform(Target):
 
     def covers(self, x: Floats) -> Bools:
         """Whether points `x` (n, 3) of the surface are inside the end, or where an opening was filled."""
-        return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted[1])
+        return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted.cubics)
 
     @cached_property
     def rims(self) -> tuple[Rim, ...]:
@@ -246,33 +250,50 @@ class Freeform(Target):
         """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         z = self._heights_of_facets(xy)
-        for k in np.flatnonzero(np.isnan(z)):
-            z[k] = self._height_of_filling(*xy[k].tolist())
+        beside = np.flatnonzero(np.isnan(z) & np.isfinite(xy).all(axis=1))
+        z[beside] = self._heights_of_fillings(xy[beside])
         smooth = self._straight_up(np.column_stack([xy, z]))
         return np.where(np.abs(smooth - z) < 0.1 * self._extent, smooth, np.nan)
 
+    @cached_property
+    def _facets_by_size(self) -> "list[tuple[cKDTree, Ints, float]]":
+        """Trees of facets' centres in plan, one for each power of two of their widths; the facets; and that width."""
+        from scipy.spatial import cKDTree
+
+        plan = self.surface.vertices[self.surface.faces, :2]
+        low, high = plan.min(axis=1), plan.max(axis=1)
+        reach = np.maximum(np.linalg.norm(high - low, axis=1), 1e-9 * self._extent)  # twice of what is enough
+        octave = np.ceil(np.log2(reach)).astype(int)
+        groups = [(np.flatnonzero(octave == k), 2.0**k) for k in distinct(octave).tolist()]
+        return [(cKDTree(0.5 * (low + high)[some]), some, far) for some, far in groups]
+
     def _heights_of_facets(self, xy: Floats) -> Floats:
         """z (n,) of the uppermost facet over points of the plan, or NaN."""
-        a, b, c = (self.surface.vertices[k] for k in self.surface.faces.T)
-        z, at_once = np.full(len(xy), np.nan), max(1, AT_ONCE // len(a))
-        for begin in range(0, len(xy), at_once):
-            x, y = (side[:, None] for side in xy[begin : begin + at_once].T)
-            wedge = np.stack(
-                [(p[:, 0] - x) * (q[:, 1] - y) - (p[:, 1] - y) * (q[:, 0] - x) for p, q in ((b, c), (c, a), (a, b))]
-            )
-            point, facet = np.nonzero((wedge >= 0).all(axis=0) | (wedge <= 0).all(axis=0))
-            weight = wedge[:, point, facet]
-            total = weight.sum(axis=0)
-            point, facet, weight, total = (part[..., total != 0] for part in (point, facet, weight, total))
-            height = (weight * [a[facet, 2], b[facet, 2], c[facet, 2]]).sum(axis=0) / total
-            np.fmax.at(z, begin + point, height)
+        z, known = np.full(len(xy), np.nan), np.flatnonzero(np.isfinite(xy).all(axis=1))
+        for tree, facets, far in self._facets_by_size:
+            count = np.asarray(tree.query_ball_point(xy[known], 0.51 * far, return_length=True))
+            for some in np.split(np.arange(len(known)), np.flatnonzero(np.diff(np.cumsum(count) // AT_ONCE)) + 1):
+                near = tree.query_ball_point(xy[known[some]], 0.51 * far)
+                point = np.repeat(known[some], count[some])
+                facet = facets[np.concatenate([*near, []]).astype(np.intp)]
+                x, y = xy[point].T
+                a, b, c = self.surface.vertices[self.surface.faces[facet].T]
+                wedge = np.stack(
+                    [(p[:, 0] - x) * (q[:, 1] - y) - (p[:, 1] - y) * (q[:, 0] - x) for p, q in ((b, c), (c, a), (a, b))]
+                )
+                total = wedge.sum(axis=0)
+                inside = ((wedge >= 0).all(axis=0) | (wedge <= 0).all(axis=0)) & (total != 0)
+                height = (wedge * [a[:, 2], b[:, 2], c[:, 2]]).sum(axis=0)[inside] / total[inside]
+                np.fmax.at(z, point[inside], height)
         return z
 
-    def _height_of_filling(self, x: float, y: float) -> float:
-        """z of the uppermost cubic that fills an opening over a point of the plan, or NaN."""
-        centres = self.field.centres[: self._fitted[1]]
-        near = np.hypot(centres[:, 0] - x, centres[:, 1] - y) < self.field.spacing
-        return float(centres[near, 2].max()) if near.any() else np.nan
+    def _heights_of_fillings(self, xy: Floats) -> Floats:
+        """z (n,) of the uppermost cubic on the surface, or filling an opening, near points of the plan, or NaN."""
+        from scipy.spatial import cKDTree
+
+        centres = self.field.centres[: self._fitted.cubics]
+        near = cKDTree(centres[:, :2]).query_ball_point(xy, self.field.spacing)
+        return np.array([centres[found, 2].max() if found else np.nan for found in near])
 
     @cached_property
     def summit(self) -> tuple[float, float]:
@@ -361,14 +382,15 @@ class Freeform(Target):
 
     def _require_a_good_fit(self, name: str) -> None:
         """Refuse a mesh that its smooth field does not follow, as it is rough or two of its sheets are too close."""
-        x = self.surface.vertices
-        value, gradient = self.level(x)
-        cosine = dot(gradient, self.surface.normals) / np.linalg.norm(gradient, axis=1)
-        off = np.where(cosine > ASKEW, np.abs(value), np.inf)
-        k = int(np.argmax(np.where(np.isfinite(value), off, np.inf)))
+        off, x = self._fitted.off, self.surface.vertices
+        k = int(np.argmax(off))
         if not off[k] < OFF * self._extent:
             px, py, pz = x[k]
-            how = f"vertices lie {abs(value[k]):.2g} m off it" if np.isfinite(off[k]) else "normals point elsewhere"
+            how = (
+                f"vertices lie {off[k]:.2g} m off it"
+                if np.isfinite(off[k])
+                else "normals, or those of another sheet, point elsewhere"
+            )
             raise InputError(
                 f"{name} cannot be followed by a smooth surface near ({px:.4g}, {py:.4g}, {pz:.4g}) m, where its "
                 f"{how}: smooth it, mesh it more finely there, or separate sheets that touch or cross each other"

@@ -363,8 +363,9 @@ def surface_from(
         positive("unit", unit, "m")
     _require_placing(name, base, placement)
     curves: list[Floats] = []
+    notes: tuple[str, ...] = ()
     if path.suffix.lower() in MESH_FILES:
-        kind, (vertices, faces) = "mesh", read_mesh(path, unit, name)
+        kind, (vertices, faces, notes) = "mesh", read_mesh(path, unit, name)
     elif path.suffix.lower() in RHINO_FILES:
         kind, (vertices, faces, trims, stated) = "nurbs", read_3dm(path, name)
         unit = stated if unit is None else unit
@@ -378,7 +379,7 @@ def surface_from(
     else:
         raise InputError(f"{path} is not a surface file: use one of {', '.join(SURFACE_FILES)}")
     source: dict[str, object] = {"kind": kind, "unit": unit, "object": name}
-    return _placed(path, vertices, faces, curves, unit or 1.0, base, boundary, placement, source)
+    return _placed(path, vertices, faces, curves, unit or 1.0, base, boundary, placement, source, notes)
 
 
 def heights_from(

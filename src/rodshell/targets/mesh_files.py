@@ -2,68 +2,72 @@
 
 import codecs
 import io
-import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from itertools import islice
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, distinct
 from rodshell.errors import InputError
 from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.targets.apart import read_apart, unreadable
 from rodshell.targets.gltf import gltf_counts, gltf_parts
+from rodshell.targets.polygon_files import obj_content, off_content, ply_content
+from rodshell.targets.polygons import Polygons
 from rodshell.targets.trianglemesh import FARTHEST, MOST_FACES, require_indices
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised, read_bytes
+
+Content = TypeVar("Content")
+Notes = tuple[str, ...]
 
 CURVE_FILES = (".obj", ".dxf")
 MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
 IN_METRES = (".glb", ".gltf")  # the standard of these formats fixes the unit
 LARGEST_FILE = 300e6  # bytes
 SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a gridshell can have
-WHOLE = 0.97  # of the vertices of a complete file belong to faces; fewer in a truncated one
+LOOSE = 0.03  # of the vertices of a file that belong to no face: more are reported
 HEAD = 4000  # bytes that hold the header
 MOST_HEIGHTS = MOST_FACES // 2
 MOST_PARTS = 500  # nodes, solids, properties: readers need time for each pair of them
+NAMES = 20  # of a file's objects that a message lists
 MOST_STROKES = 5_000  # curves of a drawing: they are joined end to end
-NO_INDEX = re.compile(rb"^f[ \t](?:.*[ \t])?-?0+(?![^\s/]).*", re.MULTILINE)  # indices begin at 1
 SAG = 2e-5  # of a curve's extent: how finely arcs and splines of a DXF are divided
 
 
-def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = None) -> tuple[Floats, Ints]:
+def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = None) -> tuple[Floats, Ints, Notes]:
     """Read the surface in a mesh file.
 
     Parameters
     ----------
     path : an OBJ, STL, PLY, OFF or glTF file.
     unit : length of the file's unit [m]; None only for a format that fixes it.
-    name : object name, if the file has several.
+    name : of an object or a group, if the file has several.
 
     Returns
     -------
-    Vertices (n, 3) [m] and triangles (m, 3).
+    Vertices (n, 3) [m], triangles (m, 3), and notes for the user, in sentences.
 
     Raises
     ------
     InputError : the file is missing, damaged or truncated; it has no surface or no unit; its size is implausible.
     """
     path = Path(path)
-    data = _in_utf8(path, file_bytes(path))
+    data = file_bytes(path)
     _require_bounds(path, data)
-    meshes = _loaded(path, data)
-    if not meshes:
+    vertices, faces = _TRIANGLES.get(path.suffix.lower(), _of_scene)(path, data, name)
+    if not len(faces):
         raise InputError(f"{path} has no faces, or is damaged: export the surface as a mesh of triangles")
-    if name is not None:
-        if name not in meshes:
-            raise InputError(f"{path} has no object named {shown(name)}: it has {', '.join(map(shown, meshes))}")
-        meshes = {name: meshes[name]}
-    vertices, faces = _merged(list(meshes.values()))
-    if name is None:
-        _require_whole(path, data, vertices, faces)
-    return in_metres(vertices, faces, unit, path), faces
+    listed, notes = len(vertices), Notes()
+    loose = listed - len(distinct(faces))
+    if name is None and loose > LOOSE * listed:
+        notes = (
+            f"{loose} of the {listed} vertices of {path.name} belong to no face: if it lacks any, export it again",
+        )
+    return in_metres(vertices, faces, unit, path), faces, notes
 
 
 def require_few_heights(path: Path, rows: int, columns: int) -> None:
@@ -141,19 +145,6 @@ def _units(extent: Floats) -> str:
     return " x ".join(f"{float(f'{side:.4g}'):.10g}" for side in extent) + " units"
 
 
-def _in_utf8(path: Path, data: bytes) -> bytes:
-    """The content with its text in UTF-8, as the reader expects it: names and comments may be encoded otherwise."""
-    kind = path.suffix.lower()
-    if kind == ".ply":
-        head, end, body = data.partition(b"end_header")
-        return recoded(head) + end + body
-    if kind == ".obj":  # materials split a mesh, each at the cost of a search through all vertices
-        return re.sub(rb"^usemtl .*$", b"", recoded(data), flags=re.MULTILINE)
-    if kind == ".off" or (kind == ".stl" and data[:5].lower() == b"solid" and b"facet" in data[:HEAD]):
-        return recoded(data)
-    return data
-
-
 def recoded(text: bytes) -> bytes:
     """Text in UTF-8, UTF-16 or a Windows code page as UTF-8."""
     try:
@@ -171,8 +162,6 @@ def _require_bounds(path: Path, data: bytes) -> None:
         counts = {"solids": data.count(b"endsolid")}
     elif kind == ".ply":
         counts = {"properties": data[: data.find(b"end_header")].count(b"property")}
-    elif kind == ".obj" and (wrong := NO_INDEX.search(data)):
-        raise InputError(f"{path} is damaged: a face refers to vertex 0 ({shown(wrong[0].decode())}): export it again")
     elif kind in IN_METRES:
         counts = gltf_counts(path, data)
     for what, count in counts.items():
@@ -183,60 +172,89 @@ def _require_bounds(path: Path, data: bytes) -> None:
             )
 
 
-def _loaded(path: Path, data: bytes) -> dict[str, Any]:
-    """The meshes in a file by name, transformed to their positions in the scene."""
+def _of_obj(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
+    faces, _, named = _read(path, "OBJ", lambda: obj_content(recoded(data).decode("utf-8")))
+    if not data.endswith((b"\n", b"\r", b"\n\0")) and len(faces.points) - 1 not in faces.corners:
+        raise InputError(  # it is written in the order of its vertices
+            f"{path} seems to be truncated: its last line is not complete, and faces are missing: export it again"
+        )
+    if name is not None:
+        chosen = np.zeros(len(faces.sizes), dtype=bool)
+        for first, stop in _named(path, name, named):
+            chosen[first:stop] = True
+        faces = faces.only(chosen)
+    return faces.points, faces.triangles(str(path))
+
+
+def _of_off(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
+    return _whole(path, name, *_read(path, "OFF", lambda: off_content(recoded(data).decode("utf-8"))))
+
+
+def _of_ply(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
+    return _whole(path, name, *_read(path, "PLY", lambda: ply_content(data)))
+
+
+def _whole(path: Path, name: str | None, faces: Polygons, announced: dict[str, int]) -> tuple[Floats, Ints]:
+    """Faces as triangles, unless there are fewer than the file announces."""
+    if name is not None:
+        _named(path, name, dict[str, None]())
+    for what, there in (("vertex", len(faces.points)), ("face", len(faces.sizes))):
+        if there < announced[what]:
+            raise InputError(
+                f"{path} seems to be truncated: it has {there} of {announced[what]} entries for {what}: export it again"
+            )
+    return faces.points, faces.triangles(str(path))
+
+
+def _of_scene(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
+    """The triangles of an STL or glTF file, at their positions in the scene."""
     import trimesh
 
     kind = path.suffix[1:].lower()
+    is_text = kind == "stl" and data[:5].lower() == b"solid" and b"facet" in data[:HEAD]
     parts = gltf_parts(path, data) if kind == "gltf" else {}  # nothing else is opened, whatever the file names
+
+    def scene() -> dict[str, tuple[Floats, Ints]]:
+        content, found = io.BytesIO(recoded(data) if is_text else data), dict[str, tuple[Floats, Ints]]()
+        scene = trimesh.load_scene(content, file_type=kind, resolver=parts, process=False, skip_materials=True)
+        placed = dict(scene.graph[node][::-1] for node in scene.graph.nodes_geometry)
+        for geometry, transform in placed.items():
+            mesh = scene.geometry[geometry]
+            if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+                x = np.asarray(mesh.vertices, dtype=float) @ transform[:3, :3].T + transform[:3, 3]
+                found[str(geometry)] = (x, np.asarray(mesh.faces, dtype=np.intp))
+        return found
+
+    meshes = _read(path, kind.upper(), scene)
+    for vertices, faces in meshes.values():
+        require_indices(vertices, faces, str(path))
+    chosen = list(meshes.values()) if name is None else [_named(path, name, meshes)]
+    first = np.cumsum([0] + [len(x) for x, _ in chosen])
+    triangles = [np.empty((0, 3), dtype=np.intp), *(f + k for (_, f), k in zip(chosen, first, strict=False))]
+    return np.vstack([np.empty((0, 3)), *(x for x, _ in chosen)]), np.vstack(triangles)
+
+
+_TRIANGLES = {".obj": _of_obj, ".off": _of_off, ".ply": _of_ply}
+
+
+def _read(path: Path, format: str, reader: Callable[[], Content]) -> Content:
+    """What a reader finds; a damaged file can break it anywhere."""
     try:
         with np.errstate(all="ignore"):  # values that are not finite are refused later, with their place
-            scene = trimesh.load_scene(
-                io.BytesIO(data), file_type=kind, resolver=parts, process=False, skip_materials=True
-            )
-            placed = dict(scene.graph[node][::-1] for node in scene.graph.nodes_geometry)
-            found: dict[str, Any] = {}
-            for geometry, transform in placed.items():
-                mesh = scene.geometry[geometry]
-                if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-                    x = np.asarray(mesh.vertices, dtype=float) @ transform[:3, :3].T + transform[:3, 3]
-                    found[str(geometry)] = (x, np.asarray(mesh.faces, dtype=np.intp))
+            return reader()
     except MemoryError:
         raise InputError(f"{path} announces more data than fits into memory: it is damaged; export it again") from None
-    except Exception as reason:  # a damaged file can break a reader anywhere
-        raise unreadable(path, path.suffix[1:].upper(), reason) from None
-    for vertices, faces in found.values():
-        require_indices(vertices, faces, str(path))
-    return found
+    except Exception as reason:
+        raise unreadable(path, format, reason) from None
 
 
-def _merged(meshes: list[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
-    first = np.cumsum([0] + [len(x) for x, _ in meshes])
-    return np.vstack([x for x, _ in meshes]), np.vstack([f + k for (_, f), k in zip(meshes, first, strict=False)])
-
-
-def _require_whole(path: Path, data: bytes, vertices: Floats, faces: Ints) -> None:
-    """Refuse a truncated file. Readers accept truncated text: the result is compared with counts in the file."""
-    used, kind = len(np.unique(faces)), path.suffix.lower()
-    announced: Mapping[str, int] = {}
-    if kind == ".obj":
-        listed = len(re.findall(rb"^\s*v\s", data, re.MULTILINE))
-        if used < WHOLE * listed:
-            raise InputError(
-                f"{path} seems to be truncated: {listed - used} of its {listed} vertices belong to no face: export it "
-                "again"
-            )
-    elif kind == ".ply":
-        head = data[:HEAD].decode("ascii", "replace")
-        announced = {what: int(n) for what, n in re.findall(r"element (vertex|face) (\d+)", head)}
-    elif kind == ".off" and (numbers := re.search(rb"OFF\s*(?:#.*\s*)*(\d+)\s+(\d+)", data[:HEAD])):
-        announced = {"vertex": int(numbers[1]), "face": int(numbers[2])}
-    for what, count in announced.items():
-        there = len(vertices if what == "vertex" else faces)
-        if there < count:
-            raise InputError(
-                f"{path} seems to be truncated: it has {there} of {count} entries for {what}: export it again"
-            )
+def _named(path: Path, name: str, parts: Mapping[str, Content]) -> Content:
+    """The part of a file that has this name."""
+    if name not in parts:
+        known = ", ".join([*map(shown, islice(parts, NAMES)), *["..."][: len(parts) // (NAMES + 1)]])
+        known = f"it has {known}" if parts else "none in it has a name"
+        raise InputError(f"{path} has no object named {shown(name)}: {known}")
+    return parts[name]
 
 
 def read_curves(path: Path, unit: float) -> list[Floats]:
@@ -288,7 +306,7 @@ def _strokes(path: Path, unit: float) -> list[Floats]:
     data = file_bytes(path)
     if path.suffix.lower() not in CURVE_FILES:
         raise InputError(f"{path}: curves are read from {' or '.join(CURVE_FILES)} files")
-    strokes = _of_dxf(path, data, FARTHEST / unit) if path.suffix.lower() == ".dxf" else _of_obj(path, data)
+    strokes = _of_dxf(path, data, FARTHEST / unit) if path.suffix.lower() == ".dxf" else _lines_of_obj(path, data)
     far = max((float(np.abs(stroke).max()) * unit for stroke in strokes if len(stroke)), default=0.0)
     _require_near(path, far)
     return [stroke * unit for stroke in strokes if len(stroke) > 1]
@@ -307,20 +325,11 @@ def _require_near(path: Path, far: float) -> None:
         raise InputError(f"{path} has curves with coordinates up to {far:.3g} m: draw them near the origin")
 
 
-def _of_obj(path: Path, data: bytes) -> list[Floats]:
+def _lines_of_obj(path: Path, data: bytes) -> list[Floats]:
     """The `l` elements of an OBJ."""
-    points, lines = list[list[float]](), list[list[int]]()
-    try:
-        for words in map(str.split, recoded(data).decode("utf-8").splitlines()):
-            if words[:1] == ["v"]:
-                points.append([float(word) for word in words[1:4]])
-            elif words[:1] == ["l"]:
-                lines.append([int(word.split("/")[0]) for word in words[1:]])
-        _require_few_strokes(path, len(lines))
-        x = np.array(points, dtype=float).reshape(len(points), 3)
-        return [x[[k - 1 if k > 0 else k or len(x) for k in line]] for line in lines]  # 0 is refused
-    except (ValueError, IndexError) as reason:
-        raise unreadable(path, "a drawing of curves", reason) from None
+    content = _read(path, "a drawing of curves", lambda: obj_content(recoded(data).decode("utf-8")))
+    _require_few_strokes(path, len(content.lines))
+    return _read(path, "a drawing of curves", lambda: [content.polygons.points[line] for line in content.lines])
 
 
 def _of_dxf(path: Path, data: bytes, farthest: float) -> list[Floats]:

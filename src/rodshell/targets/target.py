@@ -51,6 +51,18 @@ class Gap(NamedTuple):
     hessian: Floats
 
 
+class Deviation(NamedTuple):
+    """Distance of a surface from the vertices of the mesh that it was fitted to.
+
+    Parameters
+    ----------
+    max, rms : the largest, and the root of the mean square [m].
+    """
+
+    max: float
+    rms: float
+
+
 def _checking_points(method: Callable[..., Any], name: str, columns: int) -> Callable[..., Any]:
     """The method, which converts points to an array (n, columns), or refuses them: a kernel would read what
     lies in memory after too short a row."""
@@ -106,6 +118,11 @@ class Target(ABC):
     def warnings(self) -> tuple[str, ...]:
         """What the user should know about the target itself, in sentences."""
         return ()
+
+    @property
+    def deviation(self) -> Deviation | None:
+        """How far the surface is from the mesh that it replaces; None for a target that replaces none."""
+        return None
 
     @abstractmethod
     def implicit(self, x: Floats) -> Implicit:

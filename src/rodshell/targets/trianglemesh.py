@@ -10,8 +10,10 @@ from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot
 
-CREASE = 40.0  # degrees between faces: a smooth piece ends there
+CREASE = 40.0  # degrees between faces, and between what is on either side: a smooth piece ends there
+STRAY = 0.01  # of the area: separate pieces with less in sum are left out
 WELD = 1e-6  # of the largest extent: vertices this close are merged; single precision has 1e-7
+SPOILT = 0.7  # least cosine between a vertex's normal and the mean of the faces around it
 MOST_FACES = 3_000_000
 FARTHEST = 1e9  # m: coordinates that are still known to a micrometre
 
@@ -45,13 +47,20 @@ class TriangleMesh:
 
     @cached_property
     def normals(self) -> Floats:
-        """(n, 3) unit normals of the vertices, exact on a sphere [Max 1999, Weights for normals]."""
+        """(n, 3) unit normals of the vertices, exact on a sphere [Max 1999, Weights for normals].
+
+        Slivers count most there: where they turn a normal away from the mean of two rows of faces, that is taken.
+        """
         result = np.zeros_like(self.vertices)
         for k in range(3):
             here, after, before = (self.faces[:, (k + i) % 3] for i in range(3))
             p, q = self.vertices[after] - self.vertices[here], self.vertices[before] - self.vertices[here]
             scale = np.maximum(dot(p, p) * dot(q, q), 1e-300)
             np.add.at(result, here, self.doubled / scale[:, None])
+        mean, wide = np.zeros_like(result), np.zeros_like(result)
+        np.add.at(mean, self.faces, self.doubled[:, None])
+        np.add.at(wide, self.faces, mean[self.faces].sum(axis=1)[:, None])
+        result = np.where((_cosine(result, wide) < SPOILT)[:, None], wide, result)
         return np.asarray(result / np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None])
 
     @cached_property
@@ -125,15 +134,8 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, 
     InputError : the mesh is empty, not finite, not manifold, one-sided, creased or in several pieces; names the place.
     """
     _require_numbers(vertices, faces, name)
-    mesh, repairs = _welded(vertices, faces, name), list[str]()
+    mesh, repairs = _main_piece(_welded(vertices, faces, name), name)
     neighbours = _Neighbours.of(mesh, name)
-    pieces = neighbours.pieces(np.ones(len(neighbours.edges), dtype=bool), len(mesh.faces))
-    if pieces.max() > 0:
-        shares = np.sort(np.bincount(pieces, mesh.areas))[::-1] / mesh.areas.sum()
-        raise InputError(
-            f"{name} has {pieces.max() + 1} separate pieces (the largest two have {100 * shares[0]:.0f} and "
-            f"{100 * shares[1]:.0f} % of the area): keep one, or join them"
-        )
     turned = neighbours.turned(len(mesh.faces), name, mesh)
     if turned.any() and not turned.all():
         fewer = min(int(turned.sum()), int((~turned).sum()))
@@ -159,7 +161,7 @@ def _require_numbers(vertices: Floats, faces: Ints, name: str) -> None:
 
 
 def require_indices(vertices: Floats, faces: Ints, name: str) -> None:
-    """Refuse faces (m, 3) with vertices that are not there."""
+    """Refuse faces, of any shape, with vertices that are not there."""
     if faces.min(initial=0) < 0 or faces.max(initial=-1) >= len(vertices):
         wrong = int(faces.max() if faces.min() >= 0 else faces.min())
         raise InputError(f"{name} is damaged: a face refers to vertex {wrong} of {len(vertices)}: export it again")
@@ -183,6 +185,32 @@ def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
     if len(mesh.faces) == 0 or mesh.areas.sum() < 1e-9 * extent**2:
         raise InputError(f"{name} has no area, all its faces are degenerate: export it again")
     return mesh
+
+
+def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]:
+    """The mesh without stray objects: faces that no edge connects to the rest."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    first, edge = unique_rows(np.column_stack([np.minimum(a, b), np.maximum(a, b)]).astype(np.int64))
+    count = len(mesh.faces)
+    graph = coo_matrix((np.ones(len(a)), (np.arange(len(a)) // 3, count + edge)), (count + len(first),) * 2)
+    pieces = connected_components(graph, directed=False)[1][:count]
+    shares = np.bincount(pieces, mesh.areas) / mesh.areas.sum()
+    if len(shares) == 1:
+        return mesh, []
+    if shares.max() < 1 - STRAY:
+        largest = 100 * np.sort(shares)[::-1]
+        raise InputError(
+            f"{name} has {len(shares)} separate pieces (the largest two have {largest[0]:.0f} and {largest[1]:.0f} % "
+            "of the area): keep one, or join them"
+        )
+    others = pieces != np.argmax(shares)
+    return mesh.only(~others), [
+        f"{len(shares) - 1} separate piece{'s' * (len(shares) > 2)} of {others.sum()} faces, with "
+        f"{100 * (1 - shares.max()):.2g} % of the area, was left out"
+    ]
 
 
 def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
@@ -293,11 +321,19 @@ def _smooth_piece(
     mesh: TriangleMesh, neighbours: _Neighbours, name: str, repairs: list[str]
 ) -> tuple[TriangleMesh, list[str]]:
     """The piece between creases that covers most of the plan, facing up."""
+    from scipy.sparse import coo_matrix
+
     i, j = neighbours.faces.T
-    length = 2 * mesh.areas
-    flat = (length[i] > 0) & (length[j] > 0)
-    cosine = dot(mesh.doubled[i], mesh.doubled[j]) / np.maximum(length[i] * length[j], 1e-300)
-    smooth = ~flat | (cosine > cos(radians(CREASE)))
+    # A sliver's own normal is noise: it is judged with the two rows of faces behind it, by their areas near its edges.
+    ends = mesh.vertices[neighbours.edges]
+    square, double = np.sum((ends[:, 1] - ends[:, 0]) ** 2, axis=1), 2 * mesh.areas
+    share = [square / np.maximum(double[there], square) for there in (j, i)]
+    graph = coo_matrix((np.concatenate(share), (np.append(i, j), np.append(j, i))), (len(double),) * 2).tocsr()
+    near = mesh.doubled + graph @ mesh.doubled
+    wide = mesh.doubled + graph @ near
+    sides = wide[i] - share[0][:, None] * near[j], wide[j] - share[1][:, None] * near[i]
+    cosine = np.maximum(_cosine(mesh.doubled[i], mesh.doubled[j]), _cosine(*sides))
+    smooth = cosine > cos(radians(CREASE))
     closed = not len(mesh.loops)
     pieces = neighbours.pieces(smooth, len(mesh.faces))
     plan = np.bincount(pieces, mesh.doubled[:, 2]) / 2
@@ -306,7 +342,7 @@ def _smooth_piece(
         within = np.flatnonzero(~smooth & (pieces[i] == chosen) & (pieces[j] == chosen))
         share = mesh.areas[pieces == chosen].sum() / mesh.areas.sum()
         if len(within) or share < 0.1:
-            worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(np.where(flat, cosine, 2.0)))
+            worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(cosine))
             angle, where = degrees(np.arccos(np.clip(cosine[worst], -1, 1))), place(mesh, neighbours.edges[worst, 0])
             raise InputError(
                 f"{name} is creased: faces meet at {angle:.0f} degrees near {where}, and a target must be smooth: "
@@ -321,6 +357,12 @@ def _smooth_piece(
     if not closed and plan[chosen] < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
     return mesh, repairs
+
+
+def _cosine(a: Floats, b: Floats) -> Floats:
+    """Of the angles between vectors (n, 3); 1 where one has no length."""
+    length = np.sqrt(dot(a, a) * dot(b, b))
+    return np.asarray(np.where(length > 0, dot(a, b) / np.maximum(length, 1e-300), 1.0))
 
 
 def place(mesh: TriangleMesh, vertex: int) -> str:
