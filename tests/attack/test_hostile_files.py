@@ -2,12 +2,14 @@
 
 import json
 import os
+import random
 import resource
 import struct
 import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +29,10 @@ from rodshell.targets.nurbs_files import Nurbs
 from rodshell.targets.trianglemesh import sound_mesh
 from tests.acceptance.targets_broken import WRITERS, dome
 from tests.attack import surface_files
+from tests.targets.test_polygons import MIXED, mixed
 
 pytestmark = pytest.mark.attack
+TRIES = 40 * int(os.environ.get("RODSHELL_ATTACK", "1"))
 
 
 def refused(said: str, call: Callable[..., object], *arguments: Any, **named: Any) -> None:
@@ -177,9 +181,9 @@ def test_a_wrong_index_of_a_face_is_one_sentence(kind: str, index: int, tmp_path
     ("name", "data", "said"),
     [
         ("vertices.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\nproperty float x\n"
-         b"property float y\nproperty float z\nend_header\n" + bytes(1000), "cannot be read as PLY"),
+         b"property float y\nproperty float z\nend_header\n" + bytes(1000), "it has 83 of 1000000000000 entries"),
         ("list.ply", b"ply\nformat binary_little_endian 1.0\nelement face 9\nproperty list uint int vertex_indices\n"
-         b"end_header\n" + b"\x7f" * 400, "cannot be read as PLY"),
+         b"end_header\n" + b"\x7f" * 400, "it has 0 of 9 entries for face"),
         ("header.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 1\n"
          + b"property list uchar int a\n" * 3000 + b"end_header\n" + bytes(9000),
          "has 3000 properties, and at most 500 are read"),
@@ -418,3 +422,26 @@ def test_what_is_said_of_an_object_with_a_name_that_is_no_text_can_be_printed(tm
     with pytest.raises(rs.InputError, match=r"has no object named|cannot be read as GLB") as caught:
         rs.surface_from(tmp_path / "roof.glb", name="door")
     assert str(caught.value).encode()
+
+
+# meshes mutated byte by byte
+
+WORDS = (
+    b"nan", b"-1", b"0", b"99999999999", b"1e400", b"\n", b" ", b"f ", b"o \n", b"\\\n", b"/", b"\0", b"2147483647",
+    b"element face 1000000000\n", b"property list uchar int vertex_indices\n", b"end_header\n",
+)  # fmt: skip
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("kind", MIXED)
+def test_mutated_mesh_of_polygons_is_read_or_refused(kind: str, tmp_path: Path) -> None:
+    chance, whole, path = random.Random(kind), MIXED[kind](*mixed()), tmp_path / f"dome.{kind}"
+    for _ in range(TRIES):
+        data = bytearray(whole)
+        for _ in range(chance.choice((1, 1, 2, 20))):
+            at = chance.randrange(len(data) if chance.random() < 0.5 else 400)
+            data[at : at + chance.choice((0, 1, 4, 30))] = chance.choice((bytes([chance.randrange(256)]), *WORDS))
+        path.write_bytes(data)
+        with suppress(rs.InputError):
+            vertices, faces, _ = read_mesh(path, 1.0)
+            sound_mesh(vertices, faces, "it")

@@ -1,10 +1,15 @@
-"""Readers of the formats whose faces have any number of corners: OBJ, with its curves; OFF; PLY."""
+"""Readers of the formats whose faces have any number of corners: OBJ, with its curves; OFF; PLY.
 
+Of a damaged file they raise whatever exception it leads to.
+"""
+
+import io
 import re
 import struct
 from array import array
-from collections.abc import Generator, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import chain, islice, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -57,12 +62,7 @@ class ObjContent(NamedTuple):
 
 
 def obj_content(text: str) -> ObjContent:
-    """Read faces and polylines of an OBJ file.
-
-    Raises
-    ------
-    ValueError, IndexError : the text is damaged.
-    """
+    """Read faces and polylines of an OBJ file."""
     faces, lines = _Faces(), list[list[int]]()
     begun: list[tuple[int, str, str]] = []  # from which face on, "o" or "g", its names
     for words in map(str.split, text.replace("\\\n", " ").split("\n")):
@@ -93,16 +93,7 @@ def _index(word: str, known: int) -> int:
 
 
 def off_content(text: str) -> tuple[Polygons, dict[str, int]]:
-    """Read an OFF file.
-
-    Returns
-    -------
-    Its faces, and the numbers of vertices and faces that it announces.
-
-    Raises
-    ------
-    ValueError, IndexError : the text is damaged.
-    """
+    """Read an OFF file: its faces, and the numbers of vertices and faces that it announces."""
     lines = [words for line in text.splitlines() if (words := line.partition("#")[0].split())]
     if not re.fullmatch("(ST|C|N)*OFF", lines[0].pop(0)):
         raise ValueError("it does not begin with OFF")
@@ -117,74 +108,41 @@ def off_content(text: str) -> tuple[Polygons, dict[str, int]]:
 
 
 def ply_content(data: bytes) -> tuple[Polygons, dict[str, int]]:
-    """Read a PLY file, text or binary.
-
-    Returns
-    -------
-    Its faces, and the numbers of vertices and faces that it announces.
-
-    Raises
-    ------
-    ValueError, IndexError, KeyError, struct.error : the file is damaged.
-    """
+    """Read a PLY file, text or binary, as `off_content` does; it has fewer faces if it ends too early."""
     head, _, body = data.partition(b"end_header")
     _, _, body = body.partition(b"\n")
     form, announced, properties = "ascii", dict[str, int](), dict[str, list[list[str]]]()
-    for words in map(str.split, head.decode("utf-8", "replace").splitlines()):
-        match words:
+    for line in map(str.split, head.decode("utf-8", "replace").splitlines()):
+        match line:
             case ["format", form, *_]:
                 pass
-            case ["element", name, count]:
-                announced[name], properties[name] = int(count), []
-            case ["property", *kind]:
-                list(properties.values())[-1].append(kind)
-    rows = _of_text(body) if form == "ascii" else _of_bytes(body, ">" if form == "binary_big_endian" else "<")
-    next(rows)
+            case ["element", element, rows]:
+                announced[element], properties[element] = int(rows), []
+            case ["property", *described]:
+                properties[element].append(described)
+    words, at = chain.from_iterable(map(bytes.split, io.BytesIO(body))), 0
+    order = ">" if form == "binary_big_endian" else "<"
+
+    def values(count: int, kind: str) -> Sequence[float]:
+        nonlocal at
+        if form == "ascii":
+            found = [float(word) for word in islice(words, count)]
+            if len(found) < count:
+                raise EOFError
+            return found
+        packed = struct.Struct(f"{order}{count}{NUMBERS[kind]}")
+        at += packed.size
+        return packed.unpack_from(body, at - packed.size)
+
     found = _Faces()
-    for name, rows_of_it in announced.items():
-        names = [kind[-1] for kind in properties[name]]
-        wanted = [names.index(axis) for axis in "xyz"] if name == "vertex" else []
-        wanted = [names.index(next(filter(CORNERS.__contains__, names)))] if name == "face" else wanted
-        for _ in range(rows_of_it if names else 0):
-            row = rows.send(properties[name])
-            if row is None:
-                break
-            if name == "vertex":
-                found.add_point([row[k][0] for k in wanted])
-            elif name == "face":
-                found.add([int(corner) for corner in row[wanted[0]]])
+    with suppress(EOFError, struct.error):
+        for name, count in announced.items():
+            for _ in range(count if properties[name] else 0):
+                row = dict[str, Sequence[float]]()
+                for *counted, kind, what in properties[name]:
+                    row[what] = values(int(values(1, counted[1])[0]) if counted else 1, kind)
+                if name == "vertex":
+                    found.add_point([row[axis][0] for axis in "xyz"])
+                elif name == "face":
+                    found.add([int(corner) for corner in row[next(filter(row.__contains__, CORNERS))]])
     return found.polygons(), {what: announced.get(what, 0) for what in ("vertex", "face")}
-
-
-Row = list[Sequence[float]] | None
-"""The values of each property in one row of an element; None past the end of the file."""
-
-
-def _of_text(body: bytes) -> Generator[Row, list[list[str]], None]:
-    """Rows of a text, for the properties that are sent."""
-    kinds = yield None
-    for words in map(str.split, body.decode("ascii", "replace").splitlines()):
-        if words:
-            row, at = list[Sequence[float]](), 0
-            for kind in kinds:
-                count, at = (int(words[at]), at + 1) if kind[0] == "list" else (1, at)
-                row.append([float(word) for word in words[at : at + count]])
-                at += count
-            kinds = yield row
-    while True:
-        yield None
-
-
-def _of_bytes(body: bytes, order: str) -> Generator[Row, list[list[str]], None]:
-    """Rows of a binary file, as `_of_text`."""
-    kinds, at = (yield None), 0
-    while True:
-        row = list[Sequence[float]]()
-        for kind in kinds:
-            count = 1
-            if kind[0] == "list":
-                (count,) = struct.unpack_from(order + NUMBERS[kind[1]], body, at)
-                at += struct.calcsize(NUMBERS[kind[1]])
-            row.append(struct.unpack_from(f"{order}{count}{NUMBERS[kind[-2]]}", body, at))
-            at += count * struct.calcsize(NUMBERS[kind[-2]])
-        kinds = yield row
