@@ -79,7 +79,7 @@ def test_a_surface_that_stands_on_its_edge_asks_which_axis_points_upwards(kind, 
     edge.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in drawn) + f"l {' '.join(map(str, range(1, 61)))} 1\n")
     read = partial(rs.surface_from, path, unit=1.0)
     with pytest.raises(
-        rs.InputError, match=rf"steeper than 60 degrees .*: does {other} .* --up {other};.* otherwise .{usual}"
+        rs.InputError, match=rf"steeper than 60 degrees .*: does {other} .*--up {other};.* otherwise .{usual}"
     ):
         read()
     turned = read(boundary=edge, placement=rs.Placement(up=other))
