@@ -1,6 +1,5 @@
-"""Shells of any size, mirrored, turned and far away: `python -m tests.acceptance.drawn_scale` prints their rows."""
+"""Shells of any size, mirrored, turned and far away: rows of `make accept-drawn`."""
 
-import sys
 from collections.abc import Iterator
 from math import pi, radians
 
@@ -9,7 +8,7 @@ from scipy.spatial import cKDTree
 
 import rodshell as rs
 from rodshell.solve.equilibrium import find_stable
-from tests.acceptance.rows import Row, print_table
+from tests.acceptance.rows import Row
 from tests.solve.fans import fans
 from tests.solve.scaled import LATH, TUBE, Placed, boundary_placed, cap, form, others
 
@@ -105,7 +104,3 @@ def rows() -> Iterator[Row]:
     yield from placed_rows()
     yield from boundary_rows()
     yield from bifurcation_rows()
-
-
-if __name__ == "__main__":
-    sys.exit(print_table("drawn_scale", rows()))
