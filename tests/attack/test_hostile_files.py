@@ -23,9 +23,10 @@ from rodshell import untrusted
 from rodshell.case.rod_ends import read_table
 from rodshell.sweeps.identity import content_digest
 from rodshell.targets import apart
-from rodshell.targets.field_fitting import cubic_spacing, mesh_samples
+from rodshell.targets.field_fitting import cubic_spacing
 from rodshell.targets.mesh_files import read_curves, read_mesh
 from rodshell.targets.nurbs_files import Nurbs
+from rodshell.targets.samples import mesh_samples
 from rodshell.targets.trianglemesh import sound_mesh
 from tests.acceptance.targets_broken import WRITERS, dome
 from tests.attack import surface_files

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rodshell.targets import Freeform
-from rodshell.targets.field_fitting import Samples, _ring, fit_field
+from rodshell.targets.field_fitting import _ring, fit_field
+from rodshell.targets.samples import Samples
 from rodshell.targets.smooth_field import SmoothField
 from tests.targets.meshes import PARTS, Floats, capped_sphere, sheet, strewn
 

@@ -148,6 +148,12 @@ def test_indices_of_an_obj_may_count_from_the_end_and_lines_go_on(tmp_path):
     assert read_mesh(tmp_path / "two.obj", 1.0)[1].tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+@pytest.mark.parametrize("kind", ["obj", "off"])
+def test_a_byte_order_mark_hides_no_first_line(kind, tmp_path):
+    (tmp_path / f"dome.{kind}").write_bytes(b"\xef\xbb\xbf" + WRITERS[kind](*dome()))
+    np.testing.assert_allclose(read_mesh(tmp_path / f"dome.{kind}", 1.0)[0], dome()[0], rtol=1e-6, atol=1e-6)
+
+
 ROOF_AND_BOX = (
     "o roof\nv 0 0 0\nv 1 0 0.1\nv 1 1 0\nv 0 1 0.1\nv 2 0 0\nv 2 1 0.1\nf 1 2 3 4\nf 2 5 6 3\n"
     "o box of wood\ng side\nv 5 5 5\nv 5.1 5 5\nv 5.1 5.1 5\nv 5 5.1 5\nf 7 8 9 10\ng top side\nf 7 8 9\n"

@@ -85,7 +85,7 @@ def test_stray_objects_with_less_than_a_hundredth_of_the_area_are_left_out_whate
     alone, _ = sound_mesh(points, faces, "the mesh")
     mesh, repairs = sound_mesh(np.vstack([points, corners]), np.vstack([book + len(points), faces]), "the mesh")
     np.testing.assert_array_equal(mesh.vertices, alone.vertices)
-    assert repairs == ["1 separate piece of 3 faces, with 0.42 % of the area, was left out"]
+    assert repairs == ["separate pieces with 0.42 % of the area were left out (3 faces)"]
     larger = 4 * corners - [9, 9, 9]
     with pytest.raises(rs.InputError, match=r"2 separate pieces \(the largest two have 94 and 6 %"):
         sound_mesh(np.vstack([points, larger]), np.vstack([faces, book + len(points)]), "the mesh")

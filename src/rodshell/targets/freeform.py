@@ -386,11 +386,7 @@ class Freeform(Target):
         k = int(np.argmax(off))
         if not off[k] < OFF * self._extent:
             px, py, pz = x[k]
-            how = (
-                f"vertices lie {off[k]:.2g} m off it"
-                if np.isfinite(off[k])
-                else "normals, or those of another sheet, point elsewhere"
-            )
+            how = f"vertices lie {off[k]:.2g} m off it" if np.isfinite(off[k]) else "or another sheet's normals differ"
             raise InputError(
                 f"{name} cannot be followed by a smooth surface near ({px:.4g}, {py:.4g}, {pz:.4g}) m, where its "
                 f"{how}: smooth it, mesh it more finely there, or separate sheets that touch or cross each other"

@@ -152,7 +152,7 @@ def recoded(text: bytes) -> bytes:
     except UnicodeDecodeError:
         utf16 = text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         return text.decode("utf-16" if utf16 else "cp1252", "replace").encode("utf-8")
-    return text
+    return text.removeprefix(codecs.BOM_UTF8)
 
 
 def _require_bounds(path: Path, data: bytes) -> None:
@@ -173,7 +173,7 @@ def _require_bounds(path: Path, data: bytes) -> None:
 
 
 def _of_obj(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
-    faces, _, named = _read(path, "OBJ", lambda: obj_content(recoded(data).decode("utf-8")))
+    faces, _, named = _read(path, "OBJ", lambda: obj_content(recoded(data)))
     if not data.endswith((b"\n", b"\r", b"\n\0")) and len(faces.points) - 1 not in faces.corners:
         raise InputError(  # it is written in the order of its vertices
             f"{path} seems to be truncated: its last line is not complete, and faces are missing: export it again"
@@ -187,7 +187,7 @@ def _of_obj(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
 
 
 def _of_off(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
-    return _whole(path, name, *_read(path, "OFF", lambda: off_content(recoded(data).decode("utf-8"))))
+    return _whole(path, name, *_read(path, "OFF", lambda: off_content(recoded(data))))
 
 
 def _of_ply(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
@@ -327,7 +327,7 @@ def _require_near(path: Path, far: float) -> None:
 
 def _lines_of_obj(path: Path, data: bytes) -> list[Floats]:
     """The `l` elements of an OBJ."""
-    content = _read(path, "a drawing of curves", lambda: obj_content(recoded(data).decode("utf-8")))
+    content = _read(path, "a drawing of curves", lambda: obj_content(recoded(data)))
     _require_few_strokes(path, len(content.lines))
     return _read(path, "a drawing of curves", lambda: [content.polygons.points[line] for line in content.lines])
 

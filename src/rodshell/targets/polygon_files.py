@@ -33,7 +33,7 @@ class _Faces:
     def known(self) -> int:
         return len(self.points) // 3
 
-    def add_point(self, words: Sequence[str | float]) -> None:
+    def add_point(self, words: Sequence[bytes | float]) -> None:
         x, y, z = words
         self.points.extend((float(x), float(y), float(z)))
 
@@ -61,22 +61,22 @@ class ObjContent(NamedTuple):
     named: dict[str, list[tuple[int, int]]]
 
 
-def obj_content(text: str) -> ObjContent:
+def obj_content(data: bytes) -> ObjContent:
     """Read faces and polylines of an OBJ file."""
     faces, lines = _Faces(), list[list[int]]()
-    begun: list[tuple[int, str, str]] = []  # from which face on, "o" or "g", its names
-    for words in map(str.split, text.replace("\\\n", " ").split("\n")):
-        key = words[0] if words else ""
-        if key == "v":
+    begun: list[tuple[int, bytes, str]] = []  # from which face on, "o" or "g", its names
+    for words in map(bytes.split, io.BytesIO(data.replace(b"\\\n", b" "))):
+        key = words[0] if words else b""
+        if key == b"v":
             faces.add_point(words[1:4])
-        elif key == "f":
+        elif key == b"f":
             faces.add([_index(word, faces.known) for word in words[1:]])
-        elif key == "l":
+        elif key == b"l":
             lines.append([_index(word, faces.known) for word in words[1:]])
-        elif key in ("o", "g"):
-            begun.append((len(faces.sizes), key, " ".join(words[1:])))
+        elif key in (b"o", b"g"):
+            begun.append((len(faces.sizes), key, b" ".join(words[1:]).decode("utf-8", "replace")))
     named = dict[str, list[tuple[int, int]]]()
-    for kind in "og":  # a group continues where the next object begins
+    for kind in (b"o", b"g"):  # a group continues where the next object begins
         starts = [(first, name) for first, of, name in begun if of == kind]
         for (first, name), (stop, _) in pairwise([*starts, (len(faces.sizes), "")]):
             if stop > first:
@@ -84,25 +84,25 @@ def obj_content(text: str) -> ObjContent:
     return ObjContent(faces.polygons(), lines, named)
 
 
-def _index(word: str, known: int) -> int:
+def _index(word: bytes, known: int) -> int:
     """The index of a point, from 0 on, of a corner such as 7/1/2, or -1 for the last point so far."""
-    number = int(word.partition("/")[0])
+    number = int(word.partition(b"/")[0])
     if number == 0:
-        raise ValueError(f"a face refers to vertex 0 ({word})")
+        raise ValueError(f"a face refers to vertex 0 ({word.decode()})")
     return number - 1 if number > 0 else known + number
 
 
-def off_content(text: str) -> tuple[Polygons, dict[str, int]]:
+def off_content(data: bytes) -> tuple[Polygons, dict[str, int]]:
     """Read an OFF file: its faces, and the numbers of vertices and faces that it announces."""
-    lines = [words for line in text.splitlines() if (words := line.partition("#")[0].split())]
-    if not re.fullmatch("(ST|C|N)*OFF", lines[0].pop(0)):
+    lines = filter(None, (line.partition(b"#")[0].split() for line in io.BytesIO(data)))
+    kind, *counts = next(lines)
+    if not re.fullmatch(b"(ST|C|N)*OFF", kind):
         raise ValueError("it does not begin with OFF")
-    lines = lines if lines[0] else lines[1:]
-    vertices, faces = (int(word) for word in lines[0][:2])
+    vertices, faces = (int(word) for word in (counts or next(lines))[:2])
     found = _Faces()
-    for words in lines[1 : 1 + vertices]:
+    for words in islice(lines, vertices):
         found.add_point(words[:3])
-    for words in lines[1 + vertices :][:faces]:
+    for words in islice(lines, faces):
         found.add([int(word) for word in words[1 : 1 + int(words[0])]])
     return found.polygons(), {"vertex": vertices, "face": faces}
 

@@ -207,10 +207,8 @@ def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]
             "of the area): keep one, or join them"
         )
     others = pieces != np.argmax(shares)
-    return mesh.only(~others), [
-        f"{len(shares) - 1} separate piece{'s' * (len(shares) > 2)} of {others.sum()} faces, with "
-        f"{100 * (1 - shares.max()):.2g} % of the area, was left out"
-    ]
+    left_out = f"separate pieces with {100 * (1 - shares.max()):.2g} % of the area were left out ({others.sum()} faces)"
+    return mesh.only(~others), [left_out]
 
 
 def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
