@@ -1,6 +1,5 @@
 """The uppermost facet over points of the plan: the one that a comparison of all with all finds, at a fraction of it."""
 
-from time import process_time
 
 import numpy as np
 import pytest
@@ -40,15 +39,3 @@ def test_heights_are_those_of_all_facets_compared_bit_for_bit(name):
     found = target._heights_of_facets(xy)
     np.testing.assert_array_equal(found, one_by_one(target, xy))
     assert 0 < np.isnan(found).sum() < len(xy)
-
-
-def test_facets_cost_little_of_what_comparing_all_with_all_does():
-    """A twentieth measured; all of them in one array take more than half."""
-    target, xy = rs.Freeform.of(*MESHES["even"]), np.random.default_rng(0).uniform(-1, 1, (2000, 2))
-    cost = list[float]()
-    for way in (target._heights_of_facets, lambda at: one_by_one(target, at)):
-        way(xy[:1])
-        begin = process_time()
-        way(xy)
-        cost.append(process_time() - begin)
-    assert cost[0] < 0.2 * cost[1]
