@@ -1,6 +1,5 @@
 """The uppermost facet over points of the plan: the one that a comparison of all with all finds, at a fraction of it."""
 
-
 import numpy as np
 import pytest
 
