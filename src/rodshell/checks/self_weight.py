@@ -7,11 +7,11 @@ are in `rodshell.loads`.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from rodshell.dataclass import dataclass
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import Equilibrium

@@ -20,6 +20,7 @@ inertias I tied by C2.
 
 import numpy as np
 from scipy.sparse import csc_matrix, diags, eye, triu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, StabilityError
@@ -161,8 +162,6 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     free : the free directions, without blocked ones.
     curvature : (N, 3, 3) what constraints that turn with the state add to the stiffness [N/m].
     """
-    from scipy.sparse.linalg import LinearOperator, eigsh  # here, as most forms do not need it
-
     elements: tuple[Elements, ...] = (*motion.elements, *motion.explicit, _Curvature(curvature))
     stiffness = tangent_stiffness(elements, state, free)
     root = 1.0 / np.sqrt(free.reduce_diagonal(motion.mass))

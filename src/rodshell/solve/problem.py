@@ -6,14 +6,13 @@ enters Newton's matrix. Forces on a twist angle are moments [N m] in the first c
 """
 
 from collections.abc import Callable
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Shell

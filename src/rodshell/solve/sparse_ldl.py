@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
@@ -276,8 +277,6 @@ def upper_triangle(indptr: Longs, indices: Longs, data: Floats) -> "csc_matrix":
     indptr, indices : the pattern, upper triangle in compressed columns.
     data : (nnz,) its values.
     """
-    from scipy.sparse import csc_matrix
-
     return csc_matrix((data, indices, indptr), shape=(len(indptr) - 1, len(indptr) - 1))
 
 

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import product
 from math import prod
@@ -11,7 +12,6 @@ from typing import Any, Literal, get_args
 
 from rodshell.case import BUILT_IN
 from rodshell.case.load import flattened, toml_of
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.sweeps.axes import BASE, Axis, read_axes

@@ -1,12 +1,14 @@
 """A triangle mesh as a surface: vertices merged, faces oriented alike, in one smooth piece; others are refused."""
 
+from dataclasses import dataclass
 from functools import cached_property
 from math import cos, degrees, radians
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from rodshell.arrays import Bools, Floats, Ints, Longs
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot
 
@@ -189,9 +191,6 @@ def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
 
 def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]:
     """The mesh without stray objects: faces that no edge connects to the rest."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     first, edge = unique_rows(np.column_stack([np.minimum(a, b), np.maximum(a, b)]).astype(np.int64))
     count = len(mesh.faces)
@@ -279,17 +278,11 @@ class _Neighbours:
 
     def pieces(self, keep: Bools, faces: int) -> Ints:
         """Index (m,) of the piece of each face, where only the edges `keep` (e,) connect faces."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         i, j = self.faces[keep].T
         return np.asarray(connected_components(coo_matrix((np.ones(len(i)), (i, j)), (faces, faces)), False)[1])
 
     def turned(self, faces: int, name: str, mesh: TriangleMesh) -> Bools:
         """(m,) which faces are oriented against the first one."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import breadth_first_order
-
         i, j = self.faces.T
         if not len(i):  # a single face, and SciPy cannot look up no entries
             return np.zeros(faces, dtype=bool)
@@ -319,8 +312,6 @@ def _smooth_piece(
     mesh: TriangleMesh, neighbours: _Neighbours, name: str, repairs: list[str]
 ) -> tuple[TriangleMesh, list[str]]:
     """The piece between creases that covers most of the plan, facing up."""
-    from scipy.sparse import coo_matrix
-
     i, j = neighbours.faces.T
     # A sliver's own normal is noise: it is judged with the two rows of faces behind it, by their areas near its edges.
     ends = mesh.vertices[neighbours.edges]
