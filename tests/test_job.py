@@ -1,6 +1,7 @@
 """A job is a value: the same however it is written; run again from an earlier form, only what changed is run."""
 
 import pickle
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
