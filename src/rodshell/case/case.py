@@ -241,7 +241,7 @@ class Case(Table):
                 f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
             )
         if self.rod.left_open:
-            progress("net", "for the size of the rods", 0.0)
+            progress("preparing", "net for the size of the rods", 0.0)
         rod = self.rod_on(target, layout, anchor=anchor)
         require_likely_sizes(rod, 2 * target.size, shortest)
         self.require_strength(rod, joint)

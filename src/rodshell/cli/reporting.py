@@ -51,7 +51,7 @@ class Progress:
     def __init__(self, *, quiet: bool = False) -> None:
         self._quiet = quiet
         self._begun = self._spoken = monotonic()
-        self._stage, self._where = "", "preparing"
+        self._stage = self._where = "preparing"
         self._live: Printed | None = None
         self._over = threading.Event()
         self._voice: threading.Thread | None = None

@@ -35,7 +35,7 @@ from rodshell.solve.problem import Problem
 from rodshell.targets import Target
 
 CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
-HOLD = 0.1  # edges from a rod's end that is held to any node, at least: on 240 rectangles at most 9 factorisations
+HOLDS = (0.1, 0.5, np.inf)  # edges from a rod's end that is held to any node, at least: the first that converges
 WARN_ANGLE = 25.0  # degrees
 MOST_SOLVES = 3  # of a drape in layers; the second leaves strains of 1e-8
 PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces converge by a factor of 0.05 a step at 200 rods
@@ -76,18 +76,23 @@ def bound_drape(
     start = net.node_positions(mesh)
     normal = unit(target.level(start)[1])
     within = rod.bend_stiffnesses[1]
-    problem = Problem(
-        elements=(IsotropicBend(mesh.bends, within / mesh.voronoi_lengths),),
-        stretch=_penalty(mesh, within, target),
-        constraint=_bind(target, mesh, start, normal, spans),
-        length=target.size,
-        inextensible=True,
-        flat_coordinates=mesh.flat[:, :2],
-    )
-    found = _in_layers(
-        problem, target, mesh, start, eccentricity,
-        progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
-    )  # fmt: skip
+    tried = list[SolveReport]()
+    for hold in HOLDS:
+        problem = Problem(
+            elements=(IsotropicBend(mesh.bends, within / mesh.voronoi_lengths),),
+            stretch=_penalty(mesh, within, target),
+            constraint=_bind(target, mesh, start, normal, spans, hold),
+            length=target.size,
+            inextensible=True,
+            flat_coordinates=mesh.flat[:, :2],
+        )
+        found = _in_layers(
+            problem, target, mesh, start, eccentricity,
+            progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
+        )  # fmt: skip
+        tried.append(found.report)
+        if found.report.converged:
+            break
     touching = np.zeros(mesh.node_count, dtype=bool)
     _mark(spans, mesh.rod_nodes, touching)
     on_target = np.flatnonzero(touching)
@@ -135,7 +140,7 @@ def bound_drape(
         mesh=mesh,
         positions=found.state,
         rods=tuple(line for line in net.rods if not line.virtual),
-        levels=(found.report,),
+        levels=(found.report.after(*tried[:-1]),),
         figures=figures,
         net=net,
         warnings=tuple(warnings),
@@ -197,9 +202,9 @@ def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentric
     return np.asarray(mesh.edge_lengths * np.sqrt(dot(chord, chord) / dot(in_layer, in_layer)))
 
 
-def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats, spans: Ints) -> BoundToTarget:
+def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats, spans: Ints, hold: float) -> BoundToTarget:
     """All nodes on the target; those of the two axes, and the ends of rods, move only along the net's lines, and the
-    anchor does not move. An end close to another node is left to that, since it would be a lever.
+    anchor does not move. An end closer than `hold` edges to another node is left to that, since it would be a lever.
 
     Parameters
     ----------
@@ -212,7 +217,7 @@ def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats, spans: 
     held = np.array([rod.offset == 0.0 for rod in mesh.grid.rods])[mesh.rod_of]
     apart = np.abs(np.diff(mesh.stations))
     nearest = np.minimum(np.append(np.inf, apart), np.append(apart, np.inf))
-    held[spans] |= nearest[spans] > HOLD * np.median(mesh.edge_lengths)
+    held[spans] |= nearest[spans] > hold * np.median(mesh.edge_lengths)
     entries, rods = np.flatnonzero(held), mesh.rod_of[held]
     before, after = np.maximum(entries - 1, mesh.rod_start[rods]), np.minimum(entries + 1, mesh.rod_stop[rods] - 1)
     nodes = mesh.rod_nodes[entries]
