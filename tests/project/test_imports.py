@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-OF_FILES = ("ezdxf", "reportlab", "PIL", "aggdraw", "jinja2", "trimesh", "rhino3dm", "OCP", "pymoo")
+OF_FILES = ("ezdxf", "reportlab", "PIL", "jinja2", "trimesh", "rhino3dm", "OCP", "pymoo")
 FORM = "from rodshell.cli import main; main(['form', 'cap', '--only', 'csv', '--checks.stages', '0', '--quiet'])"
 
 

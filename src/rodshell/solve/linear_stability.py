@@ -27,7 +27,7 @@ from rodshell.errors import InputError, StabilityError
 from rodshell.model import Assembly, Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.solve.implicit_euler import Motion
-from rodshell.solve.sparse_ldl import Factors, Qdldl, SingularError
+from rodshell.solve.sparse_ldl import Factors, Multifrontal, SingularError
 from rodshell.solve.tangent import FIRST_SHIFT, generic
 
 NO_NODES = np.empty(0, dtype=np.intp)
@@ -48,7 +48,7 @@ class ExplicitTies:
     def __init__(self, motion: Motion, free: Freedom) -> None:
         self._blocks = [element.blocks for element in (*motion.elements, *motion.explicit)]
         self._assembly = Assembly.of(self._blocks, free)
-        self._solver = Qdldl(self._assembly.indptr, self._assembly.indices)
+        self._solver = Multifrontal(self._assembly.indptr, self._assembly.indices)
         self._factors: Factors | None = None
 
     def look(self, motion: Motion, state: Floats, free: Freedom, stopped: Ints = NO_NODES) -> None:
@@ -168,7 +168,7 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     scaled = csc_matrix(diags(root) @ stiffness @ diags(root))
     identity, shift = eye(free.size, format="csc"), FIRST_SHIFT * float(np.abs(scaled.diagonal()).mean())
     upper = triu(scaled + shift * identity, format="csc")
-    solver = Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64))
+    solver = Multifrontal(upper.indptr.astype(np.int64), upper.indices.astype(np.int64))
     while (factors := solver.factor(upper.data)).negative:
         shift *= GROWTH
         upper = triu(scaled + shift * identity, format="csc")
