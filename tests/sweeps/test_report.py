@@ -39,6 +39,7 @@ def test_points_of_a_search_open_their_report_or_the_studio_and_the_front_is_tha
         ]
         browser = play.chromium.launch(executable_path=CHROMIUM, args=options)
         page = browser.new_page()
+        page.set_default_timeout(120_000)  # ms
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("request", lambda request: said.append(request.url) if request.url.startswith("http") else None)
