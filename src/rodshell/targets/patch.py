@@ -97,6 +97,17 @@ class Seam:
         side = left[before] + left[after]  # at a corner the mean of both sides decides
         return np.asarray(np.copysign(np.linalg.norm(off, axis=1), np.einsum("ni,ni->n", off, side)))
 
+    def along(self, x: Floats) -> tuple[Floats, Floats]:
+        """Arc length (n,) [m] of the seam's points closest to points `x` (n, 2 or 3), and unit tangents (n, 2) there.
+
+        It is counted from the seam's second point, or from the first of a closed one.
+        """
+        edge = np.diff(self._corners, axis=0)
+        length = np.linalg.norm(edge, axis=1)
+        begin = np.cumsum(length) - length - (0.0 if self.closed else length[0])
+        k, share, _ = self._nearest(x)
+        return np.asarray(begin[k] + share * length[k]), np.asarray(edge[k] / length[k, None])
+
     def _nearest(self, x: Floats) -> tuple[Ints, Floats, Floats]:
         """Of each point (n, 2 or 3): nearest edge, its fraction before the closest point, the vector from there."""
         start, edge = self._corners[:-1], np.diff(self._corners, axis=0)
@@ -112,17 +123,18 @@ class Seam:
 class Patch(Target):
     """A part of a target: the points on given sides of its seams.
 
-    Past a seam the surface is continued by the rest of the whole target.
-
     Parameters
     ----------
     whole : the target.
+    surface : the target that has the patch's surface, and continues it past a seam: the whole; or where that is creased
+        along a seam, the smooth piece of it on this side.
     seams : that bound the patch.
     sides : for each seam 1 if the patch is on its left, -1 if it is on its right.
     middle : x, y of a point well inside [m], the default of the anchor.
     """
 
     whole: Target
+    surface: Target
     seams: tuple[Seam, ...]
     sides: tuple[int, ...]
     middle: tuple[float, float]
@@ -182,22 +194,22 @@ class Patch(Target):
         return self.whole.covers(x)
 
     def implicit(self, x: Floats) -> Implicit:
-        return self.whole.implicit(x)
+        return self.surface.implicit(x)
 
     def level(self, x: Floats) -> tuple[Floats, Floats]:
-        return self.whole.level(x)
+        return self.surface.level(x)
 
     def height_at(self, xy: Floats) -> Floats:
-        return self.whole.height_at(xy)
+        return self.surface.height_at(xy)
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
-        return self.whole.retract(x, steps)
+        return self.surface.retract(x, steps)
 
     def on_surface(self, x: Floats) -> Gap:
-        return self.whole.on_surface(x)
+        return self.surface.on_surface(x)
 
     def closest(self, x: Floats) -> Floats:
-        return self.whole.closest(x)
+        return self.surface.closest(x)
 
     def gap(self, x: Floats) -> Gap:
-        return self.whole.gap(x)
+        return self.surface.gap(x)

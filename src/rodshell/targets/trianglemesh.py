@@ -2,6 +2,7 @@
 
 from functools import cached_property
 from math import cos, degrees, radians
+from typing import NamedTuple
 
 import numpy as np
 
@@ -113,7 +114,26 @@ class TriangleMesh:
         return TriangleMesh(self.vertices[used], renumbered.reshape(-1, 3).astype(np.intp))
 
 
-def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, list[str]]:
+class SoundMesh(NamedTuple):
+    """A mesh that was checked and repaired.
+
+    Parameters
+    ----------
+    surface : the smooth piece of it that covers most of the plan, facing up; the whole where there is none.
+    repairs : what was changed, in sentences.
+    whole : all of it between and beyond its creases, oriented alike.
+    creased : what is said of its creases; "" where it has none.
+    smooth : whether the surface has no crease within.
+    """
+
+    surface: TriangleMesh
+    repairs: list[str]
+    whole: TriangleMesh
+    creased: str
+    smooth: bool
+
+
+def sound_mesh(vertices: Floats, faces: Ints, name: str) -> SoundMesh:
     """Check and repair a mesh.
 
     Normals may point to either side. Creases end the surface: of a half ball with its floor, or of a shell with a
@@ -125,17 +145,13 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, 
     faces : (m, 3) indices of vertices.
     name : of the mesh, for messages.
 
-    Returns
-    -------
-    The smooth surface that the mesh represents, facing up; and what was repaired, in sentences.
-
     Raises
     ------
-    InputError : the mesh is empty, not finite, not manifold, one-sided, creased or in several pieces; names the place.
+    InputError : the mesh is empty, not finite, not manifold, one-sided or in several pieces; names the place.
     """
     _require_numbers(vertices, faces, name)
     mesh, repairs = _main_piece(_welded(vertices, faces, name), name)
-    neighbours = _Neighbours.of(mesh, name)
+    neighbours = Neighbours.of(mesh, name)
     turned = neighbours.turned(len(mesh.faces), name, mesh)
     if turned.any() and not turned.all():
         fewer = min(int(turned.sum()), int((~turned).sum()))
@@ -143,7 +159,7 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, 
     mesh = TriangleMesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
     if not len(mesh.loops) and _volume(mesh) < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
-    return _smooth_piece(mesh, neighbours, name, repairs)
+    return smooth_piece(mesh, neighbours, name)._replace(repairs=repairs)
 
 
 def _require_numbers(vertices: Floats, faces: Ints, name: str) -> None:
@@ -241,7 +257,7 @@ def _edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
-class _Neighbours:
+class Neighbours:
     """Neighbouring faces.
 
     Parameters
@@ -256,7 +272,7 @@ class _Neighbours:
     against: Bools
 
     @staticmethod
-    def of(mesh: TriangleMesh, name: str) -> "_Neighbours":
+    def of(mesh: TriangleMesh, name: str) -> "Neighbours":
         a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
         low, high = np.minimum(a, b), np.maximum(a, b)
         order = np.lexsort((high, low))
@@ -275,7 +291,7 @@ class _Neighbours:
             raise InputError(
                 f"{name} is not manifold: two parts of it touch in the single point {where}: add or remove a face there"
             )
-        return _Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
+        return Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
 
     def pieces(self, keep: Bools, faces: int) -> Ints:
         """Index (m,) of the piece of each face, where only the edges `keep` (e,) connect faces."""
@@ -315,10 +331,9 @@ def _volume(mesh: TriangleMesh) -> float:
     return float(dot(mesh.vertices[mesh.faces[:, 0]] - centre, mesh.doubled).sum())
 
 
-def _smooth_piece(
-    mesh: TriangleMesh, neighbours: _Neighbours, name: str, repairs: list[str]
-) -> tuple[TriangleMesh, list[str]]:
-    """The piece between creases that covers most of the plan, facing up."""
+def turns_at(mesh: TriangleMesh, neighbours: Neighbours) -> Floats:
+    """Cosines (e,) of the angles by which a mesh turns at the edges between two faces, and from what is on one side of
+    them to what is on the other: the larger of both."""
     from scipy.sparse import coo_matrix
 
     i, j = neighbours.faces.T
@@ -330,31 +345,39 @@ def _smooth_piece(
     near = mesh.doubled + graph @ mesh.doubled
     wide = mesh.doubled + graph @ near
     sides = wide[i] - share[0][:, None] * near[j], wide[j] - share[1][:, None] * near[i]
-    cosine = np.maximum(_cosine(mesh.doubled[i], mesh.doubled[j]), _cosine(*sides))
+    return np.maximum(_cosine(mesh.doubled[i], mesh.doubled[j]), _cosine(*sides))
+
+
+def smooth_piece(mesh: TriangleMesh, neighbours: Neighbours, name: str) -> SoundMesh:
+    """Of a mesh whose faces are oriented alike the piece between creases that covers most of the plan, facing up."""
+    i, j = neighbours.faces.T
+    cosine = turns_at(mesh, neighbours)
     smooth = cosine > cos(radians(CREASE))
     closed = not len(mesh.loops)
     pieces = neighbours.pieces(smooth, len(mesh.faces))
     plan = np.bincount(pieces, mesh.doubled[:, 2]) / 2
     chosen = int(np.argmax(plan if closed else np.abs(plan)))
-    if not smooth.all():
-        within = np.flatnonzero(~smooth & (pieces[i] == chosen) & (pieces[j] == chosen))
-        share = mesh.areas[pieces == chosen].sum() / mesh.areas.sum()
-        if len(within) or share < 0.1:
-            worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(cosine))
-            angle, where = degrees(np.arccos(np.clip(cosine[worst], -1, 1))), place(mesh, neighbours.edges[worst, 0])
-            raise InputError(
-                f"{name} is creased: faces meet at {angle:.0f} degrees near {where}, and a target must be smooth: "
-                "round it off, or mesh it more finely"
-            )
-        repairs.append(
-            f"the surface has creases: the target is the smooth piece of it that covers most of the plan, "
-            f"{100 * share:.0f} % of the area"
-        )
-        mesh = mesh.only(pieces == chosen)
-        _Neighbours.of(mesh, name)  # refuses a piece that touches itself in a point
     if not closed and plan[chosen] < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
-    return mesh, repairs
+    if smooth.all():
+        return SoundMesh(mesh, [], mesh, "", True)
+    within = np.flatnonzero(~smooth & (pieces[i] == chosen) & (pieces[j] == chosen))
+    share = mesh.areas[pieces == chosen].sum() / mesh.areas.sum()
+    if len(within) or share < 0.1:
+        worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(cosine))
+        angle, where = degrees(np.arccos(np.clip(cosine[worst], -1, 1))), place(mesh, neighbours.edges[worst, 0])
+        creased = (
+            f"{name} is creased: faces meet at {angle:.0f} degrees near {where}, and a target must be smooth: "
+            "round it off, or mesh it more finely"
+        )
+        return SoundMesh(mesh, [], mesh, creased, False)
+    creased = (
+        f"the surface has creases: the target is the smooth piece of it that covers most of the plan, "
+        f"{100 * share:.0f} % of the area"
+    )
+    surface = mesh.only(pieces == chosen)
+    Neighbours.of(surface, name)  # refuses a piece that touches itself in a point
+    return SoundMesh(surface, [], mesh, creased, True)
 
 
 def _cosine(a: Floats, b: Floats) -> Floats:

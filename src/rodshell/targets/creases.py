@@ -1,0 +1,212 @@
+"""Creases of a mesh: where they are, how they are drawn as seams, and the pieces into which seams along them cut it.
+
+A crease is a row of edges at which a mesh turns by more than its curvature on both sides explains. Where it becomes
+weaker than that, as at the crown of a groined vault, it is bridged.
+"""
+
+from functools import cached_property
+from itertools import pairwise, product
+from math import radians
+
+import numpy as np
+
+from rodshell.arrays import Bools, Floats, Ints
+from rodshell.geometry.curves import on_curve
+from rodshell.geometry.frames import dot, unit
+from rodshell.targets.patch import Seam
+from rodshell.targets.rim import CORNER
+from rodshell.targets.trianglemesh import Neighbours, TriangleMesh
+
+KINK = radians(3.0)  # at weaker edges there is no crease
+RISE = 2.0  # times what the curvature beside an edge explains: there it is a crease
+ROW = 1.5  # edge lengths: steps at which the curvature beside an edge is taken
+ALONG = 0.8  # least cosine in plan between an edge and the seam that runs along it
+NEAR = 0.05  # of the half extent: a crease this close to a seam is the one that is meant
+SHORT = 0.1  # of the half extent: shorter rows of edges are no crease
+ON = 1e-5  # of the half extent: what is this close to a line lies on it
+BRIDGED = 0.5  # of the half extent: longest gap between two parts of one crease
+ROUGH = 0.01  # of the half extent: how far creases are from what is said of them
+FINER = 4  # points on a curved crease between two vertices
+STEEP = 0.2  # upward part of a normal: a seam, which cuts straight down, cannot run along the foot of a wall
+
+
+class Creases:
+    """The creases of a mesh.
+
+    Parameters
+    ----------
+    mesh : with all faces oriented alike.
+    name : of the mesh, for messages.
+    """
+
+    def __init__(self, mesh: TriangleMesh, name: str) -> None:
+        self.mesh, self.neighbours = mesh, Neighbours.of(mesh, name)
+        self.extent = 0.5 * float(np.ptp(mesh.vertices, axis=0).max())
+
+    @cached_property
+    def sharp(self) -> Bools:
+        """(e,) which edges between two faces are creases."""
+        from scipy.spatial import cKDTree
+
+        mesh, (i, j) = self.mesh, self.neighbours.faces.T
+        normals, centres = unit(mesh.doubled), mesh.vertices[mesh.faces].mean(axis=1)
+        sharp = np.zeros(len(i), dtype=bool)
+        bent = np.flatnonzero(_angle(normals[i], normals[j]) > KINK)
+        if not len(bent):
+            return sharp
+        ends = mesh.vertices[self.neighbours.edges[bent]]
+        middle, along = ends.mean(axis=1), unit(ends[:, 1] - ends[:, 0])
+        step = ROW * np.sqrt(mesh.areas[i[bent]] + mesh.areas[j[bent]])[:, None]
+        tree, beside = cKDTree(centres), []
+        for face in (i[bent], j[bent]):
+            away = centres[face] - middle
+            away = unit(away - dot(away, along)[:, None] * along)
+            rows = []
+            for steps in (1, 2):
+                far, near = tree.query(middle + steps * step * away, k=min(3, len(centres)))
+                weight = 1 / np.maximum(np.reshape(far, (len(bent), -1)), 1e-12 * self.extent)
+                rows.append(unit(np.einsum("nk,nki->ni", weight, normals[np.reshape(near, weight.shape)])))
+            beside.append(rows)
+        (a, a_far), (b, b_far) = beside
+        explained = 2 * np.maximum(_angle(a, a_far), _angle(b, b_far))
+        sharp[bent] = _angle(a, b) > np.maximum(KINK, RISE * explained)
+        return sharp
+
+    def along(self, seam: Seam) -> Seam | None:
+        """The seam moved onto the crease that it runs along; None where it runs along none."""
+        edges = self.neighbours.edges[self.sharp]
+        ends = self.mesh.vertices[edges, :2]
+        _, direction = seam.along(ends.mean(axis=1))
+        edge = ends[:, 1] - ends[:, 0]
+        length = np.linalg.norm(edge, axis=1)
+        kept = np.abs(np.einsum("ni,ni->n", edge, direction)) > ALONG * length
+        kept &= (np.abs(seam.distance(ends.reshape(-1, 2))).reshape(-1, 2) < NEAR * self.extent).all(axis=1)
+        if not length[kept].sum() > SHORT * self.extent:
+            return None
+        on = np.unique(edges[kept])
+        s, _ = seam.along(self.mesh.vertices[on])
+        on, s = on[np.argsort(s)], np.sort(s)
+        points = self.mesh.vertices[on, :2]
+        if seam.closed:
+            return Seam.of(_smoothed(np.vstack([points, points[:1]]), ON * self.extent))
+        corners, _ = seam.along(seam.points)
+        rim = np.concatenate([[-1], *self.mesh.loops])
+        line = list[Floats]() if on[0] in rim else [seam.points[corners < s[0]]]
+        long = np.flatnonzero(np.diff(s) > BRIDGED * self.extent) + 1
+        for k, part in enumerate(np.split(np.arange(len(on)), long)):
+            if k:
+                line.append(seam.points[(corners > s[part[0] - 1]) & (corners < s[part[0]])])
+            line.append(_smoothed(points[part], ON * self.extent))
+        if on[-1] not in rim:
+            line.append(seam.points[corners > s[-1]])
+        return Seam.of(np.vstack(line))
+
+    def pieces(self, seams: tuple[Seam, ...]) -> dict[tuple[int, ...], TriangleMesh]:
+        """The parts of the mesh by the sides of the seams on which they are; see `Patch`.
+
+        A face that a seam crosses is in both parts where the mesh is smooth there; in neither where it bridges a crease.
+        """
+        mesh, (i, j) = self.mesh, self.neighbours.faces.T
+        at_crease = np.zeros(len(mesh.faces), dtype=bool)
+        at_crease[np.append(i[self.sharp], j[self.sharp])] = True
+        within = dict[tuple[int, int], Bools]()
+        for k, seam in enumerate(seams):
+            apart = seam.distance(mesh.vertices)[mesh.faces]
+            left, right = (apart > ON * self.extent * 10).any(axis=1), (apart < -ON * self.extent * 10).any(axis=1)
+            both = left & right
+            within[k, 1], within[k, -1] = left & ~(both & at_crease), right & ~(both & at_crease)
+        found = dict[tuple[int, ...], TriangleMesh]()
+        for sides in product((1, -1), repeat=len(seams)):
+            inside = np.logical_and.reduce([within[k, side] for k, side in enumerate(sides)])
+            if inside.any():
+                found[sides] = mesh.only(inside)
+        return found
+
+    @cached_property
+    def lines(self) -> list[Floats]:
+        """Polylines (n, 2) in plan along the creases, without detail, that seams may run along [m]."""
+        up = unit(self.mesh.doubled)[self.neighbours.faces[self.sharp], 2] > STEEP
+        edges = self.neighbours.edges[self.sharp][up.all(axis=1)]
+        chains = [self.mesh.vertices[chain, :2] for chain in _chains(edges)]
+        chains = [x for x in chains if _length(x) > SHORT * self.extent]
+        return [_simplified(x, ROUGH * self.extent) for x in _joined(chains, BRIDGED * self.extent)]
+
+
+def _angle(a: Floats, b: Floats) -> Floats:
+    """Angles (n,) between unit vectors (n, 3) [rad]."""
+    return np.asarray(np.arccos(np.clip(dot(a, b), -1.0, 1.0)))
+
+
+def _length(line: Floats) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def _chains(edges: Ints) -> list[Ints]:
+    """Vertices of the rows into which edges (e, 2) fall at vertices where other than two of them meet."""
+    at: dict[int, set[int]] = {}
+    for a, b in edges.tolist():
+        at.setdefault(a, set()).add(b)
+        at.setdefault(b, set()).add(a)
+    ends = [k for k in at if len(at[k]) != 2]
+    chains = list[Ints]()
+    for first in [*ends, *at]:  # rings, which have no end, last
+        while at[first]:
+            chain = [first, at[first].pop()]
+            at[chain[1]].remove(first)
+            while chain[-1] not in ends and at[chain[-1]]:
+                chain.append(at[chain[-1]].pop())
+                at[chain[-1]].remove(chain[-2])
+            chains.append(np.array(chain, dtype=np.intp))
+    return chains
+
+
+def _joined(lines: list[Floats], reach: float) -> list[Floats]:
+    """Polylines joined across gaps of at most `reach` [m] where one continues the other straight."""
+    lines = list(lines)
+    while True:
+        best = (reach, None)
+        for k, a in enumerate(lines):
+            for m, b in enumerate(lines[:k]):
+                for p, q in product((a, a[::-1]), (b, b[::-1])):  # the end of p, the start of q
+                    gap = q[0] - p[-1]
+                    apart, out, onward = float(np.linalg.norm(gap)), p[-1] - p[-1 - len(p) // 3], q[len(q) // 3] - q[0]
+                    straight = min(_cosine(out, onward), _cosine(out, gap), _cosine(gap, onward))
+                    if straight > 0.97 and apart < best[0]:
+                        best = apart, (k, m, np.vstack([p, q]))
+        if best[1] is None:
+            return lines
+        k, m, line = best[1]
+        lines = [x for n, x in enumerate(lines) if n not in (k, m)] + [line]
+
+
+def _cosine(a: Floats, b: Floats) -> float:
+    """Of the angle between vectors; 1 where one has no length."""
+    length = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / length if length > 0 else 1.0
+
+
+def _smoothed(line: Floats, off: float) -> Floats:
+    """A polyline (n, 2) with cubics between its corners, to within `off` [m]."""
+    ahead = np.diff(line, axis=0)
+    length = np.linalg.norm(ahead, axis=1)
+    turn = np.einsum("ni,ni->n", ahead[1:], ahead[:-1]) < np.cos(CORNER) * length[1:] * length[:-1]
+    s, parts = np.append(0.0, np.cumsum(length)), list[Floats]()
+    for first, last in pairwise([0, *(np.flatnonzero(turn) + 1).tolist(), len(line) - 1]):
+        run = slice(first, last + 1)
+        dense = np.unique(np.concatenate([s[run], *(s[run][:-1] + k / FINER * length[first:last] for k in range(FINER))]))
+        parts.append(_simplified(on_curve(s[run], line[run], dense), off))
+    return np.vstack([part[k > 0 :] for k, part in enumerate(parts)])
+
+
+def _simplified(line: Floats, off: float) -> Floats:
+    """The points of a polyline (n, 2) that are needed to stay within `off` [m] [Douglas and Peucker 1973]."""
+    if len(line) < 3:
+        return line
+    chord = line[-1] - line[0]
+    x = line - line[0]
+    share = np.clip(x @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
+    apart = np.linalg.norm(x - share[:, None] * chord, axis=1)
+    k = int(np.argmax(apart))
+    if apart[k] <= off:
+        return line[[0, -1]]
+    return np.vstack([_simplified(line[: k + 1], off)[:-1], _simplified(line[k:], off)])
