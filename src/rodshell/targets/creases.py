@@ -26,7 +26,7 @@ SHORT = 0.1  # of the half extent: shorter rows of edges are no crease
 ON = 1e-5  # of the half extent: what is this close to a line lies on it
 BRIDGED = 0.5  # of the half extent: longest gap between two parts of one crease
 ROUGH = 0.01  # of the half extent: how far creases are from what is said of them
-FINER = 4  # points on a curved crease between two vertices
+FINER = 8  # points on a curved crease between two vertices
 STEEP = 0.2  # upward part of a normal: a seam, which cuts straight down, cannot run along the foot of a wall
 
 
@@ -83,23 +83,24 @@ class Creases:
         kept &= (np.abs(seam.distance(ends.reshape(-1, 2))).reshape(-1, 2) < NEAR * self.extent).all(axis=1)
         if not length[kept].sum() > SHORT * self.extent:
             return None
-        on = np.unique(edges[kept])
+        on, linked = np.unique(edges[kept]), {tuple(edge) for edge in np.sort(edges, axis=1).tolist()}
         s, _ = seam.along(self.mesh.vertices[on])
         on, s = on[np.argsort(s)], np.sort(s)
-        points = self.mesh.vertices[on, :2]
         if seam.closed:
-            return Seam.of(_smoothed(np.vstack([points, points[:1]]), ON * self.extent))
-        corners, _ = seam.along(seam.points)
-        rim = np.concatenate([[-1], *self.mesh.loops])
-        line = list[Floats]() if on[0] in rim else [seam.points[corners < s[0]]]
-        long = np.flatnonzero(np.diff(s) > BRIDGED * self.extent) + 1
-        for k, part in enumerate(np.split(np.arange(len(on)), long)):
-            if k:
-                line.append(seam.points[(corners > s[part[0] - 1]) & (corners < s[part[0]])])
-            line.append(_smoothed(points[part], ON * self.extent))
-        if on[-1] not in rim:
-            line.append(seam.points[corners > s[-1]])
-        return Seam.of(np.vstack(line))
+            on, s = np.append(on, on[0]), np.append(s, np.inf)
+        gaps = [k for k in range(1, len(on)) if tuple(sorted((int(on[k - 1]), int(on[k])))) not in linked]
+        crests = [_smoothed(self.mesh.vertices[run]) for run in np.split(on, gaps)]
+        line, rim = list[Floats](), np.concatenate([[-1], *self.mesh.loops])
+        at, low = seam.along(seam.points)[0], s[0] if on[0] in rim else -np.inf
+        for crest, first, last in zip(crests, [0, *gaps], [*gaps, len(on)], strict=True):
+            line += [self._drawn(seam, at, low, s[first]), _simplified(crest[:, :2], ON * self.extent)]
+            low = s[last - 1]
+        line += [self._drawn(seam, at, low, s[-1] if on[-1] in rim else np.inf)]
+        return Seam(np.vstack(line), tuple(crest for crest in crests if len(crest) > 1))
+
+    def _drawn(self, seam: Seam, at: Floats, low: float, high: float) -> Floats:
+        """The points of a seam, of arc lengths `at` (n,) [m], between two parts of a crease, or past its end."""
+        return seam.points[(at > low) & (at < high) & (high - low > BRIDGED * self.extent)]
 
     def pieces(self, seams: tuple[Seam, ...]) -> dict[tuple[int, ...], TriangleMesh]:
         """The parts of the mesh by the sides of the seams on which they are; see `Patch`.
@@ -185,17 +186,20 @@ def _cosine(a: Floats, b: Floats) -> float:
     return float(a @ b) / length if length > 0 else 1.0
 
 
-def _smoothed(line: Floats, off: float) -> Floats:
-    """A polyline (n, 2) with cubics between its corners, to within `off` [m]."""
+def _smoothed(line: Floats) -> Floats:
+    """A polyline (n, 3) with cubics between its corners, of `FINER` times as many points; a ring is round throughout."""
+    if len(line) < 3:
+        return line
+    ring = bool((line[0] == line[-1]).all())
+    line = np.vstack([line[-4:-1], line, line[1:4]]) if ring else line
     ahead = np.diff(line, axis=0)
     length = np.linalg.norm(ahead, axis=1)
-    turn = np.einsum("ni,ni->n", ahead[1:], ahead[:-1]) < np.cos(CORNER) * length[1:] * length[:-1]
-    s, parts = np.append(0.0, np.cumsum(length)), list[Floats]()
-    for first, last in pairwise([0, *(np.flatnonzero(turn) + 1).tolist(), len(line) - 1]):
-        run = slice(first, last + 1)
-        dense = np.unique(np.concatenate([s[run], *(s[run][:-1] + k / FINER * length[first:last] for k in range(FINER))]))
-        parts.append(_simplified(on_curve(s[run], line[run], dense), off))
-    return np.vstack([part[k > 0 :] for k, part in enumerate(parts)])
+    straight = dot(ahead[1:], ahead[:-1]) > np.cos(CORNER) * length[1:] * length[:-1]
+    s, parts = np.append(0.0, np.cumsum(length)), [line[:1]]
+    for first, last in pairwise([0, *(np.flatnonzero(~straight) + 1).tolist(), len(line) - 1]):
+        dense = (s[first:last, None] + np.arange(1, FINER + 1) / FINER * length[first:last, None]).ravel()
+        parts.append(on_curve(s[first : last + 1], line[first : last + 1], dense))
+    return np.vstack(parts)[3 * FINER : -3 * FINER] if ring else np.vstack(parts)
 
 
 def _simplified(line: Floats, off: float) -> Floats:

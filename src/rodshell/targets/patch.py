@@ -12,6 +12,7 @@ from rodshell.geometry.frames import unit
 from rodshell.targets.target import Gap, Implicit, Target
 from rodshell.validation import LARGEST, short
 
+ON_CREST = 1e-4  # of its length: points this close to a crease in plan are on it
 BEYOND = 1e3  # lengths of an open seam by which its two ends are prolonged
 
 
@@ -24,9 +25,11 @@ class Seam:
     Parameters
     ----------
     points : (n, 2) [m].
+    crests : fine polylines (k, 3) on the parts of it that are creases [m].
     """
 
     points: Floats
+    crests: tuple[Floats, ...] = ()
 
     @staticmethod
     def of(points: ArrayLike) -> "Seam":
@@ -108,15 +111,29 @@ class Seam:
         k, share, _ = self._nearest(x)
         return np.asarray(begin[k] + share * length[k]), np.asarray(edge[k] / length[k, None])
 
+    def height(self, x: Floats) -> Floats:
+        """z (n,) [m] of the crease over points `x` (n, 2 or 3) of the seam; NaN where it runs along none."""
+        z = np.full(len(x), np.nan)
+        for crest in self.crests:
+            k, share, off = _nearest(crest[:, :2], x)
+            here = np.linalg.norm(off, axis=1) < ON_CREST * np.linalg.norm(np.ptp(crest, axis=0))
+            z[here] = (crest[k, 2] + share * (crest[k + 1, 2] - crest[k, 2]))[here]
+        return z
+
     def _nearest(self, x: Floats) -> tuple[Ints, Floats, Floats]:
-        """Of each point (n, 2 or 3): nearest edge, its fraction before the closest point, the vector from there."""
-        start, edge = self._corners[:-1], np.diff(self._corners, axis=0)
-        off = x[:, None, :2] - start
-        share = np.clip(np.einsum("nki,ki->nk", off, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)
-        off = off - share[..., None] * edge
-        k = np.argmin(np.einsum("nki,nki->nk", off, off), axis=1)
-        row = np.arange(len(x))
-        return k, share[row, k], off[row, k]
+        return _nearest(self._corners, x)
+
+
+def _nearest(line: Floats, x: Floats) -> tuple[Ints, Floats, Floats]:
+    """Of each point (n, 2 or 3): nearest edge of a polyline, its fraction before the closest point, the vector from
+    there."""
+    start, edge = line[:-1], np.diff(line, axis=0)
+    off = x[:, None, :2] - start
+    share = np.clip(np.einsum("nki,ki->nk", off, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)
+    off = off - share[..., None] * edge
+    k = np.argmin(np.einsum("nki,nki->nk", off, off), axis=1)
+    row = np.arange(len(x))
+    return k, share[row, k], off[row, k]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -169,7 +186,8 @@ class Patch(Target):
         return np.asarray(np.min([self.whole.margin(x), *apart], axis=0))
 
     def on_seam(self, x: Floats, seam: int) -> Floats:
-        """The common point (3,) [m] of the surface and a seam that is closest to `x` (3,), a point near both."""
+        """The common point (3,) [m] of the surface and a seam that is closest to `x` (3,), a point near both; where the
+        seam runs along a crease the crease's."""
         for _ in range(12):
             value, gradient = self.level(x[None])
             rows = np.vstack([gradient, self._aside(x, seam)])
@@ -178,7 +196,8 @@ class Patch(Target):
             x = x + step
             if np.linalg.norm(step) <= 1e-15 * self.size:
                 break
-        return x
+        z = self.seams[seam].height(x[None])[0]
+        return np.append(x[:2], z) if np.isfinite(z) else x
 
     def across(self, x: Floats, seam: int) -> Floats:
         """Unit tangent (3,) of the surface at right angles to a seam, at a point `x` (3,) of both."""
