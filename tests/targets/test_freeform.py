@@ -322,7 +322,7 @@ def test_sheets_that_cross_are_refused(count):
 
 def test_a_sound_mesh_is_returned_facing_up_and_whole():
     x, faces = PARTS["bowl"]()
-    mesh, repairs = sound_mesh(x, faces[:, ::-1], "the mesh")
+    mesh, repairs, *_ = sound_mesh(x, faces[:, ::-1], "the mesh")
     assert repairs == []
     assert mesh.areas.sum() == pytest.approx(sound_mesh(x, faces, "the mesh")[0].areas.sum(), rel=1e-14)
     assert (mesh.doubled[:, 2] > 0).all()
@@ -332,12 +332,12 @@ def test_a_sound_mesh_is_returned_facing_up_and_whole():
 
 def test_a_single_triangle_is_a_sound_mesh():
     """That most single triangles have nothing inside their edge is said later, by `Freeform`."""
-    mesh, repairs = sound_mesh(np.eye(3), np.array([[0, 2, 1]]), "the mesh")
+    mesh, repairs, *_ = sound_mesh(np.eye(3), np.array([[0, 2, 1]]), "the mesh")
     assert repairs == []
     assert (mesh.doubled[:, 2] > 0).all()
 
 
 def test_normals_at_the_vertices_of_a_sphere_are_exact():
     x, faces = closed_ball(20)
-    mesh, _ = sound_mesh(x, faces, "the ball")
+    mesh, _, *_ = sound_mesh(x, faces, "the ball")
     assert mesh.normals == pytest.approx(mesh.vertices, abs=1e-12)

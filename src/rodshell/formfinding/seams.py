@@ -183,13 +183,19 @@ class PatchNet:
 
 @dataclass(frozen=True, eq=False)
 class _OpenEnd:
-    """A rod end on a seam that no rod meets yet: the sides of the patch beyond, its tangent mirrored in the seam."""
+    """A rod end on a seam that no rod meets yet: the sides of the patch beyond, its outward tangent, and the tangent of
+    its patch across the seam."""
 
     end: End
     seam: int
     beyond: tuple[int, ...]
     point: Floats
-    mirrored: Floats
+    out: Floats
+    across: Floats
+
+    def mirrored(self, patch: Patch) -> Floats:
+        """The tangent (3,) mirrored in the seam, in the surface of the patch beyond."""
+        return self.out - (self.out @ self.across) * (self.across + patch.across(self.point, self.seam))
 
 
 def lay_patches(
@@ -238,7 +244,7 @@ def _end_goals(patch: Patch, ends: list[_OpenEnd], others: list[Patch]) -> EndGo
     points = np.array([end.point for end in ends])
     return EndGoals(
         points,
-        np.array([end.mirrored for end in ends]),
+        np.array([end.mirrored(patch) for end in ends]),
         _rows(np.array([end.seam for end in ends]), points),
         lambda x: np.isin(_cut_by(patch, x), taken),
     )
@@ -290,8 +296,7 @@ def _ends_on_seams(name: str, grid: PatchNet) -> list[_OpenEnd]:
         at = rod.end - tiny if k % 2 else rod.start + tiny
         out = unit(points[k] - grid.net.positions(rod, np.array([at]))[0])
         across = patch.across(on_seam, seam)
-        mirrored = out - 2 * (out @ across) * across
-        result.append(_OpenEnd(End(name, rod.name, k % 2), seam, _across(patch, seam), on_seam, mirrored))
+        result.append(_OpenEnd(End(name, rod.name, k % 2), seam, _across(patch, seam), on_seam, out, across))
     return result
 
 

@@ -125,12 +125,13 @@ def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
         target.require_usable()
         return target
     lines = [target.creases.along(seam) for seam in drawn]
+    cut = tuple(line or seam for line, seam in zip(lines, drawn, strict=True))
+    if (target.creased or any(lines)) and (left := target.creases.lines(beside=cut)):
+        x, y = left[0][len(left[0]) // 2]
+        raise InputError(f"{target.name} is creased near ({x:.3g}, {y:.3g}) m, beside the seams{target.along_creases}")
     if not any(lines):
-        if target.creases.lines and target.creased:
-            raise InputError(f"the seams run beside the creases of {target.name}{target.along_creases}")
         target.require_usable()
         return target
-    cut = tuple(line or seam for line, seam in zip(lines, drawn, strict=True))
     pieces = dict[tuple[int, ...], Freeform]()
     for sides, mesh in target.creases.pieces(cut).items():
         found = smooth_piece(mesh, Neighbours.of(mesh, target.name), f"{target.name}, between its seams,")

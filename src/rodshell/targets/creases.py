@@ -15,17 +15,20 @@ from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import dot, unit
 from rodshell.targets.patch import Seam
 from rodshell.targets.rim import CORNER
-from rodshell.targets.trianglemesh import Neighbours, TriangleMesh
+from rodshell.targets.trianglemesh import Neighbours, TriangleMesh, edge_counts
 
 KINK = radians(3.0)  # at weaker edges there is no crease
 RISE = 2.0  # times what the curvature beside an edge explains: there it is a crease
+OWN = 0.25  # of the turn across an edge and the faces beside it: what turns less lies beside a crease
 ROW = 1.5  # edge lengths: steps at which the curvature beside an edge is taken
 ALONG = 0.8  # least cosine in plan between an edge and the seam that runs along it
 NEAR = 0.05  # of the half extent: a crease this close to a seam is the one that is meant
 SHORT = 0.1  # of the half extent: shorter rows of edges are no crease
 ON = 1e-5  # of the half extent: what is this close to a line lies on it
-BRIDGED = 0.5  # of the half extent: longest gap between two parts of one crease
+BRIDGED = 1.0  # of the half extent: longest gap between two parts of one crease
 ROUGH = 0.01  # of the half extent: how far creases are from what is said of them
+LONG = 0.5  # of the half extent: shorter ones are not worth a seam
+LINKED = 0.8  # of the length of a row of edges: a crease is smoother than that, and faces bridge a rougher one
 FINER = 8  # points on a curved crease between two vertices
 STEEP = 0.2  # upward part of a normal: a seam, which cuts straight down, cannot run along the foot of a wall
 
@@ -69,7 +72,8 @@ class Creases:
             beside.append(rows)
         (a, a_far), (b, b_far) = beside
         explained = 2 * np.maximum(_angle(a, a_far), _angle(b, b_far))
-        sharp[bent] = _angle(a, b) > np.maximum(KINK, RISE * explained)
+        turn, own = _angle(a, b), _angle(normals[i[bent]], normals[j[bent]])
+        sharp[bent] = (turn > np.maximum(KINK, RISE * explained)) & (own > OWN * turn)
         return sharp
 
     def along(self, seam: Seam) -> Seam | None:
@@ -89,9 +93,11 @@ class Creases:
         if seam.closed:
             on, s = np.append(on, on[0]), np.append(s, np.inf)
         gaps = [k for k in range(1, len(on)) if tuple(sorted((int(on[k - 1]), int(on[k])))) not in linked]
+        if len(gaps) > (1 - LINKED) * len(on):
+            return seam  # faces bridge the crease: it is where it is drawn
         crests = [_smoothed(self.mesh.vertices[run]) for run in np.split(on, gaps)]
         line, rim = list[Floats](), np.concatenate([[-1], *self.mesh.loops])
-        at, low = seam.along(seam.points)[0], s[0] if on[0] in rim else -np.inf
+        at, low = seam.along(seam.points)[0], s[0] if on[0] in rim or seam.closed else -np.inf
         for crest, first, last in zip(crests, [0, *gaps], [*gaps, len(on)], strict=True):
             line += [self._drawn(seam, at, low, s[first]), _simplified(crest[:, :2], ON * self.extent)]
             low = s[last - 1]
@@ -100,7 +106,7 @@ class Creases:
 
     def _drawn(self, seam: Seam, at: Floats, low: float, high: float) -> Floats:
         """The points of a seam, of arc lengths `at` (n,) [m], between two parts of a crease, or past its end."""
-        return seam.points[(at > low) & (at < high) & (high - low > BRIDGED * self.extent)]
+        return seam.points[(at > low) & (at < high) & (high > low + BRIDGED * self.extent)]
 
     def pieces(self, seams: tuple[Seam, ...]) -> dict[tuple[int, ...], TriangleMesh]:
         """The parts of the mesh by the sides of the seams on which they are; see `Patch`.
@@ -120,17 +126,31 @@ class Creases:
         for sides in product((1, -1), repeat=len(seams)):
             inside = np.logical_and.reduce([within[k, side] for k, side in enumerate(sides)])
             if inside.any():
-                found[sides] = mesh.only(inside)
+                found[sides] = _without_pinches(mesh.only(inside))
         return found
 
-    @cached_property
-    def lines(self) -> list[Floats]:
-        """Polylines (n, 2) in plan along the creases, without detail, that seams may run along [m]."""
+    def lines(self, beside: tuple[Seam, ...] = ()) -> list[Floats]:
+        """Polylines (n, 2) in plan, without detail, that seams may run along: of the creases `beside` these seams [m]."""
         up = unit(self.mesh.doubled)[self.neighbours.faces[self.sharp], 2] > STEEP
         edges = self.neighbours.edges[self.sharp][up.all(axis=1)]
+        for seam in beside:
+            apart = np.abs(seam.distance(self.mesh.vertices[edges].mean(axis=1)))
+            edges = edges[apart > NEAR * self.extent]
         chains = [self.mesh.vertices[chain, :2] for chain in _chains(edges)]
-        chains = [x for x in chains if _length(x) > SHORT * self.extent]
-        return [_simplified(x, ROUGH * self.extent) for x in _joined(chains, BRIDGED * self.extent)]
+        chains = _joined([x for x in chains if _length(x) > SHORT * self.extent], BRIDGED * self.extent)
+        lines = [_simplified(x, ROUGH * self.extent) for x in chains]
+        return [line for line, x in zip(lines, chains, strict=True) if LINKED * _length(x) < _length(line) > LONG * self.extent]
+
+
+def _without_pinches(mesh: TriangleMesh) -> TriangleMesh:
+    """The mesh without the faces at vertices in which two parts of it touch, as where a seam cuts faces off."""
+    while True:
+        a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+        outer = edge_counts(a, b, len(mesh.vertices)) == 1
+        pinched = np.bincount(a[outer], minlength=len(mesh.vertices)) > 1
+        if not pinched.any():
+            return mesh
+        mesh = mesh.only(~pinched[mesh.faces].any(axis=1))
 
 
 def _angle(a: Floats, b: Floats) -> Floats:

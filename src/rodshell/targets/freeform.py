@@ -104,7 +104,7 @@ class Freeform(Target):
                 target._require_an_end(name)
                 target.require_a_good_fit(name)
         except InputError as reason:
-            if not target.creases.lines:
+            if not target.along_creases:
                 raise
             target = replace(target, creased=str(reason), usable=False)
         return target
@@ -114,11 +114,11 @@ class Freeform(Target):
         """Those of the whole mesh."""
         return Creases(self.whole or self.surface, self.name)
 
-    @property
+    @cached_property
     def along_creases(self) -> str:
-        """What to do about its creases, where seams can lie along them."""
-        lines = " | ".join("; ".join(f"{x:.4g},{y:.4g}" for x, y in line.tolist()) for line in self.creases.lines)
-        return f': to form it in patches that meet there, lay seams along its creases, --seams.lines "{lines}"' * bool(lines)
+        """What to do about its creases, where seams can lie along them; else ""."""
+        lines = " | ".join("; ".join(f"{x:.4g},{y:.4g}" for x, y in line.tolist()) for line in self.creases.lines())
+        return lines and f': to form it in patches that meet there, lay seams along its creases, --seams.lines "{lines}"'
 
     def require_usable(self) -> None:
         """Refuse a mesh that no seams cut along its creases, where it is smooth nowhere else.

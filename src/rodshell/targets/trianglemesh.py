@@ -9,12 +9,13 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints, Longs
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
-from rodshell.geometry.frames import cross, dot
+from rodshell.geometry.frames import cross, dot, unit
 
 CREASE = 40.0  # degrees between faces, and between what is on either side: a smooth piece ends there
 STRAY = 0.01  # of the area: separate pieces with less in sum are left out
 WELD = 1e-6  # of the largest extent: vertices this close are merged; single precision has 1e-7
 SPOILT = 0.7  # least cosine between a vertex's normal and the mean of the faces around it
+SWEEPS = 8  # by which normals at the rim are corrected, each by half
 MOST_FACES = 3_000_000
 FARTHEST = 1e9  # m: coordinates that are still known to a micrometre
 
@@ -62,13 +63,39 @@ class TriangleMesh:
         np.add.at(mean, self.faces, self.doubled[:, None])
         np.add.at(wide, self.faces, mean[self.faces].sum(axis=1)[:, None])
         result = np.where((_cosine(result, wide) < SPOILT)[:, None], wide, result)
-        return np.asarray(result / np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None])
+        result /= np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None]
+        return self._with_rim_normals(result)
+
+    def _with_rim_normals(self, normals: Floats) -> Floats:
+        """Normals (n, 3) of the vertices, those at the rim corrected: faces on one side only do not tell them.
+
+        Along each edge of an arc, and of any parabola, the slopes at both ends are opposite against its chord.
+        """
+        rim = np.zeros(len(self.vertices), dtype=bool)
+        rim[np.concatenate([np.empty(0, dtype=np.intp), *self.loops])] = True
+        a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        here, there = np.append(a, b), np.append(b, a)
+        here, there = here[rim[here]], there[rim[here]]
+        if not len(here):
+            return normals
+        along = unit(self.vertices[there] - self.vertices[here])
+        for _ in range(SWEEPS):
+            flat = along - dot(along, normals[here])[:, None] * normals[here]
+            off = 0.5 * dot(normals[here] + normals[there], along)
+            square, known = np.zeros((len(normals), 3, 3)), np.zeros_like(normals)
+            np.add.at(square, here, flat[:, :, None] * flat[:, None, :])
+            np.add.at(known, here, off[:, None] * flat)
+            at = np.flatnonzero(rim)
+            across = normals[at][:, :, None] * normals[at][:, None, :]
+            turn = np.linalg.solve(square[at] + across + 1e-3 * np.eye(3), known[at][..., None])[..., 0]
+            normals[at] = unit(normals[at] - turn)
+        return normals
 
     @cached_property
     def loops(self) -> list[Ints]:
         """The open boundary: vertices of each closed loop, the longest first; the surface is on their left."""
         a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
-        count = _edge_counts(a, b, len(self.vertices))
+        count = edge_counts(a, b, len(self.vertices))
         after = dict(zip(a[count == 1].tolist(), b[count == 1].tolist(), strict=True))
         loops = list[Ints]()
         while after:
@@ -249,7 +276,7 @@ def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
     return first, kind.reshape(-1)
 
 
-def _edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
+def edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
     """Number (k,) of faces at each edge between the vertices a and b."""
     key = np.minimum(a, b).astype(np.int64) * vertices + np.maximum(a, b)
     _, kind, count = np.unique(key, return_inverse=True, return_counts=True)
