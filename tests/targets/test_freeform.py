@@ -290,7 +290,6 @@ REFUSED = {
     r"not manifold: three faces": fin(),
     r"2 separate pieces .* 50 and 50 %": doubled(dome(6), 1.0),
     r"only one side": moebius(),
-    r"creased: faces meet at \d\d degrees near \(": gable(),
     r"closed: say where .* between z = -1 and 1 m": closed_ball(20),
 }
 
@@ -300,6 +299,14 @@ def test_what_is_no_smooth_surface_is_refused_in_one_sentence(sentence):
     with pytest.raises(rs.InputError, match=sentence) as refusal:
         Freeform.of(*REFUSED[sentence])
     assert "\n" not in str(refusal.value)
+
+
+def test_a_mesh_that_is_creased_within_is_refused_where_it_is_used_and_names_the_seam_to_lay():
+    sentence = r"creased: faces meet at \d\d degrees near \(.*: to form it in patches .* --seams\.lines \"0,"
+    target = Freeform.of(*gable())
+    for use in (lambda: target.level(np.zeros((1, 3))), target.require_usable, lambda: target.size):
+        with pytest.raises(rs.InputError, match=sentence):
+            use()
 
 
 def test_sheets_that_touch_are_refused_with_the_place():
@@ -339,5 +346,5 @@ def test_a_single_triangle_is_a_sound_mesh():
 
 def test_normals_at_the_vertices_of_a_sphere_are_exact():
     x, faces = closed_ball(20)
-    mesh, _, *_ = sound_mesh(x, faces, "the ball")
+    mesh, *_ = sound_mesh(x, faces, "the ball")
     assert mesh.normals == pytest.approx(mesh.vertices, abs=1e-12)

@@ -9,7 +9,7 @@ from rodshell.arrays import Bools, Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.targets.creases import Creases
-from rodshell.targets.field_fitting import Fit
+from rodshell.targets.field_fitting import CLOSE, Fit
 from rodshell.targets.freeform import TIE, Freeform
 from rodshell.targets.patch import Seam
 from rodshell.targets.target import Deviation, Implicit, Target
@@ -121,7 +121,7 @@ def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
         target = target.uncut
     if not isinstance(target, Freeform):
         return target
-    if not drawn:
+    if not drawn or (not target.creased and target.deviation.max < CLOSE * target.size):
         target.require_usable()
         return target
     lines = [target.creases.along(seam) for seam in drawn]
@@ -133,7 +133,8 @@ def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
         target.require_usable()
         return target
     pieces = dict[tuple[int, ...], Freeform]()
-    for sides, mesh in target.creases.pieces(cut).items():
+    bridged = [line is not None and not line.crests for line in lines]
+    for sides, mesh in target.creases.pieces(cut, bridged).items():
         found = smooth_piece(mesh, Neighbours.of(mesh, target.name), f"{target.name}, between its seams,")
         if not found.smooth:
             raise InputError(found.creased + target.along_creases)

@@ -4,6 +4,7 @@ A crease is a row of edges at which a mesh turns by more than its curvature on b
 weaker than that, as at the crown of a groined vault, it is bridged.
 """
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise, product
 from math import radians
@@ -25,6 +26,7 @@ ALONG = 0.8  # least cosine in plan between an edge and the seam that runs along
 NEAR = 0.05  # of the half extent: a crease this close to a seam is the one that is meant
 SHORT = 0.1  # of the half extent: shorter rows of edges are no crease
 ON = 1e-5  # of the half extent: what is this close to a line lies on it
+BESIDE = 1e-4  # of the half extent: vertices closer to a seam are on it
 BRIDGED = 1.0  # of the half extent: longest gap between two parts of one crease
 ROUGH = 0.01  # of the half extent: how far creases are from what is said of them
 LONG = 0.5  # of the half extent: shorter ones are not worth a seam
@@ -48,7 +50,7 @@ class Creases:
 
     @cached_property
     def sharp(self) -> Bools:
-        """(e,) which edges between two faces are creases."""
+        """(e,) which edges between two faces are creases that are seen from above."""
         from scipy.spatial import cKDTree
 
         mesh, (i, j) = self.mesh, self.neighbours.faces.T
@@ -74,6 +76,7 @@ class Creases:
         explained = 2 * np.maximum(_angle(a, a_far), _angle(b, b_far))
         turn, own = _angle(a, b), _angle(normals[i[bent]], normals[j[bent]])
         sharp[bent] = (turn > np.maximum(KINK, RISE * explained)) & (own > OWN * turn)
+        sharp[bent] &= np.minimum(a[:, 2], b[:, 2]) > STEEP
         return sharp
 
     def along(self, seam: Seam) -> Seam | None:
@@ -108,38 +111,42 @@ class Creases:
         """The points of a seam, of arc lengths `at` (n,) [m], between two parts of a crease, or past its end."""
         return seam.points[(at > low) & (at < high) & (high > low + BRIDGED * self.extent)]
 
-    def pieces(self, seams: tuple[Seam, ...]) -> dict[tuple[int, ...], TriangleMesh]:
+    def pieces(self, seams: Sequence[Seam], bridged: Sequence[bool]) -> dict[tuple[int, ...], TriangleMesh]:
         """The parts of the mesh by the sides of the seams on which they are; see `Patch`.
 
-        A face that a seam crosses is in both parts where the mesh is smooth there; in neither where it bridges a crease.
+        A face that a seam crosses is in both parts where the mesh is smooth; in neither where it bridges a crease.
+
+        Parameters
+        ----------
+        seams : the lines at which it is cut.
+        bridged : which of them run along creases that faces bridge.
         """
-        mesh, (i, j) = self.mesh, self.neighbours.faces.T
-        at_crease = np.zeros(len(mesh.faces), dtype=bool)
-        at_crease[np.append(i[self.sharp], j[self.sharp])] = True
         within = dict[tuple[int, int], Bools]()
-        for k, seam in enumerate(seams):
-            apart = seam.distance(mesh.vertices)[mesh.faces]
-            left, right = (apart > ON * self.extent * 10).any(axis=1), (apart < -ON * self.extent * 10).any(axis=1)
-            both = left & right
-            within[k, 1], within[k, -1] = left & ~(both & at_crease), right & ~(both & at_crease)
+        for k, (seam, bridge) in enumerate(zip(seams, bridged, strict=True)):
+            apart = seam.distance(self.mesh.vertices)[self.mesh.faces] / self.extent
+            left, right = (apart > BESIDE).any(axis=1), (apart < -BESIDE).any(axis=1)
+            within[k, 1], within[k, -1] = left & ~(right & bridge), right & ~(left & bridge)
         found = dict[tuple[int, ...], TriangleMesh]()
         for sides in product((1, -1), repeat=len(seams)):
             inside = np.logical_and.reduce([within[k, side] for k, side in enumerate(sides)])
             if inside.any():
-                found[sides] = _without_pinches(mesh.only(inside))
+                found[sides] = _without_pinches(self.mesh.only(inside))
         return found
 
     def lines(self, beside: tuple[Seam, ...] = ()) -> list[Floats]:
         """Polylines (n, 2) in plan, without detail, that seams may run along: of the creases `beside` these seams [m]."""
-        up = unit(self.mesh.doubled)[self.neighbours.faces[self.sharp], 2] > STEEP
-        edges = self.neighbours.edges[self.sharp][up.all(axis=1)]
+        edges = self.neighbours.edges[self.sharp]
         for seam in beside:
             apart = np.abs(seam.distance(self.mesh.vertices[edges].mean(axis=1)))
             edges = edges[apart > NEAR * self.extent]
         chains = [self.mesh.vertices[chain, :2] for chain in _chains(edges)]
         chains = _joined([x for x in chains if _length(x) > SHORT * self.extent], BRIDGED * self.extent)
         lines = [_simplified(x, ROUGH * self.extent) for x in chains]
-        return [line for line, x in zip(lines, chains, strict=True) if LINKED * _length(x) < _length(line) > LONG * self.extent]
+        return [
+            line
+            for line, x in zip(lines, chains, strict=True)
+            if LINKED * _length(x) < _length(line) > LONG * self.extent
+        ]
 
 
 def _without_pinches(mesh: TriangleMesh) -> TriangleMesh:

@@ -99,14 +99,17 @@ class Freeform(Target):
             surface=found.surface, base=base, curves=curves, source=dict(source or made),
             repairs=(*notes, *found.repairs), whole=found.whole, creased=found.creased, usable=found.smooth,
         )  # fmt: skip
+        if not target.usable:
+            if not target.along_creases:
+                raise InputError(target.creased)
+            return target
         try:
-            if target.usable:
-                target._require_an_end(name)
-                target.require_a_good_fit(name)
+            target._require_an_end(name)
+            target.require_a_good_fit(name)
         except InputError as reason:
             if not target.along_creases:
                 raise
-            target = replace(target, creased=str(reason), usable=False)
+            return replace(target, creased=str(reason), usable=False)
         return target
 
     @cached_property
@@ -118,7 +121,9 @@ class Freeform(Target):
     def along_creases(self) -> str:
         """What to do about its creases, where seams can lie along them; else ""."""
         lines = " | ".join("; ".join(f"{x:.4g},{y:.4g}" for x, y in line.tolist()) for line in self.creases.lines())
-        return lines and f': to form it in patches that meet there, lay seams along its creases, --seams.lines "{lines}"'
+        return (
+            lines and f': to form it in patches that meet there, lay seams along its creases, --seams.lines "{lines}"'
+        )
 
     def require_usable(self) -> None:
         """Refuse a mesh that no seams cut along its creases, where it is smooth nowhere else.
@@ -412,12 +417,8 @@ class Freeform(Target):
             off = self._off(self._over(curve))
             if not off < ASIDE * self._extent:
                 raise InputError(f"the boundary curve is up to {off:.3g} m away from {name}: draw it on the surface")
-        if not (self.margin(self.surface.vertices) > 0).any():
-            if len(np.unique(np.concatenate([[], *self.surface.loops]))) == len(self.surface.vertices):
-                raise InputError(
-                    f"no vertex of {name} is inside its edge (creases of more than 40 degrees are edges too): mesh it "
-                    "more finely, or round its creases"
-                )
+        x = self.surface.vertices
+        if not (self.margin(np.vstack([x, x[self.surface.faces].mean(axis=1)])) > 0).any():
             raise InputError(f"no part of {name} is inside its boundary: choose a lower base or another boundary")
 
     def require_a_good_fit(self, name: str) -> None:
