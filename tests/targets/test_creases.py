@@ -1,5 +1,7 @@
 """Creases of meshes: seams near them are moved onto them, and each piece between them is a smooth surface."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -15,7 +17,7 @@ Floats = NDArray[np.float64]
 TURN = np.linspace(0, 2 * np.pi, 25)
 CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])
 CIRCLE[-1] = CIRCLE[0]
-SEAMS: dict[str, list[list[tuple[float, float]]]] = {  # a few centimetres beside the creases
+SEAMS: dict[str, list[list[tuple[float, float]]]] = {  # a few centimetres off the creases
     "ridge": [[(0.1, -6.0), (-0.2, 6.0)]],
     "groin": [[(-5.1, -5.0), (4.9, 5.0)], [(-5.0, 5.1), (5.0, -5.1)]],
     "valley": [[(float(bend(np.array(y))) + 0.1, y) for y in (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0)]],
@@ -85,6 +87,15 @@ def test_where_faces_bridge_a_crease_the_pieces_end_before_them(name: str) -> No
     np.testing.assert_allclose(target.height_at(x), CREASED[name](*x.T), rtol=0, atol=5e-4 * target.size)
 
 
+def test_a_row_of_faces_that_bridges_a_crease_is_cut_in_its_middle() -> None:
+    """An odd number of columns: no vertex lies on the crease."""
+    said = Freeform.of(*creased("ridge", 61)).along_creases
+    assert re.search(r'--seams\.lines "-?0,-?5; -?0,-?5"$', said)
+    target = cut(creased("ridge", 61), [[(0.0, -5.0), (0.0, 5.0)]])
+    x = np.random.default_rng(3).uniform(-4.9, 4.9, (2000, 2))
+    np.testing.assert_allclose(target.height_at(x), CREASED["ridge"](*x.T), rtol=0, atol=4e-4 * target.size)
+
+
 def test_what_is_said_of_a_crease_can_be_typed() -> None:
     for name in ("ridge", "groin", "valley"):
         said = Freeform.of(*creased(name)).along_creases
@@ -97,10 +108,10 @@ def test_what_is_said_of_a_crease_can_be_typed() -> None:
         assert all(off_crease(name, seam.points).max() < 1e-4 for seam in target.seams)
 
 
-def test_a_seam_beside_a_crease_is_refused_with_the_line_to_type() -> None:
-    with pytest.raises(rs.InputError, match=r'creased near .* beside the seams.* --seams\.lines "0,-5; 0,5"'):
+def test_a_crease_without_a_seam_is_refused_with_the_line_to_type() -> None:
+    with pytest.raises(rs.InputError, match=r'creased near .* where there is no seam.* --seams\.lines "0,-5; 0,5"'):
         cut(creased("ridge"), [[(1.0, -6.0), (1.0, 6.0)]])
-    with pytest.raises(rs.InputError, match=r"creased near .* beside the seams"):  # along one of two
+    with pytest.raises(rs.InputError, match=r"creased near .* where there is no seam"):  # along one of two
         cut(creased("groin"), [[(-5.0, -5.0), (5.0, 5.0)]])
 
 

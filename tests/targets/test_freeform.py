@@ -302,7 +302,9 @@ def test_what_is_no_smooth_surface_is_refused_in_one_sentence(sentence):
 
 
 def test_a_mesh_that_is_creased_within_is_refused_where_it_is_used_and_names_the_seam_to_lay():
-    sentence = r"creased: faces meet at \d\d degrees near \(.*: to form it in patches .* --seams\.lines \"0,"
+    sentence = (
+        r"creased: faces meet at \d\d degrees near \(.*: to form it in patches .* --seams\.lines \"-0\.1897,0; 0\.2,0"
+    )
     target = Freeform.of(*gable())
     for use in (lambda: target.level(np.zeros((1, 3))), target.require_usable, lambda: target.size):
         with pytest.raises(rs.InputError, match=sentence):

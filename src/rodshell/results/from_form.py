@@ -174,7 +174,7 @@ def patches_states(form: PatchedForm) -> States:
     """The states of a form in patches."""
     states = _mesh_states(form.footprint)
     states["draped"] = form.draped
-    gaps = [found.target.gap(found.boundary.draped).distance for found in form.patches.values()]
+    gaps = [found.target.gap(found.trimmed.positions).distance for found in form.patches.values()]
     states["gap_draped"] = np.concatenate(gaps)
     states |= _target_states(form.target, form.draped)
     for ends, shell in form.popped.items():

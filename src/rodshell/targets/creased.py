@@ -8,7 +8,6 @@ import numpy as np
 from rodshell.arrays import Bools, Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
-from rodshell.targets.creases import Creases
 from rodshell.targets.field_fitting import CLOSE, Fit
 from rodshell.targets.freeform import TIE, Freeform
 from rodshell.targets.patch import Seam
@@ -107,12 +106,12 @@ def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
 
     Parameters
     ----------
-    target : of any kind; one that was cut before is cut anew.
+    target : of any kind; one that was cut before is cut again.
     seams : lines in plan; the creases near them are taken.
 
     Raises
     ------
-    InputError : the mesh is creased beside the seams, or a piece between them is not smooth; names lines that would do.
+    InputError : the mesh is creased where there is no seam, or a piece between them is not smooth; names lines that do.
     """
     drawn = tuple(seams)
     if isinstance(target, Creased):
@@ -126,9 +125,11 @@ def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
         return target
     lines = [target.creases.along(seam) for seam in drawn]
     cut = tuple(line or seam for line, seam in zip(lines, drawn, strict=True))
-    if (target.creased or any(lines)) and (left := target.creases.lines(beside=cut)):
+    if (target.creased or any(lines)) and (left := target.creases.lines(apart_from=cut)):
         x, y = left[0][len(left[0]) // 2]
-        raise InputError(f"{target.name} is creased near ({x:.3g}, {y:.3g}) m, beside the seams{target.along_creases}")
+        raise InputError(
+            f"{target.name} is creased near ({x:.3g}, {y:.3g}) m, where there is no seam{target.along_creases}"
+        )
     if not any(lines):
         target.require_usable()
         return target

@@ -49,7 +49,7 @@ class Freeform(Target):
     repairs : what was changed in the mesh, in sentences.
     whole : the mesh with what is beyond its creases; None: it has none.
     creased : what is said of its creases.
-    usable : False: the whole is no smooth surface, and there is only a target where seams cut it along its creases.
+    usable : False: the whole is not a smooth surface, and must be cut along its creases by seams.
     """
 
     surface: TriangleMesh

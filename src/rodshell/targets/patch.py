@@ -115,18 +115,18 @@ class Seam:
         """z (n,) [m] of the crease over points `x` (n, 2 or 3) of the seam; NaN where it runs along none."""
         z = np.full(len(x), np.nan)
         for crest in self.crests:
-            k, share, off = _nearest(crest[:, :2], x)
+            k, share, off = nearest(crest[:, :2], x)
             here = np.linalg.norm(off, axis=1) < ON_CREST * np.linalg.norm(np.ptp(crest, axis=0))
             z[here] = (crest[k, 2] + share * (crest[k + 1, 2] - crest[k, 2]))[here]
         return z
 
     def _nearest(self, x: Floats) -> tuple[Ints, Floats, Floats]:
-        return _nearest(self._corners, x)
+        return nearest(self._corners, x)
 
 
-def _nearest(line: Floats, x: Floats) -> tuple[Ints, Floats, Floats]:
-    """Of each point (n, 2 or 3): nearest edge of a polyline, its fraction before the closest point, the vector from
-    there."""
+def nearest(line: Floats, x: Floats) -> tuple[Ints, Floats, Floats]:
+    """Of each point (n, 2 or 3): nearest edge of a polyline (m, 2), its fraction before the closest point, the vector
+    (n, 2) from there."""
     start, edge = line[:-1], np.diff(line, axis=0)
     off = x[:, None, :2] - start
     share = np.clip(np.einsum("nki,ki->nk", off, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)

@@ -67,7 +67,7 @@ class TriangleMesh:
         return self._with_rim_normals(result)
 
     def _with_rim_normals(self, normals: Floats) -> Floats:
-        """Normals (n, 3) of the vertices, those at the rim corrected: faces on one side only do not tell them.
+        """Normals (n, 3) of the vertices, those at the rim corrected, as faces on one side only miss them.
 
         Along each edge of an arc, and of any parabola, the slopes at both ends are opposite against its chord.
         """
