@@ -8,12 +8,16 @@ import numpy as np
 from rodshell.arrays import Bools, Floats
 from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
+from rodshell.targets.creases import KINK, NEAR
 from rodshell.targets.field_fitting import CLOSE, Fit
 from rodshell.targets.freeform import TIE, Freeform
 from rodshell.targets.patch import Seam
 from rodshell.targets.target import Deviation, Implicit, Target
 from rodshell.targets.trianglemesh import Neighbours, smooth_piece
 
+STEP = 0.02  # of the half extent: distance of the points at which continued pieces are followed to where they meet
+ROUNDS = 2  # in which seams along creases that faces bridge are moved to where the pieces meet
+CLEAR = 0.25  # of the largest turn along a crease: where it fades to less, where it runs is not clear
 DENSE = 0.04  # of the size: distance of the points by which the patches are found
 
 
@@ -85,6 +89,54 @@ class Creased(Freeform):
         at: list[float] = high[np.argmin(np.linalg.norm(high - middle, axis=1))].tolist()
         return at[0], at[1]
 
+    def where_pieces_meet(self, k: int) -> Seam:
+        """The k-th seam, roughly along a crease that faces bridge, moved to where the continued pieces meet."""
+        points, extent = self.seams[k].points, self._extent
+        if not self.seams[k].closed:
+            out = points[[0, -1]] - points[[1, -2]]
+            ends = points[[0, -1]] + 2 * extent * out / np.linalg.norm(out, axis=1)[:, None]
+            points = np.vstack([ends[:1], points, ends[1:]])
+        edge = np.diff(points, axis=0)
+        length = np.linalg.norm(edge, axis=1)
+        s = np.append(0.0, np.cumsum(length))
+        at = np.arange(0.0, s[-1], STEP * extent)
+        across = (np.column_stack([-edge[:, 1], edge[:, 0]]) / length[:, None])[
+            np.searchsorted(s, at, side="right") - 1
+        ]
+        x = np.column_stack([np.interp(at, s, points[:, axis]) for axis in range(2)])
+        z = self._heights_of_facets(x)
+        x, across, z = x[np.isfinite(z)], across[np.isfinite(z)], z[np.isfinite(z)]
+        moved = np.zeros(len(x))
+        for _ in range(6):
+            (top, slope), (other, other_slope) = (self._continued(x, z, k, side) for side in (1, -1))
+            turn = np.einsum("ni,ni->n", slope - other_slope, across)
+            sharp = np.abs(turn) > max(KINK, CLEAR * float(np.nanmax(np.abs(turn), initial=0.0)))
+            known = np.isfinite(top - other) & sharp
+            step = np.where(known, (other - top) / np.where(known, turn, 1.0), 0.0)
+            step = np.clip(step, -STEP * extent, STEP * extent)
+            x, moved = x + step[:, None] * across, moved + step
+        known &= np.abs(moved) < NEAR * extent
+        if known.sum() < 2:
+            return self.seams[k]
+        crest = np.column_stack([x, 0.5 * (top + other)])
+        runs = np.split(np.flatnonzero(known), np.flatnonzero(np.diff(np.flatnonzero(known)) > 1) + 1)
+        line = x[known]
+        line = np.vstack([line, line[:1]]) if self.seams[k].closed else line
+        return Seam(line, tuple(crest[run] for run in runs if len(run) > 1))
+
+    def _continued(self, x: Floats, z: Floats, k: int, side: int) -> tuple[Floats, Floats]:
+        """Heights (n,) near z (n,), and slopes (n, 2), of the piece on a side of the k-th seam over points (n, 2)."""
+        sides = np.array([np.where(seam.distance(x) > 0, 1, -1) for seam in self.seams])
+        sides[k] = side
+        kinds, kind = np.unique(sides, axis=1, return_inverse=True)
+        height, slope = np.empty(len(x)), np.empty((len(x), 2))
+        for n, signs in enumerate(kinds.T.tolist()):
+            here, piece = kind.reshape(-1) == n, self.piece(tuple(signs))
+            height[here] = piece._straight_up(np.column_stack([x, z])[here])
+            gradient = piece.level(np.column_stack([x, height])[here])[1]
+            slope[here] = -gradient[:, :2] / gradient[:, 2:]
+        return height, slope
+
     def survey(self) -> tuple[Floats, Floats]:
         """Points (n, 3) inside the end, each standing for an area (n,) [m2]: the middles of small triangles."""
         x = self.surface.vertices[self.surface.faces]
@@ -133,14 +185,21 @@ def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
     if not any(lines):
         target.require_usable()
         return target
-    pieces = dict[tuple[int, ...], Freeform]()
     bridged = [line is not None and not line.crests for line in lines]
-    for sides, mesh in target.creases.pieces(cut, bridged).items():
+    made = _in_pieces(target, drawn, cut, bridged)
+    for _ in range(ROUNDS * any(bridged)):
+        cut = tuple(made.where_pieces_meet(k) if bridge else cut[k] for k, bridge in enumerate(bridged))
+        made = _in_pieces(target, drawn, cut, bridged)
+    return made
+
+
+def _in_pieces(target: Freeform, drawn: tuple[Seam, ...], seams: tuple[Seam, ...], bridged: Sequence[bool]) -> Creased:
+    whole, pieces = target.creases.mesh, dict[tuple[int, ...], Freeform]()
+    for sides, mesh in target.creases.pieces(seams, bridged).items():
         found = smooth_piece(mesh, Neighbours.of(mesh, target.name), f"{target.name}, between its seams,")
         if not found.smooth:
             raise InputError(found.creased + target.along_creases)
         pieces[sides] = Freeform(surface=found.surface)
         pieces[sides].require_a_good_fit(target.name)
-    whole = target.creases.mesh
     given = {key: getattr(target, key) for key in ("base", "curves", "source", "repairs")}
-    return Creased(surface=whole, whole=whole, uncut=target, drawn=drawn, seams=cut, pieces=pieces, **given)
+    return Creased(surface=whole, whole=whole, uncut=target, drawn=drawn, seams=seams, pieces=pieces, **given)

@@ -25,6 +25,7 @@ ROW = 1.5  # edge lengths: steps in which the curvature on both sides is taken
 STEEP = 0.2  # upward part of a normal: a seam, which cuts straight down, cannot run along the foot of a wall
 ALONG = 0.8  # least cosine in plan between an edge and the seam that runs along it
 LINKED = 0.8  # of a row of edges: of a rougher crease most edges lie across it, and faces bridge it
+GROUP = 12  # vertices around such a crease, whose middle is roughly on it
 FINER = 8  # points on a curved crease from vertex to vertex
 
 # of half the extent
@@ -32,7 +33,7 @@ NEAR = 0.05  # a crease this close to a seam is the one that is meant
 SHORT = 0.1  # shorter rows of edges do not count
 LONG = 0.5  # a shorter crease is not worth a seam
 BRIDGED = 1.0  # longest gap between two parts of one crease
-ROUGH = 0.01  # how far a crease is from the line that is named
+ROUGH = 0.01  # how far a crease is from the line that is named, or from the middle of the vertices around it
 FINE = 1e-5  # how far it is from the seam
 ON_SEAM = 1e-4  # vertices closer to a seam are on it
 
@@ -78,7 +79,7 @@ class Creases:
         return np.asarray(edges[creased & (np.minimum(left[:, 2], right[:, 2]) > STEEP)])
 
     def along(self, seam: Seam) -> Seam | None:
-        """The seam moved onto the crease near it; as it is drawn where faces bridge the crease; None without one."""
+        """The seam moved onto the crease near it, roughly where faces bridge the crease; None without one."""
         ends = self.mesh.vertices[self.edges, :2]
         edge, direction = ends[:, 1] - ends[:, 0], seam.along(ends.mean(axis=1))[1]
         length = np.linalg.norm(edge, axis=1)
@@ -93,7 +94,8 @@ class Creases:
             on, s = np.append(on, on[0]), np.append(s, np.inf)
         gaps = [k for k, pair in enumerate(pairwise(on.tolist()), start=1) if frozenset(pair) not in linked]
         if len(gaps) > (1 - LINKED) * len(on):
-            return seam
+            middles = [x.mean(axis=0) for x in np.array_split(self.mesh.vertices[on, :2], max(len(on) // GROUP, 2))]
+            return Seam.of(middles + middles[:1] * seam.closed)
         crests = [_smoothed(self.mesh.vertices[run]) for run in np.split(on, gaps)]
         line, rim = list[Floats](), np.concatenate([[-1], *self.mesh.loops])
         at, low = seam.along(seam.points)[0], s[0] if on[0] in rim or seam.closed else -np.inf
@@ -121,8 +123,9 @@ class Creases:
         for k, (seam, bridge) in enumerate(zip(seams, bridged, strict=True)):
             apart = seam.distance(self.mesh.vertices)[self.mesh.faces] / self.extent
             left, right = (apart > ON_SEAM).any(axis=1), (apart < -ON_SEAM).any(axis=1)
-            within[k, 1] = np.asarray(left & ~(right & bridge))
-            within[k, -1] = np.asarray(right & ~(left & bridge))
+            near = (np.abs(apart) < ROUGH).any(axis=1)  # of which it is not sure on what side they are
+            within[k, 1] = np.asarray(left & ~((right | near) & bridge))
+            within[k, -1] = np.asarray(right & ~((left | near) & bridge))
         found = dict[tuple[int, ...], TriangleMesh]()
         for sides in product((1, -1), repeat=len(seams)):
             inside = np.logical_and.reduce([within[k, side] for k, side in enumerate(sides)])
