@@ -103,7 +103,7 @@ def test_a_groined_shell_forms_in_four_patches_from_the_command_line(tmp_path, c
     assert main(["form", str(tmp_path / "groin.obj"), "--seams.lines", lines, *options]) == 0
     assert "patch D" in capsys.readouterr().out
     found = read(tmp_path / "out")
-    assert [patch.name for patch in found.results.patches] == ["A", "B", "C", "D"]
+    assert [patch.id for patch in found.results.patches] == ["A", "B", "C", "D"]
     for seam in found.results.seams:
         points = np.array([meeting.point for meeting in seam.meetings])
         assert off_crease("groin", points).max() < ON_CREASE * 5
