@@ -72,8 +72,8 @@ class TriangleMesh:
         Along each edge of an arc, and of any parabola, the slopes at both ends are opposite against its chord.
         """
         rim = np.zeros(len(self.vertices), dtype=bool)
-        rim[np.concatenate([np.empty(0, dtype=np.intp), *self.loops])] = True
         a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        rim[a[edge_counts(a, b, len(rim)) == 1]] = True
         here, there = np.append(a, b), np.append(b, a)
         here, there = here[rim[here]], there[rim[here]]
         if not len(here):
