@@ -9,8 +9,13 @@ from math import radians
 import numpy as np
 
 import rodshell as rs
+from rodshell.formfinding.patches import find_patched_stages
+from rodshell.targets.creased import cut_at
+from rodshell.targets.patch import Seam
 from tests.acceptance import drawn_scale
 from tests.acceptance.rows import Row, print_table
+from tests.targets.meshes import CREASED, creased
+from tests.targets.test_creases import SEAMS, off_crease
 
 ROD = rs.Rod(rs.Tube(radius=0.016, thickness=0.003), rs.Material.preset("gfrp"))
 SURFACES = {  # half width and half depth of the rectangle [m], formula
@@ -69,8 +74,24 @@ def end_rows(count: int = 80) -> Iterator[Row]:
         yield Row(str(drawn), "supports off the rectangle", 1e3 * off, 1e3 * allowed, "mm", f"{rods} rods")
 
 
+def crease_rows(names: Sequence[str] = tuple(CREASED)) -> Iterator[Row]:
+    """Creased meshes in patches: rod ends against the crease, and patches against the surface of their side."""
+    for name in names:
+        seams = [Seam.of(line) for line in SEAMS[name]]
+        target = cut_at(rs.Freeform.of(*creased(name)), seams)
+        layout = rs.GridLayout.orthogonal(spacing=0.9, edge=0.225)
+        form = find_patched_stages(target, seams, layout, ROD, ends=())
+        points, size = np.array([meeting.point for meeting in form.meetings]), target.size
+        off = np.hypot(off_crease(name, points), points[:, 2] - CREASED[name](*points[:, :2].T))
+        note = f"{len(points)} meetings, {len(form.patches)} patches"
+        yield Row(f"{name}, creased", "rod ends off the crease", float(off.max()) / size, ALLOWED, "of the size", note)
+        apart = np.abs(form.draped[:, 2] - CREASED[name](*form.draped[:, :2].T))
+        yield Row(f"{name}, creased", "patches off their surfaces", float(apart.max()) / size, 5e-4, "of the size")
+
+
 def all_rows() -> Iterator[Row]:
     yield from end_rows()
+    yield from crease_rows()
     yield from drawn_scale.rows()
 
 

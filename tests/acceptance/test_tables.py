@@ -32,7 +32,7 @@ pytestmark = pytest.mark.slow
 
 Rows = Callable[[], Iterator[Row]]
 CHEAP: dict[str, tuple[Rows, ...]] = {
-    "drawn": (partial(drawn.end_rows, 14), drawn_scale.bifurcation_rows),
+    "drawn": (partial(drawn.end_rows, 14), partial(drawn.crease_rows, ["valley"]), drawn_scale.bifurcation_rows),
     "house": (house.tree_rows,),
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
     "loads": (

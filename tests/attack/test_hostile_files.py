@@ -214,7 +214,7 @@ def test_memory_for_a_polygon_grows_with_its_corners(tmp_path: Path) -> None:
     angle = np.linspace(0, 2 * np.pi, 20_000, endpoint=False)
     x = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     k = np.arange(1, len(x) - 1)
-    mesh, _ = sound_mesh(x, np.column_stack([0 * k, k, k + 1]), "fan")
+    mesh, *_ = sound_mesh(x, np.column_stack([0 * k, k, k + 1]), "fan")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     samples = mesh_samples(mesh, cubic_spacing(float(mesh.areas.sum()), len(x)))
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 600_000

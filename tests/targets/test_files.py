@@ -227,14 +227,16 @@ def test_a_case_names_files_from_its_own_folder(bowl, tmp_path, monkeypatch):
     assert target.height_at(np.zeros((1, 2)))[0] == pytest.approx(1.1, abs=1e-4)
 
 
-def test_a_surface_with_nothing_inside_its_edge_is_told_why(bowl, tmp_path):
-    """A box of two triangles a face is all edge, whatever its base; what a base leaves nothing of is another matter."""
+def test_of_a_box_of_two_triangles_a_face_the_top_is_taken_and_what_leaves_nothing_is_refused(bowl, tmp_path):
     import trimesh
 
     trimesh.creation.box((12, 8, 3)).export(tmp_path / "box.stl")
     for base in (None, 1.0):
-        with pytest.raises(rs.InputError, match=r'no vertex of "box.stl" is inside its edge.* mesh it more finely'):
-            rs.surface_from(tmp_path / "box.stl", unit=1.0, base=base)
+        top = rs.surface_from(tmp_path / "box.stl", unit=1.0, base=base)
+        assert len(top.surface.faces) == 2
+        assert top.height_at(np.array([[5.0, -3.0], [0.0, 0.0]])) == pytest.approx([1.5, 1.5], abs=1e-9)
+    with pytest.raises(rs.InputError, match=r'no part of "box\.stl" is inside its boundary: choose a lower base'):
+        rs.surface_from(tmp_path / "box.stl", unit=1.0, base=2.0)
     (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
     with pytest.raises(rs.InputError, match=r'no part of "bowl\.obj" is inside its boundary: choose a lower base'):
         rs.surface_from(tmp_path / "bowl.obj", unit=MM, base=100.0)

@@ -290,7 +290,6 @@ REFUSED = {
     r"not manifold: three faces": fin(),
     r"2 separate pieces .* 50 and 50 %": doubled(dome(6), 1.0),
     r"only one side": moebius(),
-    r"creased: faces meet at \d\d degrees near \(": gable(),
     r"closed: say where .* between z = -1 and 1 m": closed_ball(20),
 }
 
@@ -300,6 +299,16 @@ def test_what_is_no_smooth_surface_is_refused_in_one_sentence(sentence):
     with pytest.raises(rs.InputError, match=sentence) as refusal:
         Freeform.of(*REFUSED[sentence])
     assert "\n" not in str(refusal.value)
+
+
+def test_a_mesh_that_is_creased_within_is_refused_where_it_is_used_and_names_the_seam_to_lay():
+    sentence = (
+        r"creased: faces meet at \d\d degrees near \(.*: to form it in patches .* --seams\.lines \"-0\.1897,0; 0\.2,0"
+    )
+    target = Freeform.of(*gable())
+    for use in (lambda: target.level(np.zeros((1, 3))), target.require_usable, lambda: target.size):
+        with pytest.raises(rs.InputError, match=sentence):
+            use()
 
 
 def test_sheets_that_touch_are_refused_with_the_place():
@@ -322,7 +331,7 @@ def test_sheets_that_cross_are_refused(count):
 
 def test_a_sound_mesh_is_returned_facing_up_and_whole():
     x, faces = PARTS["bowl"]()
-    mesh, repairs = sound_mesh(x, faces[:, ::-1], "the mesh")
+    mesh, repairs, *_ = sound_mesh(x, faces[:, ::-1], "the mesh")
     assert repairs == []
     assert mesh.areas.sum() == pytest.approx(sound_mesh(x, faces, "the mesh")[0].areas.sum(), rel=1e-14)
     assert (mesh.doubled[:, 2] > 0).all()
@@ -332,12 +341,12 @@ def test_a_sound_mesh_is_returned_facing_up_and_whole():
 
 def test_a_single_triangle_is_a_sound_mesh():
     """That most single triangles have nothing inside their edge is said later, by `Freeform`."""
-    mesh, repairs = sound_mesh(np.eye(3), np.array([[0, 2, 1]]), "the mesh")
+    mesh, repairs, *_ = sound_mesh(np.eye(3), np.array([[0, 2, 1]]), "the mesh")
     assert repairs == []
     assert (mesh.doubled[:, 2] > 0).all()
 
 
 def test_normals_at_the_vertices_of_a_sphere_are_exact():
     x, faces = closed_ball(20)
-    mesh, _ = sound_mesh(x, faces, "the ball")
+    mesh, *_ = sound_mesh(x, faces, "the ball")
     assert mesh.normals == pytest.approx(mesh.vertices, abs=1e-12)
