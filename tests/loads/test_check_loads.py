@@ -10,6 +10,7 @@ import pytest
 from scipy.linalg import eigh
 
 import rodshell as rs
+from rodshell.checks import self_weight
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.formfinding.popup import Ends
 from rodshell.layout.cells import diagonals
@@ -186,6 +187,15 @@ def test_self_weight_is_that_of_rods_joints_bracing_and_cladding() -> None:
     ropes = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1).sum() * ROPE.mass_per_length
     total = -found.shells["all"]["pinned"].load_sum[2] / found.shells["all"]["pinned"].at_factor
     assert total == pytest.approx(9.81 * (rods + cladding + ropes), rel=1e-3)
+
+
+def test_the_own_weight_of_a_braced_shell_is_carried_as_the_load_that_is_this_weight() -> None:
+    found = rs.check_loads(shell("tubes"), one(rs.SelfWeight(), bracing=BRACED["cables"]))
+    limit, braced = found.shells["all"]["pinned"].limit_factor, found.self_weight["pinned"].load_factor
+    assert braced == pytest.approx(limit, rel=4e-3)  # both at most .2 % below
+    bare = shell("tubes").popped["pinned"]
+    assert braced > 3 * self_weight(bare.shell, bare.equilibrium).load_factor
+    assert not rs.check_loads(shell("tubes"), one(rs.SelfWeight())).self_weight
 
 
 def test_supports_that_all_settle_alike_stress_nothing() -> None:

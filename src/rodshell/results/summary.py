@@ -7,7 +7,7 @@ from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.loaded import DesignStrength
 from rodshell.results.own_weight import is_braced
 from rodshell.results.records import Bent, RodType, printable
-from rodshell.results.results import Bending, Results
+from rodshell.results.results import Bending, Results, SelfWeight
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import strength_name
 from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict_of
@@ -236,6 +236,9 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
     what = f"own weight carried{' without bracing' * is_braced(results)}"
     for ends, weighed in results.self_weight.items():
         line = f"  weight    {ends:<8}{what}: {share_of_weight(weighed)}{least}"
+        if weighed.braced_limit is not None:
+            braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
+            line += f", with it: {share_of_weight(braced)}"
         if weighed.deflection is not None:
             line += f"; deflection under it: {length(weighed.deflection)}"
         yield line
