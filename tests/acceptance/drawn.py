@@ -9,7 +9,7 @@ from math import radians
 import numpy as np
 
 import rodshell as rs
-from tests.acceptance import drawn_scale
+from tests.acceptance import drawn_reserve, drawn_scale
 from tests.acceptance.rows import Row, print_table
 
 ROD = rs.Rod(rs.Tube(radius=0.016, thickness=0.003), rs.Material.preset("gfrp"))
@@ -72,6 +72,7 @@ def end_rows(count: int = 80) -> Iterator[Row]:
 def all_rows() -> Iterator[Row]:
     yield from end_rows()
     yield from drawn_scale.rows()
+    yield from drawn_reserve.rows()
 
 
 if __name__ == "__main__":

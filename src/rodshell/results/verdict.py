@@ -452,11 +452,11 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
         f"times its own weight, {rounded(reserve(results))} being asked for{near}"
     )
     if not results.loads:
-        creep = results.strength.creep if results.strength else None
+        known = results.strength is not None and results.strength.creep is not None
         yield (
             "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
             "people) and imperfections were not checked"
-            f"{', nor creep, which is not known of these rods' * (creep is None)}"
+            f"{'' if known else ', nor creep, which is not known of these rods'}"
         )
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
