@@ -462,7 +462,7 @@ def test_of_braced_shells_the_reserve_is_asked_with_the_bracing() -> None:
         assert found.level == level
         assert any(words in reason for reason in found.reasons)
         summary = summary_text(changed(*both))
-        assert (f"without bracing: 2 times, with it: {factor} times" in summary) == (factor in (1.5, 1.4))
+        assert (f"without bracing: 2 times; with bracing: {factor} times" in summary) == (factor in (1.5, 1.4))
 
 
 def test_a_shell_that_falls_under_its_own_weight_with_every_support_cannot_be_built() -> None:

@@ -236,11 +236,11 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
     what = f"own weight carried{' without bracing' * is_braced(results)}"
     for ends, weighed in results.self_weight.items():
         line = f"  weight    {ends:<8}{what}: {share_of_weight(weighed)}{least}"
-        if weighed.braced_limit is not None:
-            braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
-            line += f", with it: {share_of_weight(braced)}"
         if weighed.deflection is not None:
             line += f"; deflection under it: {length(weighed.deflection)}"
+        if weighed.braced_limit is not None:
+            braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
+            line += f"; with bracing: {share_of_weight(braced)}"
         yield line
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
