@@ -12,7 +12,7 @@ import rodshell as rs
 from rodshell.formfinding.patches import find_patched_stages
 from rodshell.targets.creased import cut_at
 from rodshell.targets.patch import Seam
-from tests.acceptance import drawn_scale
+from tests.acceptance import drawn_reserve, drawn_scale
 from tests.acceptance.rows import Row, print_table
 from tests.targets.meshes import CREASED, creased
 from tests.targets.test_creases import SEAMS, off_crease
@@ -93,6 +93,7 @@ def all_rows() -> Iterator[Row]:
     yield from end_rows()
     yield from crease_rows()
     yield from drawn_scale.rows()
+    yield from drawn_reserve.rows()
 
 
 if __name__ == "__main__":

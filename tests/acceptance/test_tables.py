@@ -9,6 +9,7 @@ import pytest
 
 from tests.acceptance import (
     drawn,
+    drawn_reserve,
     drawn_scale,
     house,
     joints,
@@ -32,7 +33,10 @@ pytestmark = pytest.mark.slow
 
 Rows = Callable[[], Iterator[Row]]
 CHEAP: dict[str, tuple[Rows, ...]] = {
-    "drawn": (partial(drawn.end_rows, 14), partial(drawn.crease_rows, ["valley"]), drawn_scale.bifurcation_rows),
+    "drawn": (
+        partial(drawn.end_rows, 14), partial(drawn.crease_rows, ["valley"]), drawn_scale.bifurcation_rows,
+        partial(drawn_reserve.rows, (21, 26), least=2),
+    ),
     "house": (house.tree_rows,),
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
     "loads": (

@@ -7,7 +7,7 @@ from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.loaded import DesignStrength
 from rodshell.results.own_weight import is_braced
 from rodshell.results.records import Bent, RodType, printable
-from rodshell.results.results import Bending, Results
+from rodshell.results.results import Bending, Results, SelfWeight
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import strength_name
 from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict_of
@@ -238,6 +238,9 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
         line = f"  weight    {ends:<8}{what}: {share_of_weight(weighed)}{least}"
         if weighed.deflection is not None:
             line += f"; deflection under it: {length(weighed.deflection)}"
+        if weighed.braced_limit is not None:
+            braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
+            line += f"; with bracing: {share_of_weight(braced)}"
         yield line
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
