@@ -14,7 +14,7 @@ from rodshell.arrays import Floats
 from rodshell.case import load_case
 from rodshell.cli import main
 from rodshell.targets import Freeform
-from rodshell.targets.mesh_files import read_curves
+from rodshell.targets.curve_files import read_curves
 from tests.acceptance.targets_broken import WRITERS, broken_files, called
 from tests.targets.meshes import PARTS, Mesh
 
@@ -185,6 +185,43 @@ def test_arcs_and_splines_of_a_dxf_are_curves_and_its_lines_are_straight(tmp_pat
         assert np.hypot(*curve[:, :2].T) == pytest.approx(radius, rel=3e-5)
         assert len(curve) > 300
     assert sorted(map(tuple, drawn[:, :2])) == sorted(map(tuple, corners))
+
+
+def test_curves_of_a_3dm_are_divided_its_polylines_are_not_and_its_unit_holds(tmp_path):
+    """A circle; two lines and two arcs in one curve; a polyline; and a surface, which is no curve."""
+    rhino3dm = pytest.importorskip("rhino3dm")
+    model, at = rhino3dm.File3dm(), rhino3dm.Point3d
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
+    model.Objects.AddCircle(rhino3dm.Circle(4000.0))
+    slot = rhino3dm.PolyCurve()
+    ends = [at(x, y, 0) for x, y in ((-1e3, -3e3), (1e3, -3e3), (1e3, 3e3), (-1e3, 3e3))]
+    for k, middle in enumerate((None, at(4e3, 0, 0), None, at(-4e3, 0, 0))):
+        a, b = ends[k], ends[(k + 1) % 4]
+        piece = rhino3dm.LineCurve(a, b) if middle is None else rhino3dm.Arc(a, middle, b).ToNurbsCurve()
+        slot.AppendSegment(piece)
+    model.Objects.AddCurve(slot)
+    corners = np.array([(0.9, 0.0, 1.0), (0.3, 0.4, 1.0), (-0.5, 0.2, 1.0), (-0.2, -0.6, 1.0)])
+    line = rhino3dm.Polyline(5)
+    for corner in (*corners, corners[0]):
+        line.Add(*(1e3 * corner).tolist())
+    model.Objects.AddPolyline(line)
+    model.Objects.AddBrep(rhino3dm.Sphere(at(0, 0, 0), 9e3).ToBrep())
+    assert model.Write(str(tmp_path / "edge.3dm"), 7)
+    circle, rounded, drawn = read_curves(tmp_path / "edge.3dm", 1.0)
+    assert np.hypot(*circle[:, :2].T) == pytest.approx(4.0, rel=1e-12)
+    assert len(circle) == 400
+    x, y = np.abs(rounded[:, :2]).T
+    assert np.where(x > 1, np.hypot(x - 1, y), y) == pytest.approx(3.0, rel=1e-9)
+    assert np.abs(np.sort(drawn, axis=0) - np.sort(corners, axis=0)).max() < 1e-12
+
+
+def test_a_3dm_without_curves_has_no_boundary(tmp_path):
+    rhino3dm = pytest.importorskip("rhino3dm")
+    model = rhino3dm.File3dm()
+    model.Objects.AddBrep(rhino3dm.Sphere(rhino3dm.Point3d(0, 0, 0), 9e3).ToBrep())
+    model.Write(str(tmp_path / "ball.3dm"), 7)
+    with pytest.raises(rs.InputError, match="has no closed curve"):
+        read_curves(tmp_path / "ball.3dm", 1.0)
 
 
 @pytest.mark.slow

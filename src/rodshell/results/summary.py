@@ -83,7 +83,11 @@ def rod_text(rod: RodType) -> str:
     values = material.plain()
     if preset:
         known = rod.preset.plain() if rod.preset else {}
-        changed = [NAMES.get(key, key) for key, value in values.items() if known.get(key, value) != value]
+        changed = [
+            NAMES.get(key, key)
+            for key, value in values.items()
+            if known.get(key, value) != value or (key == "poisson_ratio" and "shear" in known)
+        ]
         return line + (f" ({' and '.join(changed)} not {preset}'s)" if changed else "")
     rubber = [NAMES.get(key, key) for key, value in RUBBER.items() if values.get(key) == value]
     if len(rubber) == len(RUBBER):
