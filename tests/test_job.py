@@ -218,7 +218,7 @@ def test_the_case_kept_with_the_form_of_a_python_function_is_not_run_with_anothe
         assert said.startswith("rodshell: error: this case cannot be run again: no case file can describe the Python")
         assert said.count("\n") == 1
     assert main(["export", saved, "--only", "csv"]) == 0
-    assert main(["popup", saved, "--out", str(tmp_path / "popped"), "--only", "csv"]) in (0, 1)
+    assert main(["popup", saved, "--out", str(tmp_path / "popped"), "--only", "csv"]) in (0, 4)
 
 
 @pytest.mark.parametrize(
@@ -487,7 +487,9 @@ def test_keys_that_a_table_of_rods_does_not_have_are_refused(
 
 def test_the_command_line_runs_the_job(tmp_path: Path) -> None:
     options = [word for key, value in COARSE.items() for word in (f"--{key}", str(value))]
-    assert main(["form", "hemisphere", *options, "--only", "csv", "--out", str(tmp_path / "out"), "-q"]) == 0
+    assert (
+        main(["form", "hemisphere", *options, "--only", "csv", "--out", str(tmp_path / "out"), "-q"]) == 4
+    )  # it falls under its own weight
     saved, made = rs.read(tmp_path / "out"), dome().run().archive()
     assert saved.case_toml == made.case_toml
     for name, state in made.states.items():

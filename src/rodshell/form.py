@@ -131,8 +131,8 @@ class Form:
 
     @property
     def seams(self) -> tuple[Seam, ...]:
-        """The lines along which the target was cut."""
-        return self.stages.seams if isinstance(self.stages, PatchedForm) else ()
+        """The lines along which the target was cut: where it is creased along a seam, its crease."""
+        return self.stages.cut_along if isinstance(self.stages, PatchedForm) else ()
 
     @property
     def meetings(self) -> tuple[Meeting, ...]:

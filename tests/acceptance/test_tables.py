@@ -9,6 +9,8 @@ import pytest
 
 from tests.acceptance import (
     drawn,
+    drawn_meshes,
+    drawn_reserve,
     drawn_scale,
     house,
     joints,
@@ -32,7 +34,11 @@ pytestmark = pytest.mark.slow
 
 Rows = Callable[[], Iterator[Row]]
 CHEAP: dict[str, tuple[Rows, ...]] = {
-    "drawn": (partial(drawn.end_rows, 14), drawn_scale.bifurcation_rows),
+    "drawn": (
+        partial(drawn.end_rows, 8), partial(drawn.crease_rows, ["valley"]), drawn_scale.bifurcation_rows,
+        partial(drawn_meshes.mesh_rows, ("slivers",), (1_000, 10_000)), partial(drawn_meshes.cost_rows, 1),
+        partial(drawn_reserve.rows, (21, 26), least=2),
+    ),
     "house": (house.tree_rows,),
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
     "loads": (

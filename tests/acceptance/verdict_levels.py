@@ -59,7 +59,7 @@ CASES: dict[str, tuple[str, list[str], str]] = {  # level, words of the command 
     "strength exceeded": ("unbuildable", ["hemisphere", "--checks.strength", "1 kPa"], "of the given strength"),
     "unstable": ("unbuildable", ["hemisphere"], "unstable (2 buckling modes)"),
     "the README's pavilion": ("good", ["pavilion"], "is stable and carries at least"),
-    "the paper's hemisphere": ("check", ["hemisphere"], "its own weight"),
+    "the paper's hemisphere": ("unbuildable", ["hemisphere"], "does not stand under its own weight"),
 }
 
 

@@ -30,7 +30,8 @@ LITERATURE: dict[str, tuple[Range, Range, Range]] = {
     "petg": ((1.9, 2.3), (1230, 1300), (45, 80)),
     "spring-steel": ((190.0, 212.0), (7750, 7900), (800, 1700)),
 }
-GOOD = ("garden pavilion", "dome", "barrel vault", "ball below its equator")
+GOOD = ("garden pavilion", "dome", "ball below its equator")
+ARCHES = "barrel vault"  # whose ends along both arches hang in the air
 ROOF = "3*cos(x/6)*cos(y/5)"
 BECAUSE = ("not given: chosen to fit", "the permanent strength")
 
@@ -87,7 +88,8 @@ def unnamed_rod_rows() -> Iterator[Row]:
 
 
 def good_rows() -> Iterator[Row]:
-    """Good can be reached: by the README's first example, and by four shells of the gallery with the rods it states."""
+    """Good can be reached: by the README's first example, and by three shells of the gallery with the rods it states; a
+    vault is to be checked, since its arches have to be held."""
     with tempfile.TemporaryDirectory() as name:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
             main(["form", "pavilion", "--only", "csv", "--out", str(Path(name) / "out")])
@@ -96,6 +98,9 @@ def good_rows() -> Iterator[Row]:
     for name in GOOD:
         verdict = verdict_of(gallery()[name].form().archive().results)
         yield Row(name, "not good", float(verdict.level != "good"), 0, note=verdict.headline[:60])
+    verdict = verdict_of(gallery()[ARCHES].form().archive().results)
+    silent = verdict.level != "check" or "rod ends lie up to" not in verdict.headline
+    yield Row(ARCHES, "ends in the air not said first", float(silent), 0, note=verdict.headline[:60])
 
 
 def rows() -> Iterator[Row]:

@@ -15,7 +15,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.case.rod_ends import read_table
-from rodshell.targets.mesh_files import read_curves, read_lines
+from rodshell.targets.curve_files import read_curves, read_lines
 from tests.attack import surface_files
 from tests.attack.surface_files import MESHES, damaged
 

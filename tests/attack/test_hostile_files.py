@@ -23,8 +23,9 @@ from rodshell import untrusted
 from rodshell.case.rod_ends import read_table
 from rodshell.sweeps.identity import content_digest
 from rodshell.targets import apart
+from rodshell.targets.curve_files import read_curves
 from rodshell.targets.field_fitting import cubic_spacing
-from rodshell.targets.mesh_files import read_curves, read_mesh
+from rodshell.targets.mesh_files import read_mesh
 from rodshell.targets.nurbs_files import Nurbs
 from rodshell.targets.samples import mesh_samples
 from rodshell.targets.trianglemesh import sound_mesh
@@ -214,7 +215,7 @@ def test_memory_for_a_polygon_grows_with_its_corners(tmp_path: Path) -> None:
     angle = np.linspace(0, 2 * np.pi, 20_000, endpoint=False)
     x = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     k = np.arange(1, len(x) - 1)
-    mesh, _ = sound_mesh(x, np.column_stack([0 * k, k, k + 1]), "fan")
+    mesh, *_ = sound_mesh(x, np.column_stack([0 * k, k, k + 1]), "fan")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     samples = mesh_samples(mesh, cubic_spacing(float(mesh.areas.sum()), len(x)))
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 600_000
@@ -271,7 +272,7 @@ def test_drawing_with_an_absurd_curve_is_refused(curve: dict[str, Any], tmp_path
 
 
 def test_drawing_of_too_many_curves_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rodshell.targets.mesh_files.MOST_STROKES", 2)
+    monkeypatch.setattr("rodshell.targets.curve_files.MOST_STROKES", 2)
     drawing = ezdxf.new()
     for k in range(3):
         drawing.modelspace().add_circle((3 * k, 0), 1)

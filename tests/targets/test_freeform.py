@@ -47,15 +47,16 @@ def dome(rows: int = 30) -> Mesh:
 )
 def test_rod_ends_converge_to_those_of_the_analytic_target(kind, target):
     """Two thousand and eight thousand faces; the error falls by 4^2 or more (fourth order in the edge is 16), until it
-    meets what is left of the rim's and the march's own errors, some 2e-6 of the size, 6e-6 where rods graze it."""
+    meets what is left of the rim's and the march's own errors, some 2e-6 of the size, 6e-6 where rods graze it. The
+    coarser ellipsoid, whose vertices would be more than 1e-4 off, has more patches for its vertices: it is as good."""
     exact, error = ends(target, anchor=(0.0, 0.0)), []
     for rows in (18, 36):
         x, faces = capped_sphere(rows, np.pi / 2)
         mesh = {"ball": (0.2 * x, faces), "ellipsoid": (x * [0.2, 0.15, 0.12], faces)}
         chosen = mesh.get(kind) or disc(lambda x, y: (x**2 - y**2) / 0.8, RADIUS, rows)
         error.append(apart(ends(Freeform.of(*chosen), anchor=(0.0, 0.0)), exact) / RADIUS)
-    assert error[0] < 1e-3  # 1.3e-4, 7e-4 and 2e-6 measured
-    assert error[1] < max(error[0] / 8, 7e-6)
+    assert error[0] < 4e-4  # 1.9e-4, 6e-5 and 2e-6 measured
+    assert error[1] < max(error[0] / 8, 3e-5 if kind == "ellipsoid" else 7e-6)  # 1.5e-5, 2.4e-5
 
 
 def shuffled(x: Floats, faces: np.ndarray) -> Mesh:
@@ -290,7 +291,6 @@ REFUSED = {
     r"not manifold: three faces": fin(),
     r"2 separate pieces .* 50 and 50 %": doubled(dome(6), 1.0),
     r"only one side": moebius(),
-    r"creased: faces meet at \d\d degrees near \(": gable(),
     r"closed: say where .* between z = -1 and 1 m": closed_ball(20),
 }
 
@@ -300,6 +300,16 @@ def test_what_is_no_smooth_surface_is_refused_in_one_sentence(sentence):
     with pytest.raises(rs.InputError, match=sentence) as refusal:
         Freeform.of(*REFUSED[sentence])
     assert "\n" not in str(refusal.value)
+
+
+def test_a_mesh_that_is_creased_within_is_refused_where_it_is_used_and_names_the_seam_to_lay():
+    sentence = (
+        r"creased: faces meet at \d\d degrees near \(.*: to form it in patches .* --seams\.lines \"-0\.1897,0; 0\.2,0"
+    )
+    target = Freeform.of(*gable())
+    for use in (lambda: target.level(np.zeros((1, 3))), target.require_usable, lambda: target.size):
+        with pytest.raises(rs.InputError, match=sentence):
+            use()
 
 
 def test_sheets_that_touch_are_refused_with_the_place():
@@ -322,7 +332,7 @@ def test_sheets_that_cross_are_refused(count):
 
 def test_a_sound_mesh_is_returned_facing_up_and_whole():
     x, faces = PARTS["bowl"]()
-    mesh, repairs = sound_mesh(x, faces[:, ::-1], "the mesh")
+    mesh, repairs, *_ = sound_mesh(x, faces[:, ::-1], "the mesh")
     assert repairs == []
     assert mesh.areas.sum() == pytest.approx(sound_mesh(x, faces, "the mesh")[0].areas.sum(), rel=1e-14)
     assert (mesh.doubled[:, 2] > 0).all()
@@ -332,12 +342,12 @@ def test_a_sound_mesh_is_returned_facing_up_and_whole():
 
 def test_a_single_triangle_is_a_sound_mesh():
     """That most single triangles have nothing inside their edge is said later, by `Freeform`."""
-    mesh, repairs = sound_mesh(np.eye(3), np.array([[0, 2, 1]]), "the mesh")
+    mesh, repairs, *_ = sound_mesh(np.eye(3), np.array([[0, 2, 1]]), "the mesh")
     assert repairs == []
     assert (mesh.doubled[:, 2] > 0).all()
 
 
 def test_normals_at_the_vertices_of_a_sphere_are_exact():
     x, faces = closed_ball(20)
-    mesh, _ = sound_mesh(x, faces, "the ball")
+    mesh, *_ = sound_mesh(x, faces, "the ball")
     assert mesh.normals == pytest.approx(mesh.vertices, abs=1e-12)

@@ -136,7 +136,7 @@ def values() -> dict[str, object]:
         "TriangleMesh(144 vertices, 242 faces)": freeform.surface,
         "Seam(2 points, (-0.3, 0) to (0.3, 0) m)": Seam.of(SEAM),
         "Patch(around (0, 0.1) m, 1 seam, Hemisphere(radius=0.2))": Patch(
-            whole=rs.Hemisphere(0.2), seams=(Seam.of(SEAM),), sides=(1,), middle=(0.0, 0.1)
+            whole=rs.Hemisphere(0.2), surface=rs.Hemisphere(0.2), seams=(Seam.of(SEAM),), sides=(1,), middle=(0.0, 0.1)
         ),
         "GridLayout(rods=(5, 7), spacing=(0.06, 0.06), length=1.0, edge='auto')": rs.GridLayout.orthogonal(
             rods=[5, 7], spacing=0.06, length=1

@@ -216,6 +216,8 @@ class Case(Table):
             also keys that a form in patches does not have.
         """
         from rodshell.checks.sizing import require_likely_sizes
+        from rodshell.targets.creased import cut_at
+        from rodshell.targets.patch import Seam
 
         if self.seams.lines:
             self._require_keys_of_patches()
@@ -226,7 +228,7 @@ class Case(Table):
             )
         anchor = None if self.drape.anchor == "auto" else self.drape.anchor
         joint, method = built(self.joint), built(self.drape)
-        target = target or built(self.target)
+        target = cut_at(target or built(self.target), [Seam.of(line) for line in self.seams.lines])
         layout = built(self.layout, target)
         shortest = min(map(min, (layout.spacing, *(p.spacing for p in self.seams.patches if p.spacing is not None))))
         self._require_stock(shortest)

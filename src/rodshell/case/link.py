@@ -19,7 +19,7 @@ LARGEST = 1_000_000  # bytes of a case as JSON that the studio reads
 LARGEST_UPLOAD = 50e6  # bytes of a file that the studio reads
 UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
 SURFACES = {suffix: kind for suffix, kind in BY_SUFFIX.items() if suffix != ".gltf"}  # a .gltf names further files
-OUTLINES = (".dxf", ".obj")  # closed curves that end a surface
+OUTLINES = (".dxf", ".obj", ".3dm")  # closed curves that end a surface
 UPLOADS = tuple(dict.fromkeys((*SURFACES, *OUTLINES)))
 
 

@@ -222,8 +222,8 @@ class PatchTable(Table):
 
 class SeamsTable(Table):
     lines: Polylines = Field(default=(), description='cuts "x,y; x,y" through the whole target; "|" between two')
-    file: FileToRead | None = Field(default=None, description="OBJ or DXF file with such lines")
-    unit: Unit = Field(default=1.0, description="unit of that file, such as mm")
+    file: FileToRead | None = Field(default=None, description="OBJ, DXF or 3dm file with such lines")
+    unit: Unit = Field(default=1.0, description="unit of that file, such as mm; a 3dm file states its own")
     patches: tuple[PatchTable, ...] = Field(
         default=(), description="overrides for patches, by name; in a case file only"
     )
@@ -234,7 +234,7 @@ class SeamsTable(Table):
         """The lines of the file become lines of the case, which then needs the file no longer."""
         if given.get("file") is None:
             return given
-        from rodshell.targets.mesh_files import read_lines
+        from rodshell.targets.curve_files import read_lines
 
         rest = {key: value for key, value in given.items() if key not in ("file", "unit")}
         try:

@@ -95,7 +95,7 @@ class PlacedTable(Table):
     file: FileToRead = Field(description="path of the file; in a case file from the case file's folder")
     base: Coordinate | None = Field(default=None, description="z of the plane at which the shell ends")
     boundary: FileToRead | None = Field(
-        default=None, description="OBJ or DXF file with closed curves: the shell's edge, openings"
+        default=None, description="OBJ, DXF or 3dm file with closed curves: the shell's edge, openings"
     )
     scale: Factor = Field(default=1.0, description="factor by which it is scaled about the origin")
     turn: Angles = Field(

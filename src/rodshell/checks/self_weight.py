@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from rodshell.arrays import Floats
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import Equilibrium
@@ -54,6 +55,7 @@ def self_weight(
     shell: Shell,
     found: Equilibrium,
     *,
+    mass: Floats | None = None,
     gravity: float = STANDARD_GRAVITY,
     most: float = MOST,
     progress: Callable[[int, float], None] = lambda count, factor: None,
@@ -62,7 +64,8 @@ def self_weight(
 
     Parameters
     ----------
-    found : the equilibrium of the shell without loads, its ends held.
+    found : the equilibrium of the shell without loads, its ends held, with or without bracing.
+    mass : (n,) of the nodes, with that of bracing [kg]; None: the shell's.
     gravity : [m/s2].
     most : largest factor that is looked for.
     progress : as of `load_path`.
@@ -70,7 +73,8 @@ def self_weight(
     if not shell.mass[shell.stretch.blocks, 2].all():  # joints may have some even then
         return SelfWeightCheck(None, None, "no mass")
     load = np.zeros_like(found.state)
-    load[:, 2] = -gravity * shell.mass[:, 2]
+    weighed = shell.mass[:, 2] if mass is None else mass
+    load[: len(weighed), 2] = -gravity * weighed
     end = load_path(found, load, most=most, progress=progress)
     deflection, whole = None, end.at(1.0)
     if whole is not None:

@@ -29,6 +29,7 @@ from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, Tube, scaled, size_text
 from rodshell.targets import Target
+from rodshell.targets.creased import Creased
 from rodshell.units import length_text, rounded_down
 from rodshell.untrusted import limit, raised
 
@@ -293,17 +294,21 @@ def _other_unit(depth: float, width: float) -> str:
 def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
     """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature.
 
+    No rod runs across a crease.
+
     Parameters
     ----------
     target : the surface.
     layout : of the rods on it.
     anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
     """
-    try:
-        return net_bends(chebyshev_net(target, layout, anchor=anchor))
-    except NetLimitError:  # it is cut by seams, or another anchor is looked for
-        sharpest = np.atleast_1d(_sharpest_of(target))
-        return Bends(sharpest, sharpest)
+    if not isinstance(target, Creased):
+        try:
+            return net_bends(chebyshev_net(target, layout, anchor=anchor))
+        except NetLimitError:  # it is cut by seams, or another anchor is looked for
+            pass
+    sharpest = np.atleast_1d(_sharpest_of(target))
+    return Bends(sharpest, sharpest)
 
 
 def net_bends(net: ChebyshevNet) -> Bends:

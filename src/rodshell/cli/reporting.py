@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
+from shlex import quote
 from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -247,13 +248,16 @@ def deliver(
     quiet: bool,
 ) -> int:
     """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
+    from rodshell.results.wording import CASE, FORM, FORM_AGAIN
+
     Interruption.check()
     with progress:
         folder = _saved(lambda where: save(where, progress), place)
+    again = f"{FORM} {quote(str(folder / CASE))}"
     if as_json:
         click.echo(json.dumps({"out": str(folder), **result.result()}))
     elif not quiet:
-        click.echo(result.summary())
+        click.echo(result.summary().replace(FORM_AGAIN, again))
         click.echo(f"written to {folder}")
     if isinstance(result, Kept) and result.refused:
         say(f"error: {result.refused}; the form is in {folder}, without its loads")
@@ -265,7 +269,7 @@ def deliver(
         return NOT_CONVERGED
     verdict = result.result().get("verdict")
     if verdict and verdict["level"] == "unbuildable":
-        say(f"NOT BUILDABLE: {verdict['reasons'][0]}; results are in {folder}")
+        say(f"NOT BUILDABLE: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
         return UNBUILDABLE
     return FOUND
 

@@ -130,6 +130,11 @@ class PatchedForm:
             )
         return (*flat_warnings(self.draped, self.rod), *self.target.warnings, *words)
 
+    @property
+    def cut_along(self) -> tuple[Seam, ...]:
+        """Where the target is cut: along creases that seams are drawn near to."""
+        return next(iter(self.patch_nets.values())).patch.seams
+
     def parameters(self) -> dict[str, object]:
         """Seams and what patches have of their patch_layouts, as they stand in a case file."""
         patches = [{"name": name, **_given(overrides)} for name, overrides in self.patch_layouts.items()]

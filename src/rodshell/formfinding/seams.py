@@ -22,6 +22,7 @@ from rodshell.layout import FlatGrid, FlatRod, GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net, geodesics
 from rodshell.progress import Progress, silent
 from rodshell.targets import Patch, Target
+from rodshell.targets.creased import Creased
 from rodshell.targets.patch import Seam
 
 RAYS, STEPS = 240, 90  # of the survey of a target from its summit
@@ -43,13 +44,16 @@ def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
     ------
     InputError : the seams cut off nothing, or there are more patches than letters.
     """
-    points, areas = _survey(target)
+    creased = target if isinstance(target, Creased) else None
+    seams = creased.seams if creased else seams
+    points, areas = creased.survey() if creased else _survey(target)
     sides = np.array([seam.distance(points) > 0 for seam in seams])  # (seams, n)
     found = list[Patch]()
     for part in _connected(points, sides, ADJACENT * target.size):
         if areas[part].sum() > LEAST * areas.sum():
             signs = tuple(1 if left else -1 for left in sides[:, part[0]])
-            patch = Patch(whole=target, seams=seams, sides=signs, middle=(0.0, 0.0))
+            surface = creased.piece(signs) if creased else target
+            patch = Patch(whole=target, surface=surface, seams=seams, sides=signs, middle=(0.0, 0.0))
             found.append(replace(patch, middle=_middle(patch, points[part], areas[part])))
     if len(found) < 2:
         raise InputError("the seams leave the target in one piece: draw lines that run across it in plan")
@@ -65,10 +69,12 @@ def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
 def transported_heading(target: Target, anchor: tuple[float, float], rotate: float) -> float:
     """Angle against x, seen from above [rad], of the summit's heading `rotate` where it is carried to an anchor.
 
-    It is rotated as the surface's normal is from one point to the other: mirrored patches get mirrored headings.
+    It is rotated as the surface's normal is from one point to the other: mirrored patches get mirrored headings. Where
+    the target is creased it is that of a level plane, since the summit may lie on a crease.
     """
     points = target.lift(np.array([target.summit, anchor]))
     n, m = target.on_surface(points).normal
+    n = np.array([0.0, 0.0, 1.0]) if isinstance(target, Creased) else n
     along = np.array([np.cos(rotate) * n[2], np.sin(rotate) * n[2], -np.cos(rotate) * n[0] - np.sin(rotate) * n[1]])
     axis = np.cross(n, m)
     turned = along + np.cross(axis, along) + np.cross(axis, np.cross(axis, along)) / (1.0 + n @ m)
@@ -175,13 +181,19 @@ class PatchNet:
 
 @dataclass(frozen=True, eq=False)
 class _OpenEnd:
-    """A rod end on a seam that no rod meets yet: the sides of the patch beyond, its tangent mirrored in the seam."""
+    """A rod end on a seam that no rod meets yet: the sides of the patch beyond, its outward tangent, and the tangent of
+    its patch across the seam."""
 
     end: End
     seam: int
     beyond: tuple[int, ...]
     point: Floats
-    mirrored: Floats
+    out: Floats
+    across: Floats
+
+    def mirrored(self, patch: Patch) -> Floats:
+        """The tangent (3,) mirrored in the seam, in the surface of the patch beyond."""
+        return self.out - (self.out @ self.across) * (self.across + patch.across(self.point, self.seam))
 
 
 def lay_patches(
@@ -230,7 +242,7 @@ def _end_goals(patch: Patch, ends: list[_OpenEnd], others: list[Patch]) -> EndGo
     points = np.array([end.point for end in ends])
     return EndGoals(
         points,
-        np.array([end.mirrored for end in ends]),
+        np.array([end.mirrored(patch) for end in ends]),
         _rows(np.array([end.seam for end in ends]), points),
         lambda x: np.isin(_cut_by(patch, x), taken),
     )
@@ -279,8 +291,7 @@ def _ends_on_seams(name: str, grid: PatchNet) -> list[_OpenEnd]:
         at = rod.end - tiny if k % 2 else rod.start + tiny
         out = unit(points[k] - grid.net.positions(rod, np.array([at]))[0])
         across = patch.across(on_seam, seam)
-        mirrored = out - 2 * (out @ across) * across
-        result.append(_OpenEnd(End(name, rod.name, k % 2), seam, _across(patch, seam), on_seam, mirrored))
+        result.append(_OpenEnd(End(name, rod.name, k % 2), seam, _across(patch, seam), on_seam, out, across))
     return result
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.checks.bending import require_known_stress, rod_frames
 from rodshell.checks.reactions import Reactions
+from rodshell.checks.self_weight import SelfWeightCheck, self_weight
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding import PatchForm, PopUp, pop_up
 from rodshell.formfinding.patches import PatchedForm
@@ -136,6 +137,7 @@ class LoadChecks:
     stopped, missing : when a time limit came, or "", and which combinations were not reached.
     refused : why the form cannot be checked under these loads, or "".
     frequencies : lowest natural frequencies of the shells without loads, with bracing and locked joints [Hz].
+    self_weight : how much of their own weight braced shells carry; empty without bracing.
     """
 
     asked: Loads
@@ -146,6 +148,7 @@ class LoadChecks:
     missing: tuple[str, ...] = ()
     refused: str = ""
     frequencies: Mapping[Ends, Floats] = field(default_factory=dict)
+    self_weight: Mapping[Ends, SelfWeightCheck] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         late = f", {self.stopped or self.refused}" if self.stopped or self.refused else ""
@@ -211,6 +214,7 @@ def check_shells(
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
     stopped, braced, vibrations = "", np.empty((0, 2), dtype=np.intp), dict[Ends, Floats]()
+    weighed = dict[Ends, SelfWeightCheck]()
     try:
         for ends, popped in done.items():
             if limits.bending:
@@ -229,9 +233,18 @@ def check_shells(
                 except InputError as reason:
                     raise InputError(f"combination {shown(name)}: {reason}") from None
                 missing.pop(0)
+            if len(braced):
+                said = partial(_said, progress, f"own weight, {ends} ends")
+                weighed[ends] = self_weight(
+                    structure.shell, structure.equilibrium, mass=structure.mass,
+                    progress=lambda count, factor, said=said: said(f"{factor:.3g} times, {count} factorisations"),  # type: ignore[misc]
+                )  # fmt: skip
     except OutOfTimeError as late:
         stopped = str(late)
-    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else (), frequencies=vibrations)
+    return LoadChecks(
+        loads, found, braced, limits, stopped, tuple(missing) if stopped else (), frequencies=vibrations,
+        self_weight=weighed,
+    )  # fmt: skip
 
 
 def unchecked(loads: Loads, *, refused: str = "", stopped: str = "") -> LoadChecks:

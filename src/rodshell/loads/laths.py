@@ -175,12 +175,10 @@ def _joined(structure: Structure, layer: LathLayer, laid: _Laid, ties: tuple[Ele
             "thinner ones (bracing.section), or another pattern"
         )
     mass = np.zeros(structure.shell.node_count)
-    lengths = np.array([rod.length for rod in laid.mesh.grid.rods])
-    at_joints = np.zeros(len(laid.mesh.rod_nodes))
     rods = np.searchsorted(laid.mesh.rod_start, laid.entries, side="right") - 1
-    counts = np.bincount(rods, minlength=len(lengths))
-    at_joints[laid.entries] = (lengths / counts)[rods] * layer.rod.mass_per_length
-    np.add.at(mass, outer_nodes(structure.mesh)[laid.crossings], at_joints[laid.entries])
+    half = np.where(np.diff(rods) == 0, np.diff(laid.mesh.stations[laid.entries]), 0.0) / 2
+    reach = np.append(half, 0.0) + np.append(0.0, half)  # the load of a lath goes to its nearest joint
+    np.add.at(mass, outer_nodes(structure.mesh)[laid.crossings], layer.rod.mass_per_length * reach)
     grid = structure.shell.with_elements(found.elements[: len(structure.shell.elements)])
     return replace(structure, shell=grid, equilibrium=found, braced=layer.pairs, bracing_mass=mass, laths=layer)
 

@@ -75,7 +75,7 @@ class Structure:
     equilibrium : of grid and bracing without loads, its ends held.
     rod : of the grid.
     braced : (d, 2) crossings that its bracing joins, the rod ends counted on from them.
-    bracing_mass : (n,) mass of the bracing, lumped at the mesh's nodes [kg]; None: there is no bracing.
+    bracing_mass : (n,) mass of the bracing whose weight the mesh's nodes carry [kg]; None: there is no bracing.
     cables : its energy; None: there are no cables.
     laths : its third layer; None: there is none.
     locked : crossings of the joints of each of the shell's last elements, which lock them; empty: none is locked.
@@ -149,8 +149,8 @@ class Structure:
     def frequencies(self, count: int) -> Floats:
         """(k,) the lowest natural frequencies without loads, ascending [Hz]; none where they are not known.
 
-        Rods' mass is spread along their edges, so that the frequencies of bending are of fourth order in their length
-        (see `solve.modes.frequencies`); joints and bracing are at the nodes.
+        The mass of rods and laths is spread along their edges, so that the frequencies of bending are of fourth order
+        in their length (see `solve.modes.frequencies`); joints and cables are at the nodes.
 
         Parameters
         ----------
@@ -158,12 +158,17 @@ class Structure:
         """
         shell, mass = self.shell, np.zeros((self.size, 3))
         mass[: len(shell.mass)] = shell.mass
-        if self.bracing_mass is not None:
+        layer = self.laths
+        if layer is not None:
+            np.add.at(mass, layer.blocks, layer.shell.mass)
+        elif self.bracing_mass is not None:
             mass[: shell.node_count] += self.bracing_mass[:, None]
         spread = np.zeros(len(self.equilibrium.problem.stretch.blocks))
         mesh = self.mesh
         of_rods = RodSections.of(mesh, [self.rod] * len(mesh.grid.rods)).mass * mesh.edge_lengths
         spread[: len(of_rods)] = of_rods
+        if layer is not None:
+            spread[len(of_rods) :] = layer.rod.mass_per_length * layer.shell.mesh.edge_lengths
         if self.equilibrium.tangent.negative_modes or not of_rods.all():
             return np.zeros(0)
         try:

@@ -9,7 +9,7 @@ import csv
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from math import isnan, pi
+from math import ceil, isnan, log, pi
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from rodshell.output.grid import GridRod, joints_of, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.loaded import LoadedShell
-from rodshell.results.records import Ends, Meeting, printable
+from rodshell.results.records import Ends, Meeting, Stiffness, printable
 from rodshell.results.strength_used import ENDS
 from rodshell.results.wording import FINEST, Rounding, rounding_of
 
@@ -35,6 +35,7 @@ UNITS = {
     "Nm": "N m",
 }
 UNKNOWN = np.full(3, np.nan)  # tangent
+GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
 Show = Callable[[float | None], str]
 
 
@@ -114,10 +115,12 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
 
 
 def sections_table(archive: Archive) -> Table:
-    """One row a segment of a rod whose section changes: its EI at both ends, linear between, and the length of the
-    section that changes, or the number of laths on each other.
+    """One row a segment of a rod whose section changes: its EI at both ends, and the length of the section that changes
+    or the number of laths on each other.
 
-    Segments are measured from the cut end of the rod's start; allowances have the section of their end.
+    EI is linear between stations, sizes are not: segments are so short that a rod built with sizes that are linear
+    between them has its EI within 1 %. They are measured from the cut end of the rod's start; allowances have the
+    section of their end.
     """
     mm, known = rounding_of(archive.results).mm, archive.results.rod
     unchanged = None if known is None else known.EI if known.EI is not None else known.EI1
@@ -128,18 +131,36 @@ def sections_table(archive: Archive) -> Table:
         along = rod.record.stiffness
         if along is None:
             continue
-        stops = [rod.from_cut_end(at) for at in along.at]
+        at, every, cuts = _segments(along)
+        stops = [rod.from_cut_end(place) for place in at]
         stops[0], stops[-1] = 0.0, rod.cut_length
         for k in range(len(stops) - 1):
-            if along.at[k] == along.at[k + 1]:
+            if at[k] == at[k + 1]:
                 continue
-            factors, sizes = along.factors[k : k + 2], along.sizes[k : k + 2]
+            factors, sizes = every[k : k + 2], cuts[k : k + 2]
             stiffness = ["" if unchanged is None else _six(factor * unchanged) for factor in factors]
             cut = [_significant(size, 1e3) for size in sizes] or ["", ""]
             laths = f"{factors[0]:g}" if along.varies == "laths" else ""
             row = [rod.id, along.varies or "", mm(stops[k]), mm(stops[k + 1]), *stiffness, *cut, laths]
             rows.append(row)
     return columns, rows
+
+
+def _segments(along: Stiffness) -> tuple[list[float], list[float], list[float]]:
+    """Stations [m], factors on EI and sizes [m], with further ones between: a size is a power of EI."""
+    if not along.sizes or min(*along.factors, *along.sizes) <= 0:
+        return list(along.at), list(along.factors), list(along.sizes)
+    found = [(along.at[0], along.factors[0], along.sizes[0])]
+    for place, factor, size in zip(along.at[1:], along.factors[1:], along.sizes[1:], strict=True):
+        (start, first, before), growth = found[-1], factor / found[-1][1]
+        bent = place > start and abs(size / before - growth) > 1e-9
+        pieces = ceil(abs(log(growth)) / log(GROWTH)) if bent else 1
+        for share in (j / pieces for j in range(1, pieces)):
+            along_it = (growth**share - 1) / (growth - 1)
+            found.append((start + along_it * (place - start), first * growth**share, before * (size / before) ** share))
+        found.append((place, factor, size))
+    at, factors, sizes = (list(column) for column in zip(*found, strict=True))
+    return at, factors, sizes
 
 
 def joints_table(archive: Archive, *, brief: bool = False) -> Table:

@@ -40,6 +40,7 @@ from rodshell.results.results import (
     Stock,
     WorstBent,
 )
+from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import verdict
 
 PREFERRED: tuple[Ends, Ends] = ("clamped", "pinned")  # the final shape is the first of these that is there
@@ -130,6 +131,7 @@ def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod
     chosen = dict.fromkeys(rod_chosen, True)
     if chosen and found.rod:
         found = found.changed(rod=found.rod.changed(chosen=chosen))
+    found = found.changed(ends_in_the_air=in_the_air(found))
     return found.changed(verdict=verdict(found))
 
 

@@ -174,7 +174,8 @@ def patches_states(form: PatchedForm) -> States:
     """The states of a form in patches."""
     states = _mesh_states(form.footprint)
     states["draped"] = form.draped
-    states["gap_draped"] = form.target.gap(form.draped).distance
+    gaps = [found.target.gap(found.trimmed.positions).distance for found in form.patches.values()]
+    states["gap_draped"] = np.concatenate(gaps)
     states |= _target_states(form.target, form.draped)
     for ends, shell in form.popped.items():
         states[f"popped_{ends}"] = shell.positions
@@ -429,7 +430,7 @@ def _seam(form: PatchedForm, index: int) -> Seam:
         for meeting in form.meetings
         if meeting.seam == index
     ]
-    return Seam(points=form.seams[index].points.tolist(), meetings=tuple(meetings))
+    return Seam(points=form.cut_along[index].points.tolist(), meetings=tuple(meetings))
 
 
 def _seam_forces(forces: Floats) -> SeamForces:

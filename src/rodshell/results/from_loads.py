@@ -37,6 +37,12 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
             for name, by_ends in checks.shells.items()
         },
         warnings=(*checks.warnings, *results.warnings),
+        self_weight={
+            ends: alone.changed(braced_factor=braced.load_factor, braced_limit=braced.limit)
+            if (braced := checks.self_weight.get(ends)) is not None
+            else alone
+            for ends, alone in results.self_weight.items()
+        },
     )
     late = f"the loads were not checked: {checks.refused}" if checks.refused else checks.stopped
     return found.changed(status=late) if late and found.status == "converged" else found

@@ -1,11 +1,11 @@
-"""What is said of shells that do not carry their own weight, or are not known to, and which rods would carry theirs.
+"""What is said of shells that do not carry their own weight with a reserve, or are not known to, and which rods would.
 
 By similarity: with other rods of the same material the shell has the same shape, its rods bend by the same curvatures,
 and it carries as many times its own weight as EI over the weight has grown, with the square of the radius of gyration.
 That holds where joints have no stiffness of their own: within 4 % on the example roof and a hemisphere.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf, sqrt
 
 from rodshell.results.records import Ends, RodType
@@ -13,54 +13,81 @@ from rodshell.results.records import Section as RodSection
 from rodshell.results.results import Results, SelfWeight
 from rodshell.results.sizes_sold import half_sides, sizes_sold
 from rodshell.results.strength_used import THIN, bent_of, holds_while_erected, strength_name
-from rodshell.results.wording import part_of_weight, percent, rounded, rounded_down, shown_factor
+from rodshell.results.wording import FORM_AGAIN, part_of_weight, percent, rounded, rounded_down, shown_factor
 from rodshell.rods.section import Section, size_text
 
 WITHOUT_STIFFNESS = ("ball", "pin", "rigid")  # joints
-ENOUGH = 1.05  # times its own weight: beyond what similarity is off
-RESERVE = 1.5  # times its own weight: a shell that carries less has none for creep, imperfections or a thin snow
+NOT_KNOWN = ("not followed", "no mass", None)  # limits of which no factor follows
+ENOUGH = 1.05  # of a factor: beyond what similarity is off
+RESERVE = 1.5  # times its own weight that the perfect shell carries: imperfections and supports that yield take a part
+
+
+def reserve(results: Results) -> float:
+    """How many times its own weight a good shell carries: creep divides stiffness by 1 + k_def [EN 1995-1-1, 2.3.2.2].
+
+    Parameters
+    ----------
+    results : with design strengths, where k_def is known.
+    """
+    return RESERVE * (1.0 + ((results.strength.creep if results.strength else None) or 0.0))
+
+
+def falling(results: Results) -> set[Ends]:
+    """The end conditions with which the shell, braced if it is to be, falls under its own weight.
+
+    Parameters
+    ----------
+    results : with the checks of the self-weight.
+    """
+    ends = list(results.self_weight)
+    found = _carried(results, ends)
+    return {end for end in _below(found, 1.0) if found[end].limit not in NOT_KNOWN}
 
 
 def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool]:
-    """What is said of shells that do not carry their own weight, or are not known to; and whether one of them does.
-
-    Of shells with bracing the loads say whether they stand.
+    """What is said of shells that do not carry their own weight with the reserve that is asked for, or are not known
+    to; and whether one of them stands.
 
     Parameters
     ----------
     results : with the checks of the self-weight.
     ends : whose shells are meant.
     """
-    found = {end: results.self_weight[end] for end in ends if end in results.self_weight}
-    parts = light(results, ends)
+    found, said = _carried(results, ends), []
+    parts = _below(found, 1.0)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
-    if is_braced(results):
-        carries = "is known to carry only" if lost & set(parts) else "carries only"
-        weight = _parts(parts, "its own weight")
-        words = f"{_alone(parts)}the shell {carries} {weight} without its bracing: support it until that is in place"
-        return [words] if parts else [], True
-    standing = [end for end, weighed in found.items() if end not in parts and weighed.limit != "no mass"]
+    bracing = " with its bracing" * is_braced(results)
+    if bracing and (bare := light(results, ends)):
+        unknown_above = any(results.self_weight[end].limit == "not followed" for end in bare)
+        carries = "is known to carry only" if unknown_above else "carries only"
+        weight = _parts(bare, "its own weight")
+        said.append(
+            f"{_alone(bare)}the shell {carries} {weight} without its bracing: support it until that is in place"
+        )
+    standing = [end for end, weighed in found.items() if end not in parts and weighed.limit not in (None, "no mass")]
     falling = {end: part for end, part in parts.items() if end not in lost}
     unknown = {end: part for end, part in parts.items() if end in lost}
-    said = []
     if falling:
         others = "".join(f"; with {end} ends it carries {_times(found[end])} its own weight" for end in standing)
         said.append(
-            f"{_alone(falling)}the shell does not stand under its own weight: it carries only {_parts(falling)}"
-            f"{others}{_other_rods(results, falling)}"
+            f"{_alone(falling)}the shell does not stand under its own weight{bracing}: it carries only "
+            f"{_parts(falling)}{others}{_other_rods(results, falling)}"
         )
-    known = {end: found[end].load_factor for end in standing if end not in lost}
-    if known and not results.loads and all(factor is not None and factor < RESERVE for factor in known.values()):
-        weights = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in known)
-        said.append(f"the shell carries only {weights}, with little reserve for creep, imperfections and loads")
+    short = {end: part for end, part in _below(found, reserve(results)).items() if end in standing and end not in lost}
+    if short:
+        weights = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in short)
+        others = "".join(f"; with {end} ends it carries {_times(found[end])}" for end in standing if end not in short)
+        said.append(
+            f"the shell{bracing} carries only {weights}, and {_asked(results)}{others}{_other_rods(results, short)}"
+        )
     if unknown:
         said.append(
-            f"{_alone(unknown)}it is not known whether the shell stands under its own weight: it could be followed "
-            f"only up to {_parts(unknown)}"
+            f"{_alone(unknown)}it is not known whether the shell stands under its own weight{bracing}: it could be "
+            f"followed only up to {_parts(unknown)}"
         )
     said += [
-        f"with {end} ends the shell carries {_times(found[end])} its own weight; above, it could not be followed, and "
-        "nothing is known"
+        f"with {end} ends the shell{bracing} carries {_times(found[end])} its own weight; above, it could not be "
+        "followed, and nothing is known"
         for end in standing
         if end in lost
     ]
@@ -69,9 +96,38 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
             "no mass was given, so that it is not known what share of its own weight the shell carries: give "
             "rod.section.mass"
         )
-    if set(found) != set(ends):
-        said.append("whether it carries its own weight was not checked")
-    return said, bool(standing)
+    if any(end not in found or found[end].limit is None for end in ends):
+        said.append(f"whether it carries its own weight{bracing} was not checked")
+    return said, bool(standing or (bracing and not falling))
+
+
+def _carried(results: Results, ends: Sequence[Ends]) -> dict[Ends, SelfWeight]:
+    """How much of its own weight the shell carries with these ends, with its bracing if it has any."""
+    found = {end: results.self_weight[end] for end in ends if end in results.self_weight}
+    if not is_braced(results):
+        return found
+    return {end: SelfWeight(load_factor=each.braced_factor, limit=each.braced_limit) for end, each in found.items()}
+
+
+def _below(found: Mapping[Ends, SelfWeight], least: float) -> dict[Ends, float]:
+    """Factors on the own weight that are below `least`."""
+    return {
+        end: each.load_factor
+        for end, each in found.items()
+        if each.load_factor is not None and each.load_factor < least
+    }
+
+
+def _asked(results: Results) -> str:
+    """The reserve that is asked for, and what for."""
+    asked, creep = reserve(results), results.strength.creep if results.strength else None
+    if creep:
+        return (
+            f"{rounded(asked)} times are asked for: {RESERVE} for imperfections and supports that yield, "
+            f"{rounded(1 + creep)} times that for creep (k_def)"
+        )
+    creeps = "creep, " * (creep is None)
+    return f"{rounded(asked)} times are asked for, of which {creeps}imperfections and supports that yield take a part"
 
 
 def is_braced(results: Results) -> bool:
@@ -109,37 +165,56 @@ def light(results: Results, ends: list[Ends]) -> dict[Ends, float]:
     results : with the checks of the self-weight.
     ends : whose shells are meant.
     """
-    found = {end: results.self_weight[end].load_factor for end in ends if end in results.self_weight}
-    return {end: factor for end, factor in found.items() if factor is not None and factor < 1}
+    return _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
 
 
 def _other_rods(results: Results, factors: Mapping[Ends, float]) -> str:
-    """Which rods of the same material would carry their own weight: a size that is sold, or rods in proportion.
+    """Which rods of the same material would carry the shell with the reserve: a size that is sold, or in proportion.
 
     Parameters
     ----------
-    factors : on the weight, below 1, that is carried with these ends.
+    factors : on the weight, too low, that is carried with these ends.
     """
-    ends, factor = max(factors.items(), key=lambda pair: pair[1])
     rod, kind = results.rod, (results.joint.kind if results.joint else None) or "ball"
-    if factor <= 0 or rod is None or kind not in WITHOUT_STIFFNESS:
+    factors = {ends: factor for ends, factor in factors.items() if factor > 0}
+    if not factors or rod is None or kind not in WITHOUT_STIFFNESS or is_braced(results):
         return ""
-    for section in () if results.refinement else sizes_sold(rod):  # a refined rod's section varies along it
-        gain, sharper = _gain(rod, section), _sharper(rod, section)
-        if factor * gain >= ENOUGH and not _too_much(results, ends, sharper):
-            return (
-                f"; made of {size_text(section)}, it would carry about {rounded_down(factor * gain)} times its own "
-                f"weight or more with {ends} ends{_share(results, ends, sharper)}"
-            )
-    thicker = sqrt(ENOUGH / factor)
-    rods = f"rods about {rounded(thicker, 2)} times as thick"
-    made = f"; made of {rods}, it would just carry its own weight with {ends} ends, by an estimate"
+    enough = ENOUGH * reserve(results)
+    for ends, factor in sorted(factors.items(), key=lambda pair: pair[1]):
+        for section in () if results.refinement else sizes_sold(rod):  # a refined rod's section varies along it
+            gain, sharper = _gain(rod, section), _sharper(rod, section)
+            if factor * gain >= enough and not _too_much(results, ends, sharper):
+                return (
+                    f"; made of {size_text(section)}, it would carry about {rounded_down(factor * gain)} times its own "
+                    f"weight or more with {ends} ends{_share(results, ends, sharper)}{_again(results, section)}"
+                )
+    ends, factor = max(factors.items(), key=lambda pair: pair[1])
+    thicker = sqrt(enough / factor)
+    made = (
+        f"; made of rods about {rounded(thicker, 2)} times as thick, it would carry {rounded(reserve(results))} times "
+        f"its own weight with {ends} ends, by an estimate"
+    )
     if too_much := _too_much(results, ends, thicker):
         return (
             f"{made}, but they would {too_much}: support it, or take another material; rodshell check finds what "
             "bracing adds"
         )
     return made + _share(results, ends, thicker)
+
+
+def _again(results: Results, section: Section) -> str:
+    """The command that forms the shell with another section."""
+    if results.target is None:
+        return ""
+    now = results.rod.section.kind if results.rod and results.rod.section else None
+    lengths = {
+        key: f'"{rounded(1e3 * value, 4)} mm"'
+        for key, value in section.parameters().items()
+        if isinstance(value, float)
+    }
+    kind = {} if section.parameters()["kind"] == now else {"kind": section.parameters()["kind"]}
+    words = " ".join(f"--rod.section.{key} {value}" for key, value in (kind | lengths).items())
+    return f" ({FORM_AGAIN} {words})"
 
 
 def _gain(rod: RodType, section: Section) -> float:

@@ -140,6 +140,18 @@ class SelfWeight(Record):
     load_factor: Number = key("factor on the weight at which stability is lost; null: above 100, or no mass given")
     deflection: Number = key("largest displacement under the whole weight; null: it does not carry it", "m")
     limit: Text | None = key("limit point, bifurcation, unstable unloaded, none, not followed, or no mass")
+    braced_factor: Number = key("the load_factor of the shell with its bracing and locked joints")
+    braced_limit: Text | None = key("as limit, of the braced shell; absent without bracing")
+
+
+class EndsInTheAir(Record):
+    """Rod ends, those at seams left out, that lie higher than a fiftieth of the size above the lowest one."""
+
+    count: Whole | None = key("number of these ends")
+    highest: Number = key("height of the highest over the lowest end", "m")
+    largest_force: Number = key(
+        "largest force on what holds one of them, of all that were checked; null: none are", "N"
+    )
 
 
 class Stage(Bent):
@@ -322,6 +334,7 @@ class Results(Record, metaclass=_Refusing):
     bending: Bending | None = key("bending and stress")
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[Rows[JointLoad]] = by_ends("what acts at the joints")
+    ends_in_the_air: EndsInTheAir | None = key("rod ends that may not stand on the ground")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
     strength: DesignStrength | None = key("design strengths, by which the rods are judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")

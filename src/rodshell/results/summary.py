@@ -7,7 +7,7 @@ from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.loaded import DesignStrength
 from rodshell.results.own_weight import is_braced
 from rodshell.results.records import Bent, RodType, printable
-from rodshell.results.results import Bending, Results
+from rodshell.results.results import Bending, Results, SelfWeight
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import strength_name
 from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict_of
@@ -83,7 +83,11 @@ def rod_text(rod: RodType) -> str:
     values = material.plain()
     if preset:
         known = rod.preset.plain() if rod.preset else {}
-        changed = [NAMES.get(key, key) for key, value in values.items() if known.get(key, value) != value]
+        changed = [
+            NAMES.get(key, key)
+            for key, value in values.items()
+            if known.get(key, value) != value or (key == "poisson_ratio" and "shear" in known)
+        ]
         return line + (f" ({' and '.join(changed)} not {preset}'s)" if changed else "")
     rubber = [NAMES.get(key, key) for key, value in RUBBER.items() if values.get(key) == value]
     if len(rubber) == len(RUBBER):
@@ -238,6 +242,9 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
         line = f"  weight    {ends:<8}{what}: {share_of_weight(weighed)}{least}"
         if weighed.deflection is not None:
             line += f"; deflection under it: {length(weighed.deflection)}"
+        if weighed.braced_limit is not None:
+            braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
+            line += f"; with bracing: {share_of_weight(braced)}"
         yield line
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"

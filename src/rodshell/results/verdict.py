@@ -8,7 +8,7 @@ not checked, and then the result is not good.
 from collections.abc import Iterable, Iterator, Mapping
 
 from rodshell.results.loaded import LoadedShell
-from rodshell.results.own_weight import light, weight_findings
+from rodshell.results.own_weight import falling, is_braced, light, reserve, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
 from rodshell.results.sizes_sold import thinner_than_sold
@@ -20,7 +20,9 @@ from rodshell.results.strength_used import (
     holds_while_erected,
     strength_name,
 )
+from rodshell.results.supports import air_findings, width
 from rodshell.results.wording import (
+    FORM_AGAIN,
     millimetres,
     percent,
     place,
@@ -51,9 +53,11 @@ def verdict_of(results: Results) -> Verdict:
 def verdict(results: Results) -> Verdict:
     """The verdict on the figures of a result.
 
-    An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
-    enough for their bends. Without one that can be used, or far off the target, the result is unbuildable; unknown if
-    one that might be was not computed: a computation that does not converge says nothing about the shell.
+    An end condition can be used if its shell converged, is stable and carries its own weight, its rods do not touch,
+    hold, and are thin enough for their bends. Without one that can be used, or far off the target, the result is
+    unbuildable; unknown if one that might be was not computed: a computation that does not converge says nothing about
+    the shell. The deployment that is computed is one of several ways to erect the shell: what breaks on it has to be
+    checked, but where rods of the flat grid touch, no way begins.
 
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
@@ -66,13 +70,10 @@ def verdict(results: Results) -> Verdict:
     shells = results.pop_up
     faults = {ends: [*_shell_faults(results, ends)] for ends in shells}
     usable = [ends for ends, found in faults.items() if not found]
-    deployment = [
-        *_fibre_faults(results, "deployment"),
-        *_contact_faults(results, "deployment"),
-    ]
+    deployment = [] if _on_the_way(results) else [*_contact_faults(results, "deployment")]
     lost = [ends for ends, shell in shells.items() if _status(shell) not in (CONVERGED, BUCKLED)]
     in_order = [*(ends for ends in shells if ends not in lost), *lost]  # what is known of a shell comes first
-    grave = [sentence for ends in in_order for sentence in faults[ends]] + deployment
+    grave = [sentence for ends in in_order for sentence in faults[ends]] + deployment + [*_erection(results)]
     if results.target and results.target.flat:
         warned = [word for word in results.warnings if word.startswith(FLAT)]
         return _verdict("unbuildable", warned or [FLAT])
@@ -88,15 +89,17 @@ def verdict(results: Results) -> Verdict:
     gravest = [*lead, *far, *grave] if off > FAR_OFF else [*lead, *grave, *far]
     sinks = _sinks(results, usable)
     to_check = [
-        *gravest, *weight, *sinks, *_loads(results, usable or there), *_open_points(results, usable), *results.warnings
+        *gravest, *weight, *sinks, *_loads(results, usable or there), *air_findings(results),
+        *_open_points(results, usable), *results.warnings,
     ]  # fmt: skip
-    if lost and not usable and not deployment:
+    standing = set(usable) - falling(results)
+    if lost and not standing and not deployment:
         return _verdict("unknown", [*failed, *to_check])
-    if not usable or deployment or off > FAR_OFF:
+    if not standing or deployment or off > FAR_OFF:
         return _verdict("unbuildable", to_check)
     if to_check:
-        return _verdict("check", to_check)
-    return _verdict("good", _merits(results, usable))
+        return _verdict("check", [*to_check, *_perfect(results)])
+    return _verdict("good", [*_merits(results, usable), *_perfect(results)])
 
 
 def unknown_below(results: Results) -> float:
@@ -229,7 +232,7 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
     bent = bent_of(results, shape)
     used, strain = bent.utilisation, bent.max_bending_strain
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
-    if used is not None and used > 1 and not (shape == "deployment" and holds_while_erected(results, used)):
+    if used is not None and used > 1 and not (shape not in ENDS and holds_while_erected(results, used)):
         share = _too_much(used)
         if shape in ENDS and results.rod and "section" in (results.rod.chosen or {}):
             where += ": the section that was chosen is too thick; give a thinner one (rod.section)"
@@ -245,18 +248,29 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
         )
 
 
-def _erection(results: Results, *, thinner: bool) -> Iterator[str]:
-    """Too little safety while the shell is erected as computed; another way may need less.
+def _on_the_way(results: Results) -> bool:
+    """Whether the rods are nearest to each other while the grid is erected, not in the flat grid."""
+    met = results.contact.deployment if results.contact else None
+    return met is not None and (met.share or 0.0) > 0
 
-    thinner : whether thinner rods may be advised.
-    """
-    bent = bent_of(results, "deployment")
+
+def _erection(results: Results) -> Iterator[str]:
+    """What the rods do not withstand on the way that was computed, and other ways, which may spare them."""
+    bent, thinner = bent_of(results, "deployment"), not light(results, list(results.self_weight))
     used = bent.utilisation
+    said = [*_fibre_faults(results, "deployment")]
     if used is not None and used > 1 and holds_while_erected(results, used):
-        yield (
-            f"{_shape('deployment', bent)}, the ends moved evenly, the rods use {_too_much(used)} of "
-            f"{strength_name(results, 'deployment')}: erect it in another way{', or use thinner rods' * thinner}"
+        said.append(
+            f"{_shape('deployment', bent)} the rods use {_too_much(used)} of {strength_name(results, 'deployment')}"
         )
+    if _on_the_way(results):
+        said += _contact_faults(results, "deployment")
+    if said:
+        said[-1] += (
+            "; this is on one way, all ends moved evenly: erect it in another way that is checked, such as rod by rod "
+            f"over a scaffold, lifted at its middle, or one family's ends first{', or use thinner rods' * thinner}"
+        )
+    yield from said
 
 
 def _shape(shape: str, found: WorstBent | Clearance) -> str:
@@ -316,7 +330,6 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
         yield "whether the shell is stable was not checked"
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
-    yield from _erection(results, thinner=not light(results, usable))
     yield from _rods(results, usable)
     if results.target and not set(usable) <= set(results.agreement):
         yield "the gap to the target was not checked"
@@ -377,7 +390,7 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
     if results.rod and (thin := thinner_than_sold(results.rod)):
         yield f"the chosen section is {thin}: have it made, or choose another material or a larger target"
     if results.bending is None or results.bending.strength is None:
-        if _width(results) > LARGE:
+        if width(results) > LARGE:
             yield "no strength was given, so it is not known whether the rods hold (checks.strength)"
         return
     name = results.bending.strength_of
@@ -421,34 +434,43 @@ def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[str]:
             )
 
 
-def _width(results: Results) -> float:
-    """Longest side in plan [m] of what the shell stands on."""
-    columns = [[point[axis] for point in results.boundary] for axis in (0, 1)]
-    known = [[value for value in column if value is not None] for column in columns]
-    return max((max(column) - min(column) for column in known if column), default=0.0)
-
-
 def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
     """Why a result is good."""
-    borne = [results.self_weight[ends].load_factor for ends in usable]
+    braced = is_braced(results)
+    weighed = [results.self_weight[ends] for ends in usable]
+    borne = [each.braced_factor if braced else each.load_factor for each in weighed]
     least = min((factor for factor in borne if factor is not None), default=None)
     weight = "at least " * (least is not None and len(usable) > 1) + shown_factor(least)
-    best = _best(results, usable)
-    near = (
-        f"; with {best[0]} ends the gap to the target is at most {percent(best[1].max_relative)} of its size"
-        if best
-        else ""
+    gaps = [
+        f"{percent(gap.max_relative)} with {ends} ends"
+        for ends in usable
+        if (gap := results.agreement.get(ends)) and gap.max_relative is not None
+    ]
+    near = f"; the gap to the target is at most {' and '.join(gaps)}, of its size" if gaps else ""
+    yield (
+        f"with {' and '.join(usable)} ends the shell{' with its bracing' * braced} is stable and carries {weight} "
+        f"times its own weight, {rounded(reserve(results))} being asked for{near}"
     )
-    yield f"with {' and '.join(usable)} ends the shell is stable and carries {weight} times its own weight{near}"
     if not results.loads:
+        known = results.strength is not None and results.strength.creep is not None
         yield (
             "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
             "people) and imperfections were not checked"
+            f"{'' if known else ', nor creep, which is not known of these rods'}"
         )
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)
         yield f"under {name} it is stable up to {shown_factor(least)} times these loads"
+
+
+def _perfect(results: Results) -> Iterator[str]:
+    """That factors under loads are those of the perfect shell."""
+    if any(found.imperfect_kind is None for by_ends in results.loads.values() for found in by_ends.values()):
+        yield (
+            "imperfections were not looked at, and the factors on the loads are those of the perfect shell: have them "
+            f'looked at ({FORM_AGAIN} --stability.imperfection "span/500")'
+        )
 
 
 def _mm(results: Results, metres: float | None) -> str:

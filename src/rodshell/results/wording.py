@@ -12,6 +12,8 @@ from rodshell.results.results import Results, SelfWeight
 from rodshell.units import percent_text, stress_text
 
 FINEST, COARSEST = 1e-3, 1.0  # mm
+FORM, CASE = "rodshell form", "case.toml"
+FORM_AGAIN = f"{FORM} {CASE}"  # for the folder of a result, which holds this case
 OF_ROD = 1e-4  # share of the longest rod to which lengths are shown where no tolerance is given
 
 

@@ -36,7 +36,9 @@ class RodSupports:
     along : node -> orthonormal directions along which alone it is free.
     tangents : clamped end -> tangent (3,) along the rod there.
     directors : clamped end -> first material director m1 (3,) there; its part across the tangent is used.
-    turns : clamped end -> how far it turns about its tangent [rad], on top of that; more than once around if so given.
+    turns : clamped end -> how far it is turned about its tangent in all [rad], more than once around if so given: from
+        the director, if one is given, or from where it has no twist angle, as it was built; the same again turns no
+        further.
     spinning : clamped ends that hold position and direction but let the rod spin.
     angles : edge -> twist angle that it is held at [rad].
     """
@@ -207,11 +209,11 @@ class _TurningClamp:
         side = unit(then - dot(now, then) * now) if angle > 1e-12 else np.zeros(3)
         if end in wanted.directors or end in wanted.turns:
             block = int(rod.ghost_angles[k])
-            turn = finite(f'the turn of the "{end}"', wanted.turns.get(end, 0.0))
-            theta = float(state[block, 0] + turn)
+            before = 0.0 if end in wanted.turns else state[block, 0]  # turns in all, or on from there
+            theta = float(before + finite(f'the turn of the "{end}"', wanted.turns.get(end, 0.0)))
             if end in wanted.directors:
                 d1 = rod.reference_directors(state)[rod.edge_count + k]
-                m1 = np.cos(state[block, 0]) * d1 + np.sin(state[block, 0]) * cross(now, d1)
+                m1 = np.cos(before) * d1 + np.sin(before) * cross(now, d1)
                 transported = parallel_transport(m1, now, then)
                 given = direction(f'the director at the "{end}"', wanted.directors[end])
                 theta += float(signed_angle(transported, adapted(given, then), then))

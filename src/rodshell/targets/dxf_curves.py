@@ -1,4 +1,4 @@
-"""A separate program that reads the curves of a DXF drawing with ezdxf; see `apart` and `mesh_files.read_curves`."""
+"""A separate program that reads the curves of a DXF drawing with ezdxf; see `apart` and `curve_files.read_curves`."""
 
 from typing import Any
 

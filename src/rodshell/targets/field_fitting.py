@@ -21,7 +21,7 @@ SAME_SIDE = 0.3  # cosine between normals: points of another sheet of the surfac
 RIDGE = 1e-7  # of the sum of weights: keeps the least squares regular where points are few
 
 # how near
-CLOSE = 5e-4  # of the size: where a vertex is further off, more cubics are tried
+CLOSE = 1e-4  # of the size: where a vertex is further off, more cubics are tried
 GAIN = 0.75  # of that distance: more cubics are taken where it becomes less; noise of a mesh leaves more than 0.8
 OFF = 0.005  # of the size: where a vertex is further off than that, the field does not follow the mesh
 ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there

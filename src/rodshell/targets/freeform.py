@@ -1,7 +1,7 @@
 """A target given by a surface in triangles: its smooth field, where the shell ends, and its highest point."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.targets.creases import Creases
 from rodshell.targets.field_fitting import OFF, Fit, fit_mesh
 from rodshell.targets.rim import UPRIGHT, Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
@@ -46,6 +47,9 @@ class Freeform(Target):
     curves : closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
     source : kind, file and options, as they are written in a case file.
     repairs : what was changed in the mesh, in sentences.
+    whole : the mesh with what is beyond its creases; None: it has none.
+    creased : what is said of its creases.
+    usable : False: the whole is not a smooth surface, and must be cut along its creases by seams.
     """
 
     surface: TriangleMesh
@@ -53,6 +57,9 @@ class Freeform(Target):
     curves: tuple[Floats, ...] = ()
     source: Mapping[str, object] = field(default_factory=dict)
     repairs: tuple[str, ...] = ()
+    whole: TriangleMesh | None = None
+    creased: str = ""
+    usable: bool = True
 
     @staticmethod
     def of(
@@ -86,15 +93,47 @@ class Freeform(Target):
         faces = array("faces", faces, np.intp, None, 3)
         base = None if base is None else number("target base", base, "m")
         curves = tuple(array("a boundary curve", curve, np.float64, None, 3) for curve in curves)
-        surface, repairs = sound_mesh(vertices, faces, name)
+        found = sound_mesh(vertices, faces, name)
         made = {"kind": "mesh", "vertices": len(vertices), "faces": len(faces)}
         target = Freeform(
-            surface=surface, base=base, curves=curves, source=dict(source or made),
-            repairs=(*notes, *repairs),
+            surface=found.surface, base=base, curves=curves, source=dict(source or made),
+            repairs=(*notes, *found.repairs), whole=found.whole, creased=found.creased, usable=found.smooth,
         )  # fmt: skip
-        target._require_an_end(name)
-        target._require_a_good_fit(name)
+        if not target.usable:
+            if not target.along_creases:
+                raise InputError(target.creased)
+            return target
+        try:
+            target._require_an_end(name)
+            target.require_a_good_fit(name)
+        except InputError as reason:
+            if not target.along_creases:
+                raise
+            return replace(target, creased=str(reason), usable=False)
         return target
+
+    @cached_property
+    def creases(self) -> Creases:
+        """Those of the whole mesh."""
+        return Creases(self.whole or self.surface, self.name)
+
+    @cached_property
+    def along_creases(self) -> str:
+        """What to do about its creases, where seams can lie along them; else ""."""
+        lines = " | ".join("; ".join(f"{x:.4g},{y:.4g}" for x, y in line.tolist()) for line in self.creases.lines())
+        return (
+            lines and f': to form it in patches that meet there, lay seams along its creases, --seams.lines "{lines}"'
+        )
+
+    def require_usable(self) -> None:
+        """Refuse a mesh that no seams cut along its creases, where it is smooth nowhere else.
+
+        Raises
+        ------
+        InputError : names seams that would.
+        """
+        if not self.usable:
+            raise InputError(self.creased + self.along_creases)
 
     @property
     def name(self) -> str:
@@ -104,7 +143,8 @@ class Freeform(Target):
     @property
     def warnings(self) -> tuple[str, ...]:
         ends, moved = self._open_ends
-        words, names = list(self.repairs), ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
+        words = [*self.repairs, self.creased + self.along_creases] if self.creased else list(self.repairs)
+        names = ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
         offs = [rim.off for rim in self.rims]
         offs[-1:] = [max([off, *map(self._off, filter(self._is_in_space, self.curves))]) for off in offs[-1:]]
         words += [
@@ -141,6 +181,7 @@ class Freeform(Target):
 
     @cached_property
     def _fitted(self) -> Fit:
+        self.require_usable()
         return fit_mesh(self.surface, size=self._extent)
 
     @property
@@ -162,7 +203,11 @@ class Freeform(Target):
 
     def covers(self, x: Floats) -> Bools:
         """Whether points `x` (n, 3) of the surface are inside the end, or where an opening was filled."""
-        return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted.cubics)
+        return (self.margin(x) > 0) | self._filled(x)
+
+    def _filled(self, x: Floats) -> Bools:
+        """Whether points (n, 3) of the surface are among its own, with its openings filled, and not past its edge."""
+        return self.field.nearest(x)[1] < self._fitted.cubics
 
     @cached_property
     def rims(self) -> tuple[Rim, ...]:
@@ -368,15 +413,11 @@ class Freeform(Target):
             off = self._off(self._over(curve))
             if not off < ASIDE * self._extent:
                 raise InputError(f"the boundary curve is up to {off:.3g} m away from {name}: draw it on the surface")
-        if not (self.margin(self.surface.vertices) > 0).any():
-            if len(np.unique(np.concatenate([[], *self.surface.loops]))) == len(self.surface.vertices):
-                raise InputError(
-                    f"no vertex of {name} is inside its edge (creases of more than 40 degrees are edges too): mesh it "
-                    "more finely, or round its creases"
-                )
+        x = self.surface.vertices
+        if not (self.margin(np.vstack([x, x[self.surface.faces].mean(axis=1)])) > 0).any():
             raise InputError(f"no part of {name} is inside its boundary: choose a lower base or another boundary")
 
-    def _require_a_good_fit(self, name: str) -> None:
+    def require_a_good_fit(self, name: str) -> None:
         """Refuse a mesh that its smooth field does not follow, as it is rough or two of its sheets are too close."""
         off, x = self._fitted.off, self.surface.vertices
         k = int(np.argmax(off))

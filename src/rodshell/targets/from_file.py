@@ -14,6 +14,7 @@ from scipy.linalg import solveh_banded
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.targets.apart import cause
+from rodshell.targets.curve_files import read_curves
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.mesh_files import (
     IN_METRES,
@@ -21,7 +22,6 @@ from rodshell.targets.mesh_files import (
     MOST_HEIGHTS,
     file_bytes,
     in_metres,
-    read_curves,
     read_mesh,
     require_few_heights,
     require_size,
@@ -348,8 +348,8 @@ def surface_from(
     name : object name, if the file has several (3dm: object or layer name; STEP: name of a face, shell or solid, or
         the number of a face).
     base : z of a plane below which there is no shell [m], after placement; None for a surface that ends at its edge.
-    boundary : path of an OBJ or DXF file with closed curves on the surface, in the same unit and placed with it: the
-        longest bounds the shell, the others are openings.
+    boundary : path of an OBJ, DXF or 3dm file with closed curves on the surface, in the same unit, unless a 3dm file
+        states its own, and placed with it: the longest bounds the shell, the others are openings.
     placement : scales, turns and moves the surface.
 
     Raises

@@ -1,4 +1,4 @@
-"""Meshes and curves in files: OBJ, STL, PLY, OFF, glTF; polylines of OBJ and DXF."""
+"""Meshes in files: OBJ, STL, PLY, OFF, glTF."""
 
 import codecs
 import io
@@ -12,19 +12,17 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.curves import closed_loops, join_end_to_end
-from rodshell.targets.apart import read_apart, unreadable
+from rodshell.targets.apart import unreadable
 from rodshell.targets.gltf import gltf_counts, gltf_parts
 from rodshell.targets.polygon_files import obj_content, off_content, ply_content
 from rodshell.targets.polygons import Polygons
-from rodshell.targets.trianglemesh import FARTHEST, MOST_FACES, require_indices
+from rodshell.targets.trianglemesh import MOST_FACES, require_indices
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised, read_bytes
 
 Content = TypeVar("Content")
 Notes = tuple[str, ...]
 
-CURVE_FILES = (".obj", ".dxf")
 MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
 IN_METRES = (".glb", ".gltf")  # the standard of these formats fixes the unit
 LARGEST_FILE = 300e6  # bytes
@@ -34,8 +32,6 @@ HEAD = 4000  # bytes that hold the header
 MOST_HEIGHTS = MOST_FACES // 2
 MOST_PARTS = 500  # nodes, solids, properties: readers need time for each pair of them
 NAMES = 20  # of a file's objects that a message lists
-MOST_STROKES = 5_000  # curves of a drawing: they are joined end to end
-SAG = 2e-5  # of a curve's extent: how finely arcs and splines of a DXF are divided
 
 
 def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = None) -> tuple[Floats, Ints, Notes]:
@@ -173,7 +169,7 @@ def _require_bounds(path: Path, data: bytes) -> None:
 
 
 def _of_obj(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
-    faces, _, named = _read(path, "OBJ", lambda: obj_content(recoded(data)))
+    faces, _, named = read_with(path, "OBJ", lambda: obj_content(recoded(data)))
     if not data.endswith((b"\n", b"\r", b"\n\0")) and len(faces.points) - 1 not in faces.corners:
         raise InputError(  # it is written in the order of its vertices
             f"{path} seems to be truncated: its last line is not complete, and faces are missing: export it again"
@@ -187,11 +183,11 @@ def _of_obj(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
 
 
 def _of_off(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
-    return _whole(path, name, *_read(path, "OFF", lambda: off_content(recoded(data))))
+    return _whole(path, name, *read_with(path, "OFF", lambda: off_content(recoded(data))))
 
 
 def _of_ply(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
-    return _whole(path, name, *_read(path, "PLY", lambda: ply_content(data)))
+    return _whole(path, name, *read_with(path, "PLY", lambda: ply_content(data)))
 
 
 def _whole(path: Path, name: str | None, faces: Polygons, announced: dict[str, int]) -> tuple[Floats, Ints]:
@@ -225,7 +221,7 @@ def _of_scene(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
                 found[str(geometry)] = (x, np.asarray(mesh.faces, dtype=np.intp))
         return found
 
-    meshes = _read(path, kind.upper(), scene)
+    meshes = read_with(path, kind.upper(), scene)
     for vertices, faces in meshes.values():
         require_indices(vertices, faces, str(path))
     chosen = list(meshes.values()) if name is None else [_named(path, name, meshes)]
@@ -237,8 +233,19 @@ def _of_scene(path: Path, data: bytes, name: str | None) -> tuple[Floats, Ints]:
 _TRIANGLES = {".obj": _of_obj, ".off": _of_off, ".ply": _of_ply}
 
 
-def _read(path: Path, format: str, reader: Callable[[], Content]) -> Content:
-    """What a reader finds; a damaged file can break it anywhere."""
+def read_with(path: Path, format: str, reader: Callable[[], Content]) -> Content:
+    """What a reader finds; a damaged file can break it anywhere.
+
+    Parameters
+    ----------
+    path : of the file, for messages.
+    format : as it is called in messages.
+    reader : of the file's content.
+
+    Raises
+    ------
+    InputError : the reader fails.
+    """
     try:
         with np.errstate(all="ignore"):  # values that are not finite are refused later, with their place
             return reader()
@@ -255,87 +262,3 @@ def _named(path: Path, name: str, parts: Mapping[str, Content]) -> Content:
         known = f"it has {known}" if parts else "none in it has a name"
         raise InputError(f"{path} has no object named {shown(name)}: {known}")
     return parts[name]
-
-
-def read_curves(path: Path, unit: float) -> list[Floats]:
-    """Read closed curves from an OBJ or DXF file.
-
-    Parameters
-    ----------
-    path : of the file.
-    unit : length of the file's unit [m].
-
-    Returns
-    -------
-    Closed polylines (n, 3) [m], the longest first: the edge of the shell, then its openings.
-
-    Raises
-    ------
-    InputError : the file is missing or damaged, or has no closed curve.
-    """
-    loops = closed_loops(_strokes(path, unit))
-    if not loops or not all(np.isfinite(loop).all() for loop in loops):
-        raise InputError(f"{path} has no closed curve with finite coordinates: draw one polyline around the shell")
-    return loops
-
-
-def read_lines(path: Path, unit: float) -> list[Floats]:
-    """Read open and closed curves from an OBJ or DXF file; those that touch end to end are joined.
-
-    Parameters
-    ----------
-    path : of the file.
-    unit : length of the file's unit [m].
-
-    Returns
-    -------
-    Polylines (n, 3) [m].
-
-    Raises
-    ------
-    InputError : the file is missing or damaged, or has no curve.
-    """
-    lines = join_end_to_end(_strokes(path, unit))
-    if not lines or not all(np.isfinite(line).all() for line in lines):
-        raise InputError(f"{path} has no line with finite coordinates: draw a polyline along each seam")
-    return lines
-
-
-def _strokes(path: Path, unit: float) -> list[Floats]:
-    """Polylines (n, 3) [m] in the order of the file."""
-    data = file_bytes(path)
-    if path.suffix.lower() not in CURVE_FILES:
-        raise InputError(f"{path}: curves are read from {' or '.join(CURVE_FILES)} files")
-    strokes = _of_dxf(path, data, FARTHEST / unit) if path.suffix.lower() == ".dxf" else _lines_of_obj(path, data)
-    far = max((float(np.abs(stroke).max()) * unit for stroke in strokes if len(stroke)), default=0.0)
-    _require_near(path, far)
-    return [stroke * unit for stroke in strokes if len(stroke) > 1]
-
-
-def _require_few_strokes(path: Path, count: int) -> None:
-    if count > limit(MOST_STROKES):
-        raise InputError(
-            f"{path} has {count} curves, and at most {limit(MOST_STROKES):.0f} are read: draw one polyline around the "
-            f"shell, {raised(MOST_STROKES, count)}"
-        )
-
-
-def _require_near(path: Path, far: float) -> None:
-    if not far <= FARTHEST:
-        raise InputError(f"{path} has curves with coordinates up to {far:.3g} m: draw them near the origin")
-
-
-def _lines_of_obj(path: Path, data: bytes) -> list[Floats]:
-    """The `l` elements of an OBJ."""
-    content = _read(path, "a drawing of curves", lambda: obj_content(recoded(data)))
-    _require_few_strokes(path, len(content.lines))
-    return _read(path, "a drawing of curves", lambda: [content.polygons.points[line] for line in content.lines])
-
-
-def _of_dxf(path: Path, data: bytes, farthest: float) -> list[Floats]:
-    request = {"sag": SAG, "most": limit(MOST_STROKES), "farthest": farthest}
-    found = read_apart(Path(__file__).with_name("dxf_curves.py"), path, data, "a drawing of curves", **request)
-    _require_few_strokes(path, int(found["count"]))
-    if "points" not in found:
-        _require_near(path, float(found["far"]) * FARTHEST / farthest)
-    return np.split(found["points"], found["ends"][1:-1])

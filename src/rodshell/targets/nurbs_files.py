@@ -5,6 +5,7 @@ import re
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -129,12 +130,7 @@ def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Fl
     ------
     InputError : the file is missing or damaged; rhino3dm is not installed; the file has no such face, or several.
     """
-    if find_spec("rhino3dm") is None:
-        raise InputError(f'{path}: 3dm files need rhino3dm: pip install "rodshell[rhino]"')
-    request = {"name": name, "along_edges": ALONG_EDGES}
-    found = read_apart(READERS / "opennurbs.py", path, file_bytes(path), "3DM", **request)
-    if not found:
-        raise InputError(f"{path} cannot be read as 3DM: save it again from Rhino")
+    found = rhino_content(path, file_bytes(path), name=name)
     if "controls" not in found:
         raise _no_single_surface(path, json.loads(str(found["names"])), name)
     # OpenNURBS omits the first and the last knot
@@ -143,6 +139,27 @@ def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Fl
     if surface.fault:
         raise InputError(f"{path} is damaged: {surface.fault}: save it again from Rhino")
     return *surface.triangles(), closed_loops(found["trims"]), RHINO_UNITS.get(str(found["unit"]))
+
+
+def rhino_content(path: Path, data: bytes, **request: object) -> dict[str, Any]:
+    """What `opennurbs` finds in a 3dm file.
+
+    Parameters
+    ----------
+    path : of the file, for messages.
+    data : its content.
+    request : the `name` of a surface; or the `most` curves that are read.
+
+    Raises
+    ------
+    InputError : the file is damaged; rhino3dm is not installed.
+    """
+    if find_spec("rhino3dm") is None:
+        raise InputError(f'{path}: 3dm files need rhino3dm: pip install "rodshell[rhino]"')
+    found = read_apart(READERS / "opennurbs.py", path, data, "3DM", along_edges=ALONG_EDGES, **request)
+    if not found:
+        raise InputError(f"{path} cannot be read as 3DM: save it again from Rhino")
+    return found
 
 
 def _no_single_surface(path: Path, surfaces: list[tuple[str, str, int]], name: str | None) -> InputError:

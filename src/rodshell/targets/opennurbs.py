@@ -1,4 +1,4 @@
-"""A separate program that reads a surface of a 3dm file with OpenNURBS; see `apart` and `nurbs_files.read_3dm`."""
+"""A separate program that reads a surface or curves of a 3dm file with OpenNURBS; see `nurbs_files.rhino_content`."""
 
 import json
 from pathlib import Path
@@ -6,27 +6,37 @@ from typing import Any
 
 import numpy as np
 
+FEWEST = 8  # pieces of each span of a curve
+
 
 def main(request: dict[str, Any]) -> dict[str, Any]:
-    """The surfaces of a file, and the one that is wanted.
+    """The surfaces of a file, and the one that is wanted; or its curves.
 
     Parameters
     ----------
-    request : `path`; `name` of an object or a layer, or None; `along_edges`, the pieces of each trimming edge.
+    request : `path`; `along_edges`, the pieces of each edge or curve; and `name` of an object or a layer, or None, or
+        `most`, curves.
 
     Returns
     -------
     `unit`, by its name, and `names` (JSON: object, layer and number of faces of each surface); nothing for another
     kind of file. If one surface with one face matches, also `degrees` (2,), `knots_u` and `knots_v` without the first
     and the last, `controls` (m, n, 4) and `trims` (k, along_edges + 1, 3), the curves that bound it.
+
+    Of curves `unit` and their `count`; if it is not above `most`, `points` and `ends` as `dxf_curves` returns them.
     """
     import rhino3dm
 
     model = rhino3dm.File3dm.FromByteArray(Path(request["path"]).read_bytes())  # type: ignore[arg-type]
     if model is None:
         return {}
-    surfaces = list(surfaces_of(model))
     found: dict[str, Any] = {"unit": model.Settings.ModelUnitSystem.name}
+    if "most" in request:
+        curves = curves_of(model)
+        drawn = [divided(curve, request["along_edges"]) for curve in curves[: int(request["most"])]]
+        ends = np.cumsum([0, *map(len, drawn)])
+        return found | {"count": len(curves), "points": np.vstack([np.empty((0, 3)), *drawn]), "ends": ends}
+    surfaces = list(surfaces_of(model))
     found["names"] = json.dumps([names for *names, _ in surfaces])
     wanted = [(shape, faces) for name, layer, faces, shape in surfaces if request["name"] in (None, name, layer)]
     if len(wanted) == 1 and wanted[0][1] == 1:
@@ -35,6 +45,13 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
         trims = [] if whole is shape or shape.IsSurface else trims_of(shape, request["along_edges"])
         found |= nurbs_of(whole) | {"trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
     return found
+
+
+def curves_of(model: Any) -> list[Any]:
+    """Every curve object."""
+    import rhino3dm
+
+    return [item.Geometry for item in model.Objects if isinstance(item.Geometry, rhino3dm.Curve)]
 
 
 def surfaces_of(model: Any) -> Any:
@@ -66,6 +83,15 @@ def trims_of(brep: Any, pieces: int) -> list[Any]:
     loops = brep.Faces[0].Loops
     edges = [trim.EdgeIndex for loop in (loops[k] for k in range(len(loops))) for trim in loop.Trims]
     return [polyline(brep.Edges[k], pieces) for k in edges if k >= 0 and edges.count(k) == 1]
+
+
+def divided(curve: Any, pieces: int) -> list[tuple[float, float, float]]:
+    """Points of any curve: its corners where it is straight between them, else about `pieces` or more."""
+    form = curve.ToNurbsCurve()
+    knots = np.unique(list(form.Knots))
+    share = np.linspace(0.0, 1.0, 2 if form.Degree == 1 else max(pieces // (len(knots) - 1), FEWEST) + 1)[1:]
+    t = np.append(knots[:1], knots[:-1, None] + np.diff(knots)[:, None] * share)
+    return [(p.X, p.Y, p.Z) for p in map(form.PointAt, t.tolist())]
 
 
 def polyline(curve: Any, pieces: int) -> list[tuple[float, float, float]]:

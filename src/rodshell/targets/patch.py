@@ -12,6 +12,7 @@ from rodshell.geometry.frames import unit
 from rodshell.targets.target import Gap, Implicit, Target
 from rodshell.validation import LARGEST, short
 
+ON_CREST = 1e-4  # of its length: points this close to a crease in plan are on it
 BEYOND = 1e3  # lengths of an open seam by which its two ends are prolonged
 
 
@@ -24,9 +25,11 @@ class Seam:
     Parameters
     ----------
     points : (n, 2) [m].
+    crests : fine polylines (k, 3) on the parts of it that are creases [m].
     """
 
     points: Floats
+    crests: tuple[Floats, ...] = ()
 
     @staticmethod
     def of(points: ArrayLike) -> "Seam":
@@ -97,32 +100,58 @@ class Seam:
         side = left[before] + left[after]  # at a corner the mean of both sides decides
         return np.asarray(np.copysign(np.linalg.norm(off, axis=1), np.einsum("ni,ni->n", off, side)))
 
+    def along(self, x: Floats) -> tuple[Floats, Floats]:
+        """Arc length (n,) [m] of the seam's points closest to points `x` (n, 2 or 3), and unit tangents (n, 2) there.
+
+        It is counted from the seam's second point, or from the first of a closed one.
+        """
+        edge = np.diff(self._corners, axis=0)
+        length = np.linalg.norm(edge, axis=1)
+        begin = np.cumsum(length) - length - (0.0 if self.closed else length[0])
+        k, share, _ = self._nearest(x)
+        return np.asarray(begin[k] + share * length[k]), np.asarray(edge[k] / length[k, None])
+
+    def height(self, x: Floats) -> Floats:
+        """z (n,) [m] of the crease over points `x` (n, 2 or 3) of the seam; NaN where it runs along none."""
+        z = np.full(len(x), np.nan)
+        for crest in self.crests:
+            k, share, off = nearest(crest[:, :2], x)
+            here = np.linalg.norm(off, axis=1) < ON_CREST * np.linalg.norm(np.ptp(crest, axis=0))
+            z[here] = (crest[k, 2] + share * (crest[k + 1, 2] - crest[k, 2]))[here]
+        return z
+
     def _nearest(self, x: Floats) -> tuple[Ints, Floats, Floats]:
-        """Of each point (n, 2 or 3): nearest edge, its fraction before the closest point, the vector from there."""
-        start, edge = self._corners[:-1], np.diff(self._corners, axis=0)
-        off = x[:, None, :2] - start
-        share = np.clip(np.einsum("nki,ki->nk", off, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)
-        off = off - share[..., None] * edge
-        k = np.argmin(np.einsum("nki,nki->nk", off, off), axis=1)
-        row = np.arange(len(x))
-        return k, share[row, k], off[row, k]
+        return nearest(self._corners, x)
+
+
+def nearest(line: Floats, x: Floats) -> tuple[Ints, Floats, Floats]:
+    """Of each point (n, 2 or 3): nearest edge of a polyline (m, 2), its fraction before the closest point, the vector
+    (n, 2) from there."""
+    start, edge = line[:-1], np.diff(line, axis=0)
+    off = x[:, None, :2] - start
+    share = np.clip(np.einsum("nki,ki->nk", off, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)
+    off = off - share[..., None] * edge
+    k = np.argmin(np.einsum("nki,nki->nk", off, off), axis=1)
+    row = np.arange(len(x))
+    return k, share[row, k], off[row, k]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Patch(Target):
     """A part of a target: the points on given sides of its seams.
 
-    Past a seam the surface is continued by the rest of the whole target.
-
     Parameters
     ----------
     whole : the target.
+    surface : the target that has the patch's surface, and continues it past a seam: the whole; or where that is creased
+        along a seam, the smooth piece of it on this side.
     seams : that bound the patch.
     sides : for each seam 1 if the patch is on its left, -1 if it is on its right.
     middle : x, y of a point well inside [m], the default of the anchor.
     """
 
     whole: Target
+    surface: Target
     seams: tuple[Seam, ...]
     sides: tuple[int, ...]
     middle: tuple[float, float]
@@ -157,7 +186,8 @@ class Patch(Target):
         return np.asarray(np.min([self.whole.margin(x), *apart], axis=0))
 
     def on_seam(self, x: Floats, seam: int) -> Floats:
-        """The common point (3,) [m] of the surface and a seam that is closest to `x` (3,), a point near both."""
+        """The common point (3,) [m] of the surface and a seam that is closest to `x` (3,), a point near both; where the
+        seam runs along a crease the crease's."""
         for _ in range(12):
             value, gradient = self.level(x[None])
             rows = np.vstack([gradient, self._aside(x, seam)])
@@ -166,7 +196,8 @@ class Patch(Target):
             x = x + step
             if np.linalg.norm(step) <= 1e-15 * self.size:
                 break
-        return x
+        z = self.seams[seam].height(x[None])[0]
+        return np.append(x[:2], z) if np.isfinite(z) else x
 
     def across(self, x: Floats, seam: int) -> Floats:
         """Unit tangent (3,) of the surface at right angles to a seam, at a point `x` (3,) of both."""
@@ -182,22 +213,22 @@ class Patch(Target):
         return self.whole.covers(x)
 
     def implicit(self, x: Floats) -> Implicit:
-        return self.whole.implicit(x)
+        return self.surface.implicit(x)
 
     def level(self, x: Floats) -> tuple[Floats, Floats]:
-        return self.whole.level(x)
+        return self.surface.level(x)
 
     def height_at(self, xy: Floats) -> Floats:
-        return self.whole.height_at(xy)
+        return self.surface.height_at(xy)
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
-        return self.whole.retract(x, steps)
+        return self.surface.retract(x, steps)
 
     def on_surface(self, x: Floats) -> Gap:
-        return self.whole.on_surface(x)
+        return self.surface.on_surface(x)
 
     def closest(self, x: Floats) -> Floats:
-        return self.whole.closest(x)
+        return self.surface.closest(x)
 
     def gap(self, x: Floats) -> Gap:
-        return self.whole.gap(x)
+        return self.surface.gap(x)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, degrees, radians
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -10,12 +11,13 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from rodshell.arrays import Bools, Floats, Ints, Longs
 from rodshell.errors import InputError
-from rodshell.geometry.frames import cross, dot
+from rodshell.geometry.frames import cross, dot, unit
 
 CREASE = 40.0  # degrees between faces, and between what is on either side: a smooth piece ends there
 STRAY = 0.01  # of the area: separate pieces with less in sum are left out
 WELD = 1e-6  # of the largest extent: vertices this close are merged; single precision has 1e-7
 SPOILT = 0.7  # least cosine between a vertex's normal and the mean of the faces around it
+SWEEPS = 8  # by which normals at the rim are corrected, each by half
 MOST_FACES = 3_000_000
 FARTHEST = 1e9  # m: coordinates that are still known to a micrometre
 
@@ -63,13 +65,39 @@ class TriangleMesh:
         np.add.at(mean, self.faces, self.doubled[:, None])
         np.add.at(wide, self.faces, mean[self.faces].sum(axis=1)[:, None])
         result = np.where((_cosine(result, wide) < SPOILT)[:, None], wide, result)
-        return np.asarray(result / np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None])
+        result /= np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None]
+        return self._with_rim_normals(result)
+
+    def _with_rim_normals(self, normals: Floats) -> Floats:
+        """Normals (n, 3) of the vertices, those at the rim corrected, as faces on one side only miss them.
+
+        Along each edge of an arc, and of any parabola, the slopes at both ends are opposite against its chord.
+        """
+        rim = np.zeros(len(self.vertices), dtype=bool)
+        a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        rim[a[edge_counts(a, b, len(rim)) == 1]] = True
+        here, there = np.append(a, b), np.append(b, a)
+        here, there = here[rim[here]], there[rim[here]]
+        if not len(here):
+            return normals
+        along = unit(self.vertices[there] - self.vertices[here])
+        for _ in range(SWEEPS):
+            flat = along - dot(along, normals[here])[:, None] * normals[here]
+            off = 0.5 * dot(normals[here] + normals[there], along)
+            square, known = np.zeros((len(normals), 3, 3)), np.zeros_like(normals)
+            np.add.at(square, here, flat[:, :, None] * flat[:, None, :])
+            np.add.at(known, here, off[:, None] * flat)
+            at = np.flatnonzero(rim)
+            across = normals[at][:, :, None] * normals[at][:, None, :]
+            turn = np.linalg.solve(square[at] + across + 1e-3 * np.eye(3), known[at][..., None])[..., 0]
+            normals[at] = unit(normals[at] - turn)
+        return normals
 
     @cached_property
     def loops(self) -> list[Ints]:
         """The open boundary: vertices of each closed loop, the longest first; the surface is on their left."""
         a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
-        count = _edge_counts(a, b, len(self.vertices))
+        count = edge_counts(a, b, len(self.vertices))
         after = dict(zip(a[count == 1].tolist(), b[count == 1].tolist(), strict=True))
         loops = list[Ints]()
         while after:
@@ -115,7 +143,26 @@ class TriangleMesh:
         return TriangleMesh(self.vertices[used], renumbered.reshape(-1, 3).astype(np.intp))
 
 
-def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, list[str]]:
+class SoundMesh(NamedTuple):
+    """A mesh that was checked and repaired.
+
+    Parameters
+    ----------
+    surface : the smooth piece of it that covers most of the plan, facing up; the whole where there is none.
+    repairs : what was changed, in sentences.
+    whole : all of it between and beyond its creases, oriented alike.
+    creased : what is said of its creases; "" where it has none.
+    smooth : whether the surface has no crease within.
+    """
+
+    surface: TriangleMesh
+    repairs: list[str]
+    whole: TriangleMesh
+    creased: str
+    smooth: bool
+
+
+def sound_mesh(vertices: Floats, faces: Ints, name: str) -> SoundMesh:
     """Check and repair a mesh.
 
     Normals may point to either side. Creases end the surface: of a half ball with its floor, or of a shell with a
@@ -127,17 +174,13 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, 
     faces : (m, 3) indices of vertices.
     name : of the mesh, for messages.
 
-    Returns
-    -------
-    The smooth surface that the mesh represents, facing up; and what was repaired, in sentences.
-
     Raises
     ------
-    InputError : the mesh is empty, not finite, not manifold, one-sided, creased or in several pieces; names the place.
+    InputError : the mesh is empty, not finite, not manifold, one-sided or in several pieces; names the place.
     """
     _require_numbers(vertices, faces, name)
     mesh, repairs = _main_piece(_welded(vertices, faces, name), name)
-    neighbours = _Neighbours.of(mesh, name)
+    neighbours = Neighbours.of(mesh, name)
     turned = neighbours.turned(len(mesh.faces), name, mesh)
     if turned.any() and not turned.all():
         fewer = min(int(turned.sum()), int((~turned).sum()))
@@ -145,7 +188,7 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, 
     mesh = TriangleMesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
     if not len(mesh.loops) and _volume(mesh) < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
-    return _smooth_piece(mesh, neighbours, name, repairs)
+    return smooth_piece(mesh, neighbours, name)._replace(repairs=repairs)
 
 
 def _require_numbers(vertices: Floats, faces: Ints, name: str) -> None:
@@ -232,7 +275,7 @@ def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
     return first, kind.reshape(-1)
 
 
-def _edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
+def edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
     """Number (k,) of faces at each edge between the vertices a and b."""
     key = np.minimum(a, b).astype(np.int64) * vertices + np.maximum(a, b)
     _, kind, count = np.unique(key, return_inverse=True, return_counts=True)
@@ -240,7 +283,7 @@ def _edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
-class _Neighbours:
+class Neighbours:
     """Neighbouring faces.
 
     Parameters
@@ -255,7 +298,7 @@ class _Neighbours:
     against: Bools
 
     @staticmethod
-    def of(mesh: TriangleMesh, name: str) -> "_Neighbours":
+    def of(mesh: TriangleMesh, name: str) -> "Neighbours":
         a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
         low, high = np.minimum(a, b), np.maximum(a, b)
         order = np.lexsort((high, low))
@@ -274,7 +317,7 @@ class _Neighbours:
             raise InputError(
                 f"{name} is not manifold: two parts of it touch in the single point {where}: add or remove a face there"
             )
-        return _Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
+        return Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
 
     def pieces(self, keep: Bools, faces: int) -> Ints:
         """Index (m,) of the piece of each face, where only the edges `keep` (e,) connect faces."""
@@ -308,10 +351,9 @@ def _volume(mesh: TriangleMesh) -> float:
     return float(dot(mesh.vertices[mesh.faces[:, 0]] - centre, mesh.doubled).sum())
 
 
-def _smooth_piece(
-    mesh: TriangleMesh, neighbours: _Neighbours, name: str, repairs: list[str]
-) -> tuple[TriangleMesh, list[str]]:
-    """The piece between creases that covers most of the plan, facing up."""
+def turns_at(mesh: TriangleMesh, neighbours: Neighbours) -> Floats:
+    """Cosines (e,) of the angles by which a mesh turns at the edges between two faces, and from what is on one side of
+    them to what is on the other: the larger of both."""
     i, j = neighbours.faces.T
     # A sliver's own normal is noise: it is judged with the two rows of faces behind it, by their areas near its edges.
     ends = mesh.vertices[neighbours.edges]
@@ -321,31 +363,39 @@ def _smooth_piece(
     near = mesh.doubled + graph @ mesh.doubled
     wide = mesh.doubled + graph @ near
     sides = wide[i] - share[0][:, None] * near[j], wide[j] - share[1][:, None] * near[i]
-    cosine = np.maximum(_cosine(mesh.doubled[i], mesh.doubled[j]), _cosine(*sides))
+    return np.maximum(_cosine(mesh.doubled[i], mesh.doubled[j]), _cosine(*sides))
+
+
+def smooth_piece(mesh: TriangleMesh, neighbours: Neighbours, name: str) -> SoundMesh:
+    """Of a mesh whose faces are oriented alike the piece between creases that covers most of the plan, facing up."""
+    i, j = neighbours.faces.T
+    cosine = turns_at(mesh, neighbours)
     smooth = cosine > cos(radians(CREASE))
     closed = not len(mesh.loops)
     pieces = neighbours.pieces(smooth, len(mesh.faces))
     plan = np.bincount(pieces, mesh.doubled[:, 2]) / 2
     chosen = int(np.argmax(plan if closed else np.abs(plan)))
-    if not smooth.all():
-        within = np.flatnonzero(~smooth & (pieces[i] == chosen) & (pieces[j] == chosen))
-        share = mesh.areas[pieces == chosen].sum() / mesh.areas.sum()
-        if len(within) or share < 0.1:
-            worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(cosine))
-            angle, where = degrees(np.arccos(np.clip(cosine[worst], -1, 1))), place(mesh, neighbours.edges[worst, 0])
-            raise InputError(
-                f"{name} is creased: faces meet at {angle:.0f} degrees near {where}, and a target must be smooth: "
-                "round it off, or mesh it more finely"
-            )
-        repairs.append(
-            f"the surface has creases: the target is the smooth piece of it that covers most of the plan, "
-            f"{100 * share:.0f} % of the area"
-        )
-        mesh = mesh.only(pieces == chosen)
-        _Neighbours.of(mesh, name)  # refuses a piece that touches itself in a point
     if not closed and plan[chosen] < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
-    return mesh, repairs
+    if smooth.all():
+        return SoundMesh(mesh, [], mesh, "", True)
+    within = np.flatnonzero(~smooth & (pieces[i] == chosen) & (pieces[j] == chosen))
+    share = mesh.areas[pieces == chosen].sum() / mesh.areas.sum()
+    if len(within) or share < 0.1:
+        worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(cosine))
+        angle, where = degrees(np.arccos(np.clip(cosine[worst], -1, 1))), place(mesh, neighbours.edges[worst, 0])
+        creased = (
+            f"{name} is creased: faces meet at {angle:.0f} degrees near {where}, and a target must be smooth: "
+            "round it off, or mesh it more finely"
+        )
+        return SoundMesh(mesh, [], mesh, creased, False)
+    creased = (
+        f"the surface has creases: the target is the smooth piece of it that covers most of the plan, "
+        f"{100 * share:.0f} % of the area"
+    )
+    surface = mesh.only(pieces == chosen)
+    Neighbours.of(surface, name)  # refuses a piece that touches itself in a point
+    return SoundMesh(surface, [], mesh, creased, True)
 
 
 def _cosine(a: Floats, b: Floats) -> Floats:

@@ -1,0 +1,68 @@
+"""Rod ends that something other than the ground may have to hold: along open arches, free edges and openings."""
+
+from collections.abc import Iterator, Sequence
+from math import hypot
+
+from rodshell.results.records import Point
+from rodshell.results.results import EndsInTheAir, Results
+from rodshell.results.wording import newtons, shown_length
+
+ABOVE = 0.02  # of the size: higher ends are not on the level of the lowest
+
+
+def in_the_air(results: Results) -> EndsInTheAir | None:
+    """The rod ends that lie clearly higher than the lowest; None where it is not known where the ends are.
+
+    Parameters
+    ----------
+    results : with or without forces at the supports.
+    """
+    heights = [point[2] for point in results.boundary]
+    known = [z for z in heights if z is not None]
+    if not known:
+        return None
+    size = (results.target.reference_size if results.target else None) or width(results) / 2
+    seams = {end for seam in results.seams for meeting in seam.meetings for end in meeting.ends}
+    names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
+    held = {k for k, name in enumerate(names) if name in seams}
+    ground = min(known)
+    above = [k for k, z in enumerate(heights) if z is not None and z - ground > ABOVE * size and k not in held]
+    forces = [hypot(*(part or 0.0 for part in row[k])) for row in _forces(results) for k in above]
+    highest = max((heights[k] or 0.0) - ground for k in above) if above else 0.0
+    return EndsInTheAir(count=len(above), highest=highest, largest_force=max(forces, default=None))
+
+
+def width(results: Results) -> float:
+    """Longest side in plan of what the shell stands on [m]."""
+    columns = [[point[axis] for point in results.boundary] for axis in (0, 1)]
+    known = [[value for value in column if value is not None] for column in columns]
+    return max((max(column) - min(column) for column in known if column), default=0.0)
+
+
+def _forces(results: Results) -> Iterator[Sequence[Point]]:
+    """(2m, 3) forces of the supports, without loads and under each combination, with every end condition."""
+    loaded = [shell.support_forces for supported in results.loads.values() for shell in supported.values()]
+    for forces in (*(held.forces for held in results.reactions.values()), *loaded):
+        if len(forces) == len(results.boundary):
+            yield forces
+
+
+def air_findings(results: Results) -> Iterator[str]:
+    """What has to hold rod ends that do not stand on the ground.
+
+    Parameters
+    ----------
+    results : judged or not.
+    """
+    found = results.ends_in_the_air or in_the_air(results)
+    if found is None or not found.count:
+        return
+    high = shown_length(results)(found.highest)
+    force = found.largest_force
+    under = "those under the loads among them" if results.loads else "before own weight and loads act"
+    against = "" if force is None else f" against forces of up to {newtons(force)} each, {under}"
+    yield (
+        f"{found.count} of {len(results.boundary)} rod ends lie up to {high} above the lowest: where they do not stand "
+        f"on the ground, an edge beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has "
+        "to be designed"
+    )
