@@ -119,8 +119,7 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
     gc.disable()  # it takes a tenth of the time
     library = Kernels(library_name(level, unit), source_module="rodshell.kernels")
     library.output_dir, library.target_cpu = str(folder), level
-    with jit.types_found_once():
-        library.compile()
+    library.compile()
 
 
 def index_as_written() -> None:

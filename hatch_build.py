@@ -14,8 +14,8 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
-NUMBA = "numba>=0.61.2"
-BUILDER = ["numba==0.68.1", "setuptools>=70", "numpy>=2.2", "scipy>=1.14", "qdldl>=0.1.7.post5"]
+NUMBA = "numba>=0.61.2,<0.69"  # up to the last minor version with which `kernels/jit.py` was tried
+BUILDER = ["numba==0.68.1", "setuptools>=70", "numpy>=2.2", "scipy>=1.14", "threadpoolctl>=3.8"]
 COMPILED = os.environ.get("RODSHELL_KERNELS") == "compiled"
 
 

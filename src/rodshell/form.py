@@ -1,8 +1,9 @@
 """A form that was found: its stages, its checks and fabrication, and its files."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,6 @@ from rodshell.case import Case
 from rodshell.checks import Checks, check
 from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
-from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
@@ -25,13 +25,21 @@ from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout
 from rodshell.layout.cells import Pattern
+from rodshell.loads.check import (
+    check_shells,  # most forms have no loads
+    unchecked,  # most forms have no loads
+)
+from rodshell.loads.combinations import Loads
 from rodshell.loads.strength import net_factors
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
+from rodshell.output.pictures import picture_svg
+from rodshell.output.viewer import frame_html, scene_of, widget_of
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
+from rodshell.results.from_loads import loaded_results, loaded_states
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance
@@ -258,8 +266,6 @@ class Form:
         known = replace(self, _known_checks=checks)
         loaded, loads = self.known_loaded, self.case.built_loads()
         if loads is not None and (loaded is None or loaded.stopped):
-            from rodshell.loads.check import unchecked  # most forms have no loads
-
             try:  # the form is kept in any case
                 loaded = check_loads(known, loads, progress=progress)
             except InputError as error:
@@ -322,8 +328,6 @@ class Form:
         ------
         InputError : anywidget is not installed, or there is no shape in space.
         """
-        from rodshell.output.viewer import scene_of, widget_of
-
         scene = scene_of(self._archive)
         if scene is None:
             raise InputError("this form has no shape in space to look at: its verdict says why")
@@ -340,11 +344,6 @@ class Form:
 
     def _repr_html_(self) -> str:
         """The 3D viewer with all shapes, and what they are worth, as notebooks show it."""
-        from html import escape  # here, as its table of entities takes time to import
-
-        from rodshell.output.pictures import picture_svg
-        from rodshell.output.viewer import frame_html, scene_of
-
         scene = scene_of(self._archive)
         picture = picture_svg(self._archive, "flat") if scene is None else frame_html(scene)
         level, reasons = self.verdict.level, "".join(f"<li>{escape(reason)}</li>" for reason in self.verdict.reasons)
@@ -406,14 +405,10 @@ class Form:
             shear_strength=strengths.shear_strength, strength=strengths.strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         if self.loaded is not None:
-            from rodshell.results.from_loads import loaded_results
-
             results = loaded_results(results, self.footprint.mesh, self.loaded)
         results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
         states = states_of(self.stages) | self._design | checked_states(checks, self.rod.stretch_stiffness)
         if self.loaded is not None:
-            from rodshell.results.from_loads import loaded_states
-
             states |= loaded_states(self.loaded)
         return Archive(results, states, self.case.text(), self.inputs)
 
@@ -431,9 +426,6 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
     ------
     InputError : a load does not fit the form; the form comes from a table of rods.
     """
-    from rodshell.loads.check import check_shells  # most forms have no loads
-    from rodshell.loads.combinations import Loads
-
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
     require_progress(progress)

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import TextIOBase
+from shutil import get_terminal_size
 from threading import RLock
 from time import monotonic
 from typing import TextIO
@@ -74,8 +75,6 @@ class Printed(TextIOBase):
 
     def live(self, text: str) -> None:
         """Show text on the last line of a terminal, until something else is printed; "" removes it."""
-        from shutil import get_terminal_size
-
         if not text or monotonic() - self._shown >= PAUSE:
             self._shown = monotonic()
             line = visible(text, kept="")[: get_terminal_size().columns - 1]

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 from rodshell.case import Case
 from rodshell.case.case import Built, built
 from rodshell.case.rod_ends import RodEnds
+from rodshell.checks.sizing import Fit, require_likely_sizes
 from rodshell.errors import OutOfTimeError
 from rodshell.form import Form, Stages
 from rodshell.formfinding import Bound, Fall, PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
 from rodshell.formfinding.search import Search, search
+from rodshell.loads.fixed import fixed_forces
 from rodshell.progress import Progress
+from rodshell.refining.acceptance import refined
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
 from rodshell.results.summary import chosen, rod_text
@@ -106,8 +109,6 @@ class Run:
 
     def table_form(self) -> Form:
         """Of a table of rods."""
-        from rodshell.checks.sizing import Fit, require_likely_sizes
-
         case = self.asked
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
@@ -221,14 +222,10 @@ class Run:
         earlier = self.earlier
         if earlier is not None and "refine" in same and _same_pop_ups(stages, earlier.unrefined):
             return earlier.refined
-        from rodshell.refining.acceptance import refined  # it takes a tenth of a second to load, which few jobs need
-
         table, weight, forces = case.refine, float(case.refine.under == "weight"), None
         ends = stages.ends[0] if table.ends is None else table.ends
         loads = case.built_loads() if table.under in case.combination_names else None
         if loads is not None and ends in stages.ends:
-            from rodshell.loads.fixed import fixed_forces
-
             weight, forces = fixed_forces(stages, ends, loads, table.under)
         return refined(
             stages, vary, ends=ends, under_weight=weight, dead_loads=forces, span_error=table.tolerance,

@@ -5,13 +5,13 @@ Only input and messages use this: inside, everything is in SI units.
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
 from math import floor, fmod, inf, isfinite, log10, tau
 from numbers import Real
 from typing import Literal
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.printed import visible
 

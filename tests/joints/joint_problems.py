@@ -17,7 +17,7 @@ import rodshell as rs
 from rodshell.model import Assembly
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.sparse_ldl import Qdldl
+from rodshell.solve.sparse_ldl import Multifrontal
 from tests.solve.rod_problems import threshold
 
 X, Y, Z = np.eye(3)
@@ -229,7 +229,7 @@ def michell_twist(edges, rods, joint=None):
                 break
         michell_twist.off = np.abs(state[: mesh.node_count, 2]).max()
         upper = triu(tangent_stiffness(shell, state, free), format="csc")
-        return Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data).negative > 0
+        return Multifrontal(upper.indptr, upper.indices).factor(upper.data).negative > 0
 
     return threshold(lost)
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.linalg import eigvalsh, norm
 
 from rodshell.model import Assembly, Freedom
-from rodshell.solve.sparse_ldl import Qdldl, SingularError
+from rodshell.solve.sparse_ldl import Multifrontal, SingularError
 
 BLOCKS = 14
 WIDTHS = (1, 2, 3, 5)  # blocks of a surface curvature, an edge, a bend, a bend with twist
@@ -211,7 +211,7 @@ def test_solver_counts_negative_eigenvalues_and_solves(seed, negative):
     eigenvalues = np.concatenate([[-12.0], eigvalsh(dense), [12.0]])
     dense -= 0.5 * (eigenvalues[negative] + eigenvalues[negative + 1]) * np.eye(len(dense))
     indptr, indices, data = compressed(dense)
-    solver = Qdldl(indptr, indices)
+    solver = Multifrontal(indptr, indices)
     assert assert_inertia_and_solution(solver, dense, data).negative == negative
 
 
@@ -223,7 +223,7 @@ def test_solver_tells_the_sign_of_a_nearly_vanishing_eigenvalue(seed, side):
     dense += (side - middle) * np.eye(len(dense))
     indptr, indices, data = compressed(dense)
     assert np.abs(eigvalsh(dense)).min() == pytest.approx(1e-9, rel=1e-3)
-    assert_inertia_and_solution(Qdldl(indptr, indices), dense, data)
+    assert_inertia_and_solution(Multifrontal(indptr, indices), dense, data)
 
 
 @pytest.mark.parametrize("tiny", [1e-4, 1e-8])
@@ -234,14 +234,14 @@ def test_refinement_makes_up_for_tiny_pivots(tiny):
     dense = np.block([[tiny * np.eye(20), half], [half.T, -tiny * np.eye(20)]])
     indptr, indices, data = compressed(dense)
     # without refinement 6e-16 / tiny was measured
-    assert_inertia_and_solution(Qdldl(indptr, indices), dense, data)
+    assert_inertia_and_solution(Multifrontal(indptr, indices), dense, data)
 
 
 def test_solver_keeps_its_pattern_for_new_values():
     rng = np.random.default_rng(21)
     dense = chain_matrix(rng)
     indptr, indices, data = compressed(dense)
-    solver = Qdldl(indptr, indices)
+    solver = Multifrontal(indptr, indices)
     factors = solver.factor(data)
     for shift in (20.0, 0.3, -20.0, 5.0):
         shifted = dense + shift * np.eye(len(dense))
@@ -256,7 +256,7 @@ def test_solver_keeps_its_pattern_for_new_values():
 def test_a_vanishing_pivot_is_an_error(dense):
     indptr, indices, data = compressed(dense)
     with pytest.raises(SingularError):
-        Qdldl(indptr, indices).factor(data)
+        Multifrontal(indptr, indices).factor(data)
 
 
 def test_values_that_are_not_finite_are_an_error():
@@ -264,8 +264,8 @@ def test_values_that_are_not_finite_are_an_error():
     indptr, indices, data = compressed(dense)
     for bad in (np.nan, np.inf):
         with pytest.raises(SingularError):
-            Qdldl(indptr, indices).factor(np.array([1.0, bad, 3.0]))
-    solver = Qdldl(indptr, indices)
+            Multifrontal(indptr, indices).factor(np.array([1.0, bad, 3.0]))
+    solver = Multifrontal(indptr, indices)
     with pytest.raises(SingularError):
         solver.factor(np.array([1.0, np.nan, 3.0]), reuse=solver.factor(data))
 
@@ -274,7 +274,7 @@ def test_solver_recovers_after_a_singular_system():
     rng = np.random.default_rng(22)
     dense = chain_matrix(rng)
     indptr, indices, data = compressed(dense)
-    solver = Qdldl(indptr, indices)
+    solver = Multifrontal(indptr, indices)
     with pytest.raises(SingularError):
         solver.factor(np.zeros_like(data))
     factors = assert_inertia_and_solution(solver, dense, data)

@@ -8,14 +8,11 @@ import ezdxf
 import numpy as np
 import pytest
 from ezdxf.document import Drawing as Document
-from ezdxf.entities import Circle, DXFEntity, Line, LWPolyline, Text
 from ezdxf.enums import TextEntityAlignment as Alignment
-from ezdxf.lldxf.tagwriter import TagWriter
 
 from rodshell.output import export
 from rodshell.output.drawing import LAYERS, Drawing, Pencil
 from rodshell.output.dxf import CAPITAL, drawing_dxf
-from rodshell.output.dxf_entities import PlainCircle, PlainLine, PlainPolyline, PlainText, Writer
 from tests.output.dxf_reader import read_dxf
 from tests.output.forms import TARGETS, archive, wished
 
@@ -38,34 +35,6 @@ def one_of_each() -> Drawing:
 
 def written(drawing: Drawing, names: dict[str, str] | None = None) -> Document:
     return ezdxf.read(io.StringIO(drawing_dxf(drawing, names)))
-
-
-def text_of(entity: DXFEntity, writer: type[TagWriter]) -> str:
-    stream = io.StringIO()
-    entity.export_dxf(writer(stream, "AC1024"))
-    return stream.getvalue()
-
-
-@pytest.mark.parametrize("words", ["Ω 50 %", "%s %(layer)s", "insert 0"])
-@pytest.mark.parametrize("a", [(1.0, 2 / 3, 0.0), (-1e9, 5.0, 0.25)])
-def test_entities_are_written_as_those_of_ezdxf(a: tuple[float, float, float], words: str) -> None:
-    """Also after others with the same attributes, from which they have their pattern."""
-    b = (-4.5, 1e-7, 0.0)
-    line, circle = {"layer": "CUT", "start": a, "end": b}, {"layer": words, "center": a, "radius": 1 / 7}
-    text = {"layer": "Maße", "insert": a, "height": 2.5, "text": words, "style": "SANS"}
-    turned = text | {"rotation": 30.0, "halign": 2, "align_point": b}
-    pairs = [
-        (PlainLine(**line), Line.new(dxfattribs=line)), (PlainCircle(**circle), Circle.new(dxfattribs=circle)),
-        (PlainText(**text), Text.new(dxfattribs=text)), (PlainText(**turned), Text.new(dxfattribs=turned)),
-    ]  # fmt: skip
-    for points in (np.array([a, b, (7.0, 1e9, 0.0)])[:, :2], np.array([a, b])[:, :2]):
-        for closed in (False, True):
-            theirs = LWPolyline.new(dxfattribs={"layer": "DIM"})
-            theirs.set_points(points, format="xy")
-            theirs.closed = closed
-            pairs.append((PlainPolyline(points, closed=closed, layer="DIM"), theirs))
-    for ours, theirs in pairs:
-        assert text_of(ours, Writer) == text_of(theirs, TagWriter)
 
 
 @pytest.mark.parametrize("names", [{}, {"CUT": "LASER", "DIM": "Maße"}], ids=["our layers", "named layers"])

@@ -16,7 +16,7 @@ from scipy.special import ellipeinc, ellipkinc
 
 import rodshell as rs
 from rodshell.geometry.frames import directors_along, parallel_transport, signed_angle, unit
-from rodshell.solve.sparse_ldl import Qdldl
+from rodshell.solve.sparse_ldl import Multifrontal
 
 THIN = rs.Rod(rs.Circle(1e-4), rs.Material(1e9, 1e3, 0.5))
 EI, GJ = THIN.bend_stiffness, THIN.twist_stiffness
@@ -37,7 +37,7 @@ def order(sizes, errors):
 def unstable(rod, state, free):
     """Whether the energy's Hessian in the free directions has a negative eigenvalue."""
     upper = triu(rod.hessian(state, free), format="csc")
-    return Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data).negative > 0
+    return Multifrontal(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data).negative > 0
 
 
 def threshold(lost, low=0.9, high=1.1):

@@ -2,7 +2,7 @@
 one sentence: the key, its value, and what is accepted."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from types import NoneType, UnionType
@@ -15,7 +15,6 @@ from rodshell.case.case import Case
 from rodshell.case.load_tables import AnyLoad, CombinationTable
 from rodshell.case.stage_tables import IDLE, PatchTable
 from rodshell.case.values import FileToRead, Table
-from rodshell.dataclass import dataclass
 from rodshell.units import shown
 from rodshell.validation import either, not_a_choice
 

@@ -5,6 +5,7 @@ A reader of a value raises ValueError with the reason, without the key.
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import date
 from difflib import get_close_matches
 from numbers import Integral
@@ -12,7 +13,6 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr, ValidationInfo
 
-from rodshell.dataclass import dataclass
 from rodshell.units import Kind, read_quantity, require_unit_of_all, shown, wanted
 
 Auto = Literal["auto"]

@@ -25,13 +25,13 @@ Where a section changes along its rod, its fibres are as far from the axis as th
 outline in the pattern of the unchanged section, up to the largest stress of the changed one.
 """
 
+from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.checks.reactions import joint_loads
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit

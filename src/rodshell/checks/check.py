@@ -1,7 +1,7 @@
 """All checks of a shell, and the checks of several patches merged into those of one shell."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from math import inf
 from typing import Any
@@ -14,7 +14,6 @@ from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
 from rodshell.checks.self_weight import SelfWeightCheck, self_weight, weakest
-from rodshell.dataclass import dataclass
 from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import ENDS, Ends

@@ -15,7 +15,7 @@ material frames say, and without these upright on the shell.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -23,7 +23,6 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import adapted, cross, dot, unit
 from rodshell.geometry.near_pairs import near_pairs
 from rodshell.layout import FlatGrid, GridMesh

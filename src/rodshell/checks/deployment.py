@@ -11,14 +11,13 @@ clamps after the deployment.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 from math import prod
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import end_directions, laid_below, turned
 from rodshell.model import Shell

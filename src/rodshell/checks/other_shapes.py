@@ -7,13 +7,13 @@ is a shape of the shell; that nothing is found proves nothing, so the search say
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
 from rodshell.checks.deployment import Deployment
-from rodshell.dataclass import dataclass
 from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.geometry.frames import parallel_transport, signed_angle, unit
 from rodshell.layout import GridMesh

@@ -9,12 +9,11 @@ about the joint is that of the joint's energy: of the forces on the nodes next t
 twist angles. Both are resultants, whatever the joint is made of.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.formfinding.finite_sections import joint_normals, joint_tangents
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.crossings import LinkerBend

@@ -7,12 +7,12 @@ are in `rodshell.loads`.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import Equilibrium

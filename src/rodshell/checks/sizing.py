@@ -12,7 +12,7 @@ arc over a single rod's chord is right only where the ends of all rods belong to
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple, Self
 
@@ -20,7 +20,6 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import VON_MISES, bending_of, largest_stress
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.popup import PopUp
 from rodshell.joints import Ball, Joint

@@ -1,7 +1,7 @@
 """Options of the commands: keys of the case file, and those that several commands have."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
@@ -11,7 +11,6 @@ import click
 
 from rodshell.case import CaseKey, case_keys, load_case
 from rodshell.case.keys import BY_KIND
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 
 ALIASES = {

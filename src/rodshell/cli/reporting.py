@@ -7,7 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 from shlex import quote
@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import click
 
 from rodshell.cli.interruption import Interruption
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
@@ -122,10 +121,9 @@ def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
 
     progress = Progress(quiet=quiet)
 
-    def tell(done: int, count: int, seconds: float | None) -> None:
+    def tell(done: int, count: int) -> None:
         bar = "#" * (BAR * done // count)
-        left = f", about {seconds:.0f} s left" if seconds is not None else ""
-        progress("compiling kernels, once", f"[{bar:{BAR}}] {done} of {count}{left}", 0.0)
+        progress("compiling kernels, once, about a minute", f"[{bar:{BAR}}] {done} of {count}", 0.0)
 
     with progress:
         return compile_kernels(tell, every=every)

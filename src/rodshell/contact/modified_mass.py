@@ -13,14 +13,13 @@ moves further than its depth. And the displacement is counted from the start of 
 dv_pre = ((c - x_k)/h - v_k).n n, c the closest point.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
 from rodshell.model import Freedom

@@ -1,13 +1,12 @@
 """Contact with a target in statics: nodes bound to its surface (a constraint), and unilateral contact (an energy)."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.kernels import njit
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS

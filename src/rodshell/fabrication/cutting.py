@@ -1,13 +1,13 @@
 """Cutting rods from stock: where to splice a rod that is longer than a bar, and the pieces of each bar."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 
 TINY = 1e-9  # of a bar: round-off
 Route = tuple[int, int, float, int]  # to a stop: pieces so far, short ones of them, worst bend, the stop before

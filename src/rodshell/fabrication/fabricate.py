@@ -1,11 +1,11 @@
 """Cut list, layers, splices, stock and bracing of a grid, in one call, and the lengths that decide the cutting."""
 
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints, median
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.fabrication.cutting import Nesting, nest, splices
 from rodshell.layout import GridMesh, Profile
@@ -208,7 +208,7 @@ def _laths(
     for k, rod in enumerate(mesh.grid.rods):
         here, more = mesh.rod_slice(k), options.end_allowance
         joints, stations = crossings.at[crossings.rods == k] - rod.start, mesh.stations[here] - rod.start
-        apart = median(np.diff(np.sort(joints))) if len(joints) > 1 else 0.0
+        apart = np.median(np.diff(np.sort(joints))) if len(joints) > 1 else 0.0
         beyond = () if rod.profile is None else rod.profile.laths(rod.length, more)
         spliced = list[float]()
         for lath, (start, stop) in enumerate([(-more, rod.length + more), *beyond], start=1):

@@ -14,7 +14,7 @@ from math import degrees
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints, median
+from rodshell.arrays import Floats, Ints
 from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
@@ -217,7 +217,7 @@ def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats, spans: 
     held = np.array([rod.offset == 0.0 for rod in mesh.grid.rods])[mesh.rod_of]
     apart = np.abs(np.diff(mesh.stations))
     nearest = np.minimum(np.append(np.inf, apart), np.append(apart, np.inf))
-    held[spans] |= nearest[spans] > hold * median(mesh.edge_lengths)
+    held[spans] |= nearest[spans] > hold * np.median(mesh.edge_lengths)
     entries, rods = np.flatnonzero(held), mesh.rod_of[held]
     before, after = np.maximum(entries - 1, mesh.rod_start[rods]), np.minimum(entries + 1, mesh.rod_stop[rods] - 1)
     nodes = mesh.rod_nodes[entries]

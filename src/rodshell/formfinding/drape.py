@@ -5,6 +5,7 @@ from math import degrees, pi
 
 from rodshell.errors import InputError
 from rodshell.formfinding.bound_drape import bound_drape
+from rodshell.formfinding.fall_drape import fall_drape
 from rodshell.formfinding.gravity_drape import gravity_drape
 from rodshell.formfinding.methods import Bound, Draped, Gravity, Method, require_method
 from rodshell.joints import Joint, require_joint
@@ -70,6 +71,4 @@ def drape(
         return bound_drape(target, layout, rod, anchor=anchor, warm_start=warm_start, joint=joint, progress=progress)
     if isinstance(method, Gravity):
         return gravity_drape(target, layout, rod, method, anchor=anchor, joint=joint, progress=progress)
-    from rodshell.formfinding.fall_drape import fall_drape  # imported here: it loads the dynamics
-
     return fall_drape(target, layout, rod, method, anchor=anchor, joint=joint, progress=progress)

@@ -4,12 +4,11 @@ Implicit Euler with the chosen coupling, with drag, without load. Pinned ends on
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding.methods import require_coupling
 from rodshell.formfinding.popup import FIRST_RISE, arched, flat_below

@@ -7,13 +7,13 @@ corrected, until the rods end at their points.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -137,8 +137,6 @@ def match_net(
 
 def _coordinates(net: ChebyshevNet, points: Floats) -> Floats:
     """(n, 2) u, v of points (n, 3) of the surface in a net, to second order between its nodes; NaN far from it."""
-    from scipy.spatial import cKDTree
-
     flat = net.net.points.reshape(-1, 3)
     known = np.flatnonzero(np.isfinite(flat[:, 0]))
     away, nearest = cKDTree(flat[known]).query(points)

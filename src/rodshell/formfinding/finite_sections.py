@@ -9,12 +9,12 @@ pi/a sqrt(EI GJ), EI being the smaller stiffness and a the joints' distance [Tim
 Stability, chapter 6, pure bending of a strip]. Where joints let it roll, it turns to its weak axis when it is released.
 """
 
+from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, median
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
 from rodshell.layout import GridMesh
@@ -280,5 +280,5 @@ def _joint_distances(mesh: GridMesh) -> Floats:
     for rod in range(len(result)):
         gaps = np.diff(np.sort(crossings.at[crossings.rods == rod]))
         if len(gaps):
-            result[rod] = median(gaps)
+            result[rod] = np.median(gaps)
     return result

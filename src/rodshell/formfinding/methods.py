@@ -5,7 +5,7 @@ Gravity   static equilibrium under the rods' weight, in frictionless unilateral 
 Fall      the paper's method: the grid falls on the target in time and comes to rest there [HQK 3]
 """
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
@@ -13,7 +13,6 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.contact.modified_mass import Stopped
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import StrongBending, joint_tangents
 from rodshell.geometry.frames import cross, dot

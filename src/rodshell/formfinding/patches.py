@@ -2,14 +2,13 @@
 rod ends of both sides meet at common points [HQK 3.4, the outlook]."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from math import degrees
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.end_matching import Point
 from rodshell.formfinding.finite_sections import flat_warnings

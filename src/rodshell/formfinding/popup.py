@@ -7,14 +7,13 @@ A warm start transfers displacements and forces from an earlier pop-up, as the f
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers

@@ -1,13 +1,12 @@
 """Whether a motion has come to rest, how stable it is there, and what would bring it to rest otherwise."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.contact.modified_mass import Touching
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import dot
 from rodshell.model import Freedom, Shell
 from rodshell.solve.implicit_euler import Motion

@@ -4,13 +4,16 @@ The rods are chosen such that where a rod ends on a seam, a rod of the next patc
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from string import ascii_uppercase
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree, shortest_path
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.end_matching import EndGoals, Point, match_net, rod_ends
 from rodshell.formfinding.trim import NEAREST_JOINT
@@ -108,16 +111,11 @@ def _survey(target: Target) -> tuple[Floats, Floats]:
 
 def _neighbours(points: Floats, reach: float) -> Ints:
     """(m, 2) pairs of points (n, 3) no further apart than `reach` [m]."""
-    from scipy.spatial import cKDTree
-
     return np.asarray(cKDTree(points).query_pairs(reach, output_type="ndarray"), dtype=np.intp).reshape(-1, 2)
 
 
 def _connected(points: Floats, sides: Bools, reach: float) -> list[Ints]:
     """Points (k,) of each part: those within `reach` [m] on the same sides of all seams belong together."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     pairs = _neighbours(points, reach)
     kept = pairs[(sides[:, pairs[:, 0]] == sides[:, pairs[:, 1]]).all(axis=0)]
     graph = coo_array((np.ones(len(kept)), (kept[:, 0], kept[:, 1])), shape=(len(points), len(points)))
@@ -264,9 +262,6 @@ def _rows(seams: Ints, points: Floats) -> list[Ints]:
 
 def in_a_row(points: Floats) -> Ints:
     """The order (n,) of points (n, 3) along a curve through them, from one end, by their minimum spanning tree."""
-    from scipy.sparse.csgraph import minimum_spanning_tree, shortest_path
-    from scipy.spatial.distance import cdist
-
     tree = minimum_spanning_tree(cdist(points, points) + 1e-300)
     first = int(np.argmax(shortest_path(tree, directed=False, indices=0)))
     return np.argsort(shortest_path(tree, directed=False, indices=first), kind="stable")

@@ -1,13 +1,12 @@
 """A coarse search for the anchor and the heading; all trials are shown, so that the user can choose another."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import degrees, pi
 from typing import Literal, get_args
 
 import numpy as np
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, OutOfTimeError, RodshellError
 from rodshell.formfinding.pipeline import find_stages
 from rodshell.layout import GridLayout

@@ -1,9 +1,10 @@
 """Trim what extends past the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from rodshell.arrays import Floats, distinct
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped
@@ -237,6 +238,6 @@ def _recut(draped: Draped, rods: tuple[FlatRod, ...]) -> tuple[GridMesh, Floats]
     mesh = mesh_grid(FlatGrid.of(rods), draped.layout.edge)
     names = {rod.name: k for k, rod in enumerate(draped.mesh.grid.rods)}
     positions = draped.mesh.prolong(draped.positions, mesh, rods=[names[rod.name] for rod in rods])
-    ends = distinct(mesh.ends)
+    ends = np.unique(mesh.ends)
     positions[ends] = draped.target.retract(positions[ends])
     return mesh, positions

@@ -1,9 +1,10 @@
 """The motion in the plane z = 0 that brings points nearest to others."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import cross
 
 

@@ -15,13 +15,12 @@ reversed: its tangent, its second director and its twist angle change sign.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import adapted, parallel_transport, unit
 from rodshell.kernels import njit
 from rodshell.layout import GridMesh

@@ -15,6 +15,7 @@ each two. Where a joint is free, its stiffness is exactly zero.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import inf, pi
 from numbers import Integral
 from typing import Literal, Protocol
@@ -23,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.joints.crossings import RodNodes, stencils
 from rodshell.joints.relative_rotation import RelativeRotation

@@ -22,6 +22,7 @@ Why not elements from edge to edge, as the paper's linkers are: those also stiff
 by an amount that depends on the mesh. Frames, spin and sources are those of `rods.bend_twist`.
 """
 
+from dataclasses import dataclass
 from math import pi
 from typing import Self
 
@@ -29,7 +30,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import adapted, cross, dot
 from rodshell.joints.crossings import by_edge, edge_tangents, frame, of_edge, spread, with_source
 from rodshell.kernels import njit

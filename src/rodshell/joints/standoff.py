@@ -7,12 +7,12 @@ on the other. The normal turns with the rods, so that moving all nodes rigidly c
 needs no frames of the rods; the moment of its force about the crossing acts on the rods' neighbouring nodes.
 """
 
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 

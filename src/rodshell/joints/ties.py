@@ -12,13 +12,12 @@ A tie with a lever arm cannot be shared unknowns, so it is a stiff spring with e
 A lies above rod B.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import adapted
 from rodshell.joints.crossings import (
     RodNodes,

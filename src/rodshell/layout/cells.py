@@ -1,12 +1,12 @@
 """Cells of a flat grid, each between four neighbouring joints of four rods, and the diagonals that brace them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import FlatGrid
 from rodshell.units import shown

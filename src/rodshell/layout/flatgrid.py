@@ -1,15 +1,16 @@
 """Straight rods in a plane, their crossings, and the layers in which they lie."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout.profile import Profile
@@ -240,9 +241,6 @@ class FlatGrid:
     def with_common_joints(self) -> "FlatGrid":
         """The same rods; where three or more cross within a hundredth of the span, as in tables of rounded numbers, the
         mean is the only crossing point of each."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components  # here: it takes a twentieth of a second to import
-
         rods, at, count = self.crossings.rods, self.crossings.at, len(self.crossings)
         gaps, beside = self._gaps
         first, second = beside[gaps < TOGETHER * self.span].T

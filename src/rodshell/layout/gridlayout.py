@@ -1,6 +1,6 @@
 """Two families of parallel rods, orthogonal in the flat grid, before they are cut to a target."""
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from math import degrees, pi
 from numbers import Real
 from typing import Literal
@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod, refuse_too_many
 from rodshell.units import NUMBER

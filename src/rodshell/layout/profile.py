@@ -5,13 +5,13 @@ follows from it for the other stiffnesses, the mass and the stress is in `rods.v
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import sqrt
 from typing import Literal, get_args
 
 import numpy as np
 
-from rodshell.arrays import Floats, distinct
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.validation import choice, listed, number, positive
 
@@ -143,7 +143,7 @@ class Profile:
         function : of factors (p,), with values (p, q).
         low, high : (n,) where each part begins and ends, shares of the length.
         """
-        breaks = distinct(np.concatenate([self.stations, low, high]))
+        breaks = np.unique(np.concatenate([self.stations, low, high]))
         width = np.diff(breaks)
         middle = 0.5 * (breaks[1:] + breaks[:-1])
         at = middle[:, None] + 0.5 * width[:, None] * GAUSS_POINTS

@@ -5,7 +5,7 @@ Such as a shell's displacements and forces, as the first guess for a grid whose 
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints, median
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.layout.mesh import GridMesh
 
@@ -75,7 +75,7 @@ def _lattice_coordinates(mesh: GridMesh) -> Floats:
         in_family = np.array([rod.family == family for rod in rods])
         steps = np.diff(np.unique(offset[in_family]))
         if len(steps):
-            offset[in_family] /= median(steps)
+            offset[in_family] /= np.median(steps)
     return np.column_stack([offset, [0.5 * (rod.start + rod.end) for rod in rods]])
 
 

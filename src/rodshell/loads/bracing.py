@@ -1,12 +1,11 @@
 """Bracing of an erected shell: cables along the diagonals of its cells, stressed when they are put in."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.layout import GridMesh
 from rodshell.layout.cells import Pattern, diagonals, rim_diagonals

@@ -8,7 +8,7 @@ modes. All multiply the whole combination, with the shell's weight if that is in
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 
@@ -18,7 +18,6 @@ from rodshell.arrays import Floats, Ints
 from rodshell.checks.bending import require_known_stress, rod_frames
 from rodshell.checks.reactions import Reactions
 from rodshell.checks.self_weight import SelfWeightCheck, self_weight
-from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding import PatchForm, PopUp, pop_up
 from rodshell.formfinding.patches import PatchedForm

@@ -1,8 +1,7 @@
 """What a shell is checked under: loads and their combinations, its bracing, and how stability is looked at."""
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.loads.bracing import Cables
 from rodshell.loads.kinds import LineLoad, Load, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind

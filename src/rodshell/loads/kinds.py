@@ -6,6 +6,7 @@ are not forces: they move supports, or change the length at which rods are free 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from math import cos, sin
 from typing import Literal, get_args
@@ -13,7 +14,6 @@ from typing import Literal, get_args
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.loads.tributary import Tributary
 from rodshell.targets.heightfield import Formula, parse_formula

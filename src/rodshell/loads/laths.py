@@ -6,14 +6,13 @@ laid without axial force, its ends are free, and at each joint it is held over t
 outer layer, free to turn there as on a bolt. Between joints it can buckle: it has nodes there.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rodshell.arrays import Floats, Ints, median
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import joint_normals
 from rodshell.joints.standoff import Standoffs
@@ -80,7 +79,7 @@ class Laths:
         rows = lines(pairs, flat_joints(mesh.grid))
         normals = joint_normals(mesh, structure.positions(before))
         over = before.state[outer_nodes(mesh)] + self.eccentricity * normals
-        laid = _Laid.over(rows, over, normals, median(mesh.edge_lengths))
+        laid = _Laid.over(rows, over, normals, np.median(mesh.edge_lengths))
         shell = Shell.of(laid.mesh, self.rod)
         blocks = structure.size + np.arange(len(shell.like))
         if not self.eccentricity:
@@ -235,6 +234,6 @@ def _ties(structure: Structure, layer: LathLayer, crossings: Ints, eccentricity:
     mesh = structure.mesh
     held = layer.blocks[layer.shell.mesh.rod_nodes[layer.entries]]
     blocks = np.column_stack([held, outer_nodes(mesh)[crossings], _neighbours(mesh)[crossings]])
-    edge = median(mesh.edge_lengths)
+    edge = np.median(mesh.edge_lengths)
     stiffness = OFFSET_STIFFNESS * layer.rod.stretch_stiffness / edge
     return (Standoffs(blocks, np.full(len(blocks), eccentricity), np.full(len(blocks), stiffness)),)

@@ -6,12 +6,11 @@ find a shell that is stiff in shear. The spring acts in series with the half edg
 (`joints.joint`), and in parallel with the pin's other two rotations, which are rigid before and after.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rodshell.arrays import Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.joints import Joint, Pin, Spring
 from rodshell.joints.crossings import RodNodes, stencils

@@ -20,6 +20,7 @@ of the loaded shell has the buckling of spans in it.
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from math import pi
 from typing import Literal
 
@@ -28,7 +29,6 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.bending import VON_MISES, Bending, bending_of
 from rodshell.checks.reactions import cut_forces
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
 from rodshell.layout import GridMesh

@@ -5,7 +5,7 @@ scaffold or the crane that erects it. The bracing is fitted to the shell as it s
 to that, and in the equilibrium that it finds its joints are locked, where they are. All loads begin there.
 """
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -13,7 +13,6 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.checks.reactions import Reactions, reactions
-from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError
 from rodshell.formfinding.popup import PopUp
 from rodshell.joints.relative_rotation import RelativeRotation

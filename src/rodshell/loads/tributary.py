@@ -7,15 +7,16 @@ triangles' size, and those of a symmetric shell are symmetric: the triangles are
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import cross, dot
 from rodshell.targets import Target
+from rodshell.targets.freeform import Freeform
 from rodshell.validation import brief
 
 if TYPE_CHECKING:
@@ -64,8 +65,6 @@ def tributary_areas(
     rotate : angle of their sides [rad].
     spacing : smallest distance of two neighbouring rods [m].
     """
-    from rodshell.targets.freeform import Freeform  # few jobs need it
-
     step = _step(target, spacing)
     if isinstance(target, Freeform):
         corners, faces = mesh_triangles(target, step=step)

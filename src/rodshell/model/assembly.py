@@ -1,6 +1,7 @@
 """Free directions of each block of the state, and the sum of element Hessians in them as a sparse matrix."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
 from typing import NamedTuple
@@ -8,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rodshell.arrays import Floats, Ints, Longs
-from rodshell.dataclass import dataclass
 from rodshell.kernels import njit
 from rodshell.threads import in_threads, threads
 from rodshell.validation import brief

@@ -12,13 +12,12 @@ Joints keep the lengths of these half edges.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.joints import Joint, Linker
 from rodshell.joints.crossings import RodNodes, stencils
 from rodshell.joints.joint import elastic_joints, resists

@@ -9,7 +9,7 @@ order); holding the last edge itself would act half an edge inside (first order)
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csc_matrix, diags
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
 from rodshell.model.assembly import Assembly, Freedom

@@ -1,13 +1,13 @@
 """A rod at rest: its nodes and edges, its clamped ends, and where it bends, with the length of rod at each bend."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, cross, directors_along, dot, parallel_transport, signed_angle
 from rodshell.rods.section import Rod

@@ -5,12 +5,12 @@ length the arithmetic one. A node stands for the half edges next to it, whose co
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.layout import GridMesh, Profile
 from rodshell.rods.section import Rod
 from rodshell.rods.varied import Varied, varied

@@ -11,15 +11,14 @@ Eccentric joints lay the rods in two layers, whose mesh gives each rod its own n
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints, median
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle, unit
 from rodshell.joints import (
@@ -453,13 +452,13 @@ class _Builder:
         """
         if not isinstance(self.coupling, SharedDofs):
             return self._penalties()[0]
-        edge = median(self.mesh.edge_lengths)
+        edge = np.median(self.mesh.edge_lengths)
         return OFFSET_STIFFNESS * min(rod.stretch_stiffness for rod in self.rods) / edge
 
     def _penalties(self) -> tuple[float, float]:
         """C1 [N/m] and C2 [N m/rad]; by default those of the softest rod."""
         coupling = ImplicitPenalty() if isinstance(self.coupling, SharedDofs) else self.coupling
-        edge = median(self.mesh.edge_lengths)
+        edge = np.median(self.mesh.edge_lengths)
         values = [coupling.with_defaults(rod, edge) for rod in set(self.rods)]
         return min(float(value.C1 or 0.0) for value in values), min(float(value.C2 or 0.0) for value in values)
 

@@ -7,6 +7,7 @@ net: they are kept as virtual rods.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from math import cos, degrees, pi, sin
 from string import ascii_lowercase
@@ -14,7 +15,6 @@ from string import ascii_lowercase
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, NetLimitError
 from rodshell.geometry.curves import nearest_four
 from rodshell.kernels import njit

@@ -9,14 +9,13 @@ P + h n(P), h being the height of the rod's layer and n the target's normal, and
 The net's points P are on the target, between the layers.
 """
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import cross, unit
 from rodshell.kernels import njit
 from rodshell.targets import Implicit, Target

@@ -5,10 +5,11 @@ its end (`with_apron`), and a rod is cut between nodes on both sides. They are k
 same net in longer steps; the first of these nets has only a few long steps.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout import GridLayout

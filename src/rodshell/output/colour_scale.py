@@ -1,5 +1,6 @@
 """Colours that stand for numbers: of rods in a picture (gap, stress, height), and of the trials of a search."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 from html import escape
 from math import degrees
@@ -8,7 +9,6 @@ from typing import Literal, Protocol
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import number

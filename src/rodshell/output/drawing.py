@@ -2,7 +2,7 @@
 
 import pathlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress, pairwise
 from math import cos, sin
@@ -11,7 +11,6 @@ from typing import Literal, NamedTuple, TypeVar
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.geometry.bounds import bounds
 
 Anchor = Literal["start", "middle", "end"]

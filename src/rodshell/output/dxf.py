@@ -9,16 +9,18 @@ from typing import Any
 import ezdxf
 from ezdxf.document import CREATED_BY_EZDXF, WRITTEN_BY_EZDXF
 from ezdxf.document import Drawing as Document
+from ezdxf.enums import TextEntityAlignment
 from ezdxf.layouts import Modelspace
+from ezdxf.lldxf.tagwriter import TagWriter
 
 from rodshell.output.drawing import FORBIDDEN, LAYERS, Drawing, Path, Text
-from rodshell.output.dxf_entities import PlainCircle, PlainLine, PlainPolyline, PlainText, Writer
 from rodshell.results.records import printable
 
 LONGEST = 200  # letters of a layer's name
 CAPITAL = 0.716  # height of Arial's capitals over the text size; a DXF text is as high as its capitals
 DATE = 2451544.5  # 2000-01-01, a Julian date
 IDENTIFIER = "{00000000-0000-0000-0000-000000000000}"
+ALIGNMENTS = {"start": TextEntityAlignment.LEFT, "middle": TextEntityAlignment.CENTER, "end": TextEntityAlignment.RIGHT}
 STYLES = {False: ("SANS", "arial.ttf"), True: ("SANS-BOLD", "arialbd.ttf")}  # which every CAD program has or replaces
 
 
@@ -37,8 +39,7 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
     for path in drawing.paths:
         _add_path(space, path, layers[path.layer])
     for mark in drawing.marks:
-        center = (*mark.at.tolist(), 0.0)
-        space.add_entity(PlainCircle(layer=layers[mark.layer], center=center, radius=float(mark.radius)))
+        space.add_circle(mark.at.tolist(), float(mark.radius), dxfattribs={"layer": layers[mark.layer]})
     for text in drawing.texts:
         _add_text(space, text, layers[text.layer])
     return _written(document)
@@ -77,7 +78,7 @@ def _written(document: Document) -> str:
     about = document.ezdxf_metadata()
     about[CREATED_BY_EZDXF] = about[WRITTEN_BY_EZDXF] = "rodshell"
     stream = StringIO()
-    document.export_sections(Writer(stream, document.dxfversion))
+    document.export_sections(TagWriter(stream, document.dxfversion))
     return stream.getvalue()
 
 
@@ -102,26 +103,23 @@ def _set_up(document: Document, layers: Mapping[str, str], drawing: Drawing) -> 
 
 
 def _add_path(space: Modelspace, path: Path, layer: str) -> None:
+    points, look = path.points.tolist(), {"layer": layer}
     if not path.flat:
-        space.add_polyline3d(path.points.tolist(), close=path.closed, dxfattribs={"layer": layer})
-    elif len(path.points) == 2:
-        start, end = ((*point, 0.0) for point in path.points.tolist())
-        space.add_entity(PlainLine(layer=layer, start=start, end=end))
+        space.add_polyline3d(points, close=path.closed, dxfattribs=look)
+    elif len(points) == 2:
+        space.add_line(*points, dxfattribs=look)
     else:
-        space.add_entity(PlainPolyline(path.points, closed=path.closed, layer=layer))
+        space.add_lwpolyline(points, close=path.closed, dxfattribs=look)
 
 
 def _add_text(space: Modelspace, text: Text, layer: str) -> None:
-    at = (*text.at.tolist(), 0.0)
-    look = {
-        "layer": layer, "style": STYLES[text.bold][0], "height": CAPITAL * text.size, "insert": at,
-        "text": _plain(text.text),
-    }  # fmt: skip
-    if text.angle:
-        look["rotation"] = degrees(text.angle)
-    if text.anchor != "start":  # on its baseline; the second point counts [DXF reference]
-        look |= {"halign": {"middle": 1, "end": 2}[text.anchor], "align_point": at}
-    space.add_entity(PlainText(**look))
+    entity = space.add_text(
+        _plain(text.text),
+        height=CAPITAL * text.size,
+        rotation=degrees(text.angle) or None,
+        dxfattribs={"layer": layer, "style": STYLES[text.bold][0]},
+    )
+    entity.set_placement(text.at.tolist(), align=ALIGNMENTS[text.anchor])
 
 
 def _plain(text: str) -> str:

@@ -1,12 +1,11 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import OutputError
 from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.layout.flatgrid import FlatGrid, FlatRod

@@ -1,6 +1,7 @@
 """Labels that never cover each other, and callouts: names along an outline, each with a line to its place."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from math import cos, hypot, sin
 from typing import NamedTuple
 
@@ -8,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats
-from rodshell.dataclass import dataclass
 from rodshell.geometry.boxes import boxes_meet, lines_meet, lines_near
 from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from rodshell.output.pictures import mode_picture
 from rodshell.output.schedules import loaded_shells
@@ -47,8 +48,6 @@ def loads_page(archive: Archive) -> dict[str, Any] | None:
     ----------
     archive : the result.
     """
-    from markupsafe import Markup
-
     results = archive.results
     shells = list(loaded_shells(results))
     if not shells:

@@ -2,15 +2,16 @@
 
 import datetime
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rodshell.checks.bending import VON_MISES, require_known_stress
 from rodshell.checks.check import MOST_STAGES
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.joints import Joint
+from rodshell.loads.strength import Limits
+from rodshell.output.drawing import FORBIDDEN, LAYERS
 from rodshell.rods.section import Rod
 from rodshell.units import shown
 from rodshell.validation import choice, instance, keep, listed, positive, whole
@@ -68,8 +69,6 @@ class DrawingStyle:
 
 def _require_names(layers: Mapping[str, str]) -> None:
     """Refuse new names of layers that a DXF file cannot have."""
-    from rodshell.output.drawing import FORBIDDEN, LAYERS  # here, as most drawings have our layers
-
     for layer, name in layers.items():
         if layer not in LAYERS:
             raise InputError(f'there is no layer "{layer}" to rename: there are {", ".join(LAYERS)}')
@@ -164,8 +163,6 @@ class OutputOptions:
         ------
         InputError : a service class is given, and nothing depends on it.
         """
-        from rodshell.loads.strength import Limits  # many options are made only to be written
-
         judged_by = self.judged_by(rod)
         return Limits.of(
             rod, asked,

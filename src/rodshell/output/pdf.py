@@ -14,6 +14,12 @@ from math import cos, sin, sqrt
 from threading import Lock
 from typing import TYPE_CHECKING
 
+from reportlab import rl_config
+from reportlab.lib.colors import HexColor
+from reportlab.pdfbase.pdfmetrics import getFont, registerFont, stringWidth
+from reportlab.pdfbase.ttfonts import TTFont
+from reportlab.pdfgen.canvas import Canvas
+
 from rodshell.errors import OutputWarning
 from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Mark, Path, Pen, Text
 from rodshell.output.drawings.sheets import source_date
@@ -43,8 +49,6 @@ def drawings_pdf(sheets: Sequence[Drawing], paper: tuple[float, float], title: s
     -----
     OutputWarning : characters that the typeface has no glyph for; they are drawn as boxes.
     """
-    from reportlab.pdfgen.canvas import Canvas
-
     _register_fonts()
     _warn_of_missing_glyphs(text.text for sheet in sheets for text in sheet.texts)
     stream = BytesIO()
@@ -77,8 +81,6 @@ def _settings() -> Iterator[None]:
 
     Both hold for the whole process, so that only one thread at a time writes a file.
     """
-    from reportlab import rl_config
-
     with ONE_AT_A_TIME:
         before, rl_config.useA85 = rl_config.useA85, 0
         no_date = os.environ.pop("SOURCE_DATE_EPOCH", None) if source_date() is None else None
@@ -92,9 +94,6 @@ def _settings() -> Iterator[None]:
 
 @cache
 def _register_fonts() -> None:
-    from reportlab.pdfbase.pdfmetrics import registerFont
-    from reportlab.pdfbase.ttfonts import TTFont
-
     for name, file in zip(SANS.values(), (REGULAR, BOLD), strict=True):
         registerFont(TTFont(name, str(file)))
 
@@ -108,15 +107,11 @@ def text_width(text: str, size: float, *, bold: bool = False) -> float:
     size : of the font; the width has the same unit.
     bold : whether the font is bold.
     """
-    from reportlab.pdfbase.pdfmetrics import stringWidth
-
     _register_fonts()
     return float(stringWidth(text, SANS[bold], size))
 
 
 def _warn_of_missing_glyphs(texts: Iterable[str]) -> None:
-    from reportlab.pdfbase.pdfmetrics import getFont
-
     glyphs = getFont(SANS[False]).face.charToGlyph
     missing = sorted(letter for letter in set().union(*texts) if ord(letter) not in glyphs)
     if missing:
@@ -188,6 +183,4 @@ def _look(text: Text) -> tuple[bool, float, str]:
 @cache
 def _colour(code: str) -> "Color":
     """ "#rrggbb" as reportlab has colours."""
-    from reportlab.lib.colors import HexColor
-
     return HexColor(code)

@@ -3,12 +3,11 @@
 The view is axonometric: from the right, the front and above, without perspective.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints, distinct
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
 from rodshell.output.drawing import Drawing, Path, Pen, Pencil
@@ -242,7 +241,7 @@ def deployment_picture(archive: Archive) -> Drawing:
     """
     known = shape_names(archive)
     names = [name for name in known if name.startswith(STAGE) or name in ("flat", "popped_pinned")]
-    chosen = distinct(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
+    chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
     view, rods, whole, last = _view_of_all(archive), rods_of(archive), Pencil(), None
     width = WIDTH + 2 * SIDE
     share = (width - 2 * GUTTER) / COLUMNS / WIDTH

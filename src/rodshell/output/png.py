@@ -1,20 +1,17 @@
-"""A drawing as PNG: lines by aggdraw, which draws soft edges; texts and the file by Pillow."""
+"""A drawing as PNG, by Pillow: lines are drawn larger and reduced, which softens their edges."""
 
-from collections.abc import Sequence
 from functools import lru_cache
 from io import BytesIO
 from zlib import Z_RLE
 
 import numpy as np
-from aggdraw import Brush, Draw
-from aggdraw import Pen as Stroke
 from PIL import Image, ImageDraw, ImageFont
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutputError
-from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Path, Text
+from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Text
 
-CAP = 0.5  # pixels
+LARGER = 3  # times, while lines are drawn
 LONGEST = 20_000.0  # drawing units, of which a picture is some 900 wide: lower letters cannot be drawn
 COLOURS = 256  # of a file at most: a third of the bytes, and no colour off by more than a tenth
 HALO = 2.0  # width of a text's halo, in drawing units
@@ -35,17 +32,16 @@ def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
     scale = width / across
     corner = np.array([low[0], high[1]])
     size = (width, round(scale * up))
-    canvas = Draw("RGB", size, "white")
-    last, stroke = None, None
-    for path, points in zip(drawing.paths, _lines(drawing.paths, corner, scale), strict=True):
-        pen = drawing.pen(path)
+    drawn = Image.new("RGB", (LARGER * size[0], LARGER * size[1]), "white")
+    canvas = ImageDraw.Draw(drawn)
+    for path in drawing.paths:
+        pen, points = drawing.pen(path), [*map(tuple, _pixels(path.points, corner, LARGER * scale).tolist())]
         if path.closed and pen.fill:
-            canvas.polygon(points, None, Brush(pen.fill))
+            canvas.polygon(points, fill=pen.fill)
         if pen.width:
-            if pen is not last:
-                last, stroke = pen, Stroke(pen.colour, scale * pen.width)
-            canvas.line(points + points[:2] if path.closed else points, stroke)
-    image = Image.frombytes("RGB", size, canvas.tobytes())
+            points += points[:1] if path.closed else []
+            canvas.line(points, pen.colour, max(1, round(LARGER * scale * pen.width)), joint="curve")
+    image = drawn.resize(size, Image.Resampling.BOX)
     letters = ImageDraw.Draw(image)
     for text in drawing.texts:
         _write(letters, text, _pixels(text.at, corner, scale), scale)
@@ -59,24 +55,6 @@ def _png(image: Image.Image) -> bytes:
     file = BytesIO()
     image.save(file, "PNG", compress_type=Z_RLE)
     return file.getvalue()
-
-
-def _lines(paths: Sequence[Path], corner: Floats, scale: float) -> list[list[float]]:
-    """The points of each path in pixels, x, y, x, y, ...
-
-    Open lines are CAP longer at both ends: where two meet, their soft ends would show as a seam.
-    """
-    pieces = [path.points for path in paths]
-    count = np.array([*map(len, pieces)], dtype=np.intp)
-    points = _pixels(np.concatenate([np.empty((0, 2)), *pieces]), corner, scale)
-    stop = np.cumsum(count)
-    still_open = (count > 1) & ~np.array([path.closed for path in paths], dtype=bool)
-    first, last = (stop - count)[still_open], stop[still_open] - 1
-    for end, inside in ((first, first + 1), (last, last - 1)):
-        along = points[end] - points[inside]
-        points[end] += CAP * along / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
-    flat = points.ravel().tolist()
-    return [flat[2 * (end - size) : 2 * end] for end, size in zip(stop.tolist(), count.tolist(), strict=True)]
 
 
 def _pixels(points: Floats, corner: Floats, scale: float) -> Floats:

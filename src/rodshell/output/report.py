@@ -8,6 +8,9 @@ import base64
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
@@ -51,9 +54,6 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     drawings : of the archive, by name, see `drawing_set`.
     files : the same as SVG files.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-
     environment = Environment(
         loader=PackageLoader("rodshell.output", "templates"),
         autoescape=True,
@@ -103,8 +103,6 @@ def _on_page(svg: str) -> str:
 
 def _view(archive: Archive) -> dict[str, Any] | None:
     """The scene, and the viewer's script and style."""
-    from markupsafe import Markup
-
     scene = scene_of(archive)
     if scene is None:
         return None

@@ -1,13 +1,13 @@
 """Figures 6 and 7: the paper's targets draped by its method, by gravity statics and bound, against the exact net."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
 from rodshell.formfinding.methods import MethodName
 from rodshell.layout import FlatGrid, FlatRod

@@ -4,14 +4,13 @@ The shells are popped up, as in the paper, with their ends pinned on G; the tabl
 rods' direction.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.formfinding import PatchForm, find_stages
 from rodshell.output.svg import tag
 from rodshell.paper.figure import (

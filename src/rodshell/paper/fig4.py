@@ -14,13 +14,13 @@ its first node starts where Eq 7 puts it; rod 2 along y.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from math import pi
 from typing import Any, Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, Pin, SharedDofs
 from rodshell.layout import mesh_grid, straight_rods

@@ -6,7 +6,7 @@ scheme is also counted in bare solves of its rods (`BareSolves`), to show that o
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from statistics import median
 from time import process_time
 from typing import Any
@@ -15,7 +15,6 @@ import numpy as np
 from scipy.linalg import solveh_banded
 from threadpoolctl import threadpool_limits
 
-from rodshell.dataclass import dataclass
 from rodshell.formfinding import Draped, Fall, drape, map_back, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import mesh_grid

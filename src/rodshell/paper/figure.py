@@ -3,14 +3,15 @@
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from os import PathLike
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from rodshell.arrays import Bools, Floats
-from rodshell.dataclass import dataclass
 from rodshell.layout import GridLayout, GridMesh
 from rodshell.output.pictures import RIGHT, TOWARDS, UP
 from rodshell.output.schedules import csv_text
@@ -203,8 +204,6 @@ def _body(target: Target) -> Floats:
 
 
 def _hull(points: Floats) -> Floats:
-    from scipy.spatial import ConvexHull
-
     return points[ConvexHull(points).vertices]
 
 

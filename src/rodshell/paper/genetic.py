@@ -6,6 +6,7 @@ popped-up shape, the direct method for the net: so the two differ.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -13,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
 from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import repeat
 from math import inf
 from multiprocessing import get_context, parent_process
@@ -15,7 +16,6 @@ from time import process_time
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.formfinding import PatchForm, agreement, pop_up
 from rodshell.formfinding.popup import PopUp

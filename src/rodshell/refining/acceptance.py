@@ -7,12 +7,11 @@ stays as it was. Each patch of a form is refined by itself: its ends at the seam
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rodshell.arrays import Floats, median
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
@@ -189,7 +188,7 @@ def _of_piece(
 
 def _check_error(form: PatchForm, span_error: float | None) -> None:
     """That an error is one of a span, and not as large as most spans are long."""
-    usual = median(span_lengths(form.footprint.mesh))
+    usual = np.median(span_lengths(form.footprint.mesh))
     if span_error is not None and not 0.0 <= span_error <= LARGEST_ERROR * usual:
         raise InputError(
             f"refine.tolerance, the largest error of a span as it is built, is {length_text(span_error)}; spans are "

@@ -1,12 +1,12 @@
 """What a design does: to the stiffnesses of edges, to their rest lengths, and to where rod ends are held."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, hstack
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.model.edge_properties import LENGTH, PROPERTIES
 
 STIFFNESSES = 4  # EA, EI1, EI2, GJ

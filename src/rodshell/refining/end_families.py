@@ -1,13 +1,12 @@
 """Families of variables at the ends of rods: directions of clamps, and supports that move along the boundary."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import radians
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
 from rodshell.model.shell import last_edges

@@ -10,14 +10,13 @@ All sizes are relative to the target's.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, eye_array
 from scipy.sparse.linalg import spsolve
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.formfinding.pipeline import PatchForm, agreement, meshed_again
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.layout import GridMesh

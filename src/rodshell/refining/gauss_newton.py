@@ -6,11 +6,12 @@ equilibrium next to the predicted one shrinks the radius, and so does one that a
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import OutOfTimeError
 from rodshell.refining.objectives import Objective, residuals, slopes
 from rodshell.refining.structure import Point
@@ -152,8 +153,6 @@ def _least_squares(matrix: Floats, right: Floats, low: Floats, high: Floats) -> 
     free = np.asarray(np.linalg.lstsq(matrix, right)[0])
     if n == 1 or bool(((low <= free) & (free <= high)).all()):
         return np.clip(free, low, high)
-    from scipy.optimize import lsq_linear  # here, as a search of one variable does not need it
-
     tight = high - low < 1e-12
     low, high = np.where(tight, low - 1e-12, low), np.where(tight, high + 1e-12, high)
     return np.asarray(lsq_linear(matrix, right, (low, high), method="bvls").x)

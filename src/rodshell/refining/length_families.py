@@ -4,13 +4,12 @@ Each moves points of rods, joints and ends, along them. Nodes between two such p
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
-from rodshell.arrays import Floats, Ints, median
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, FlatRod, GridMesh
 from rodshell.layout.flatgrid import Crossings
@@ -175,7 +174,7 @@ def usual_span(mesh: GridMesh) -> float:
     """Median distance of neighbouring joints along rods [m]."""
     entries = np.unique(mesh.at_crossings)
     same = np.diff(mesh.rod_of[entries]) == 0
-    return median(np.diff(mesh.stations[entries])[same])
+    return float(np.median(np.diff(mesh.stations[entries])[same]))
 
 
 def between(mesh: GridMesh, points: Ints) -> csr_array:

@@ -4,11 +4,12 @@ They are added to the gap (`objectives.Gap`) in a list. Each weight is that of a
 target's size: with 0.01 an excess of 10 % everywhere counts as much as an rms gap of 0.1 %.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import csr_array
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import dot
 from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES
 from rodshell.refining.change import STIFFNESSES

@@ -11,13 +11,13 @@ are solved there; v may stay, since mu is stationary in it.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.refining.structure import Point
 from rodshell.rods.elements import Elements, Stressed, Stretch, add_product
 from rodshell.solve.modes import LinearBuckling, linear_buckling

@@ -5,12 +5,12 @@ the sum, exactly, and J'J stands for half of its Hessian. A limit is a residual 
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES
 from rodshell.refining.structure import Point
 

@@ -7,10 +7,10 @@ limit on the lowest mode are tried.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement

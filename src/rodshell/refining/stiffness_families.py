@@ -6,14 +6,13 @@ variables have the same profile. The stiffness of the edges by these numbers is 
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 from scipy.sparse import csc_array
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.layout import Profile
 from rodshell.layout.profile import DOUBLE, Varies

@@ -1,13 +1,12 @@
 """The shell that is refined: its edges, its target, and equilibria of it under one design after another."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.popup import PopUp
 from rodshell.geometry.curves import on_curve

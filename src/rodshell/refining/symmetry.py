@@ -7,12 +7,14 @@ zero.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.layout import GridMesh
 
 SAME_FLAT, SAME_SHAPE = 1e-6, 1e-4  # of the size: rods are cut to 1e-6, and drapes converge to 1e-5
@@ -92,8 +94,6 @@ def symmetries(mesh: GridMesh, shape: Floats) -> tuple[Operation, ...]:
 
 def _rods_there(mesh: GridMesh, there: Floats, flat: Floats, near: float) -> tuple[Ints, Bools] | None:
     """The rod that lies where each rod is moved, and whether it runs the other way; None if one has no such rod."""
-    from scipy.spatial import cKDTree  # here: it takes a tenth of a second to import
-
     goals, moved = flat[mesh.ends].reshape(-1, 6), there[mesh.ends]
     tree = cKDTree(goals)
     same, rods = tree.query(moved.reshape(-1, 6))
@@ -128,8 +128,6 @@ def ties(count: int, images: Sequence[Image]) -> csc_array:
     every = np.arange(count)
     if not images:
         return csc_array((np.ones(count), (every, every)), shape=(count, count))
-    from scipy.sparse.csgraph import connected_components  # here: it takes a twentieth of a second to import
-
     rows, columns = [every], [every]
     for image in images:
         opposite = image.sign < 0

@@ -1,14 +1,13 @@
 """Variables of a design: values within bounds, what they do to a shell, and how they are built."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csc_array
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.formfinding.trim import Boundary
 from rodshell.layout import GridMesh
 from rodshell.refining.change import Change

@@ -10,7 +10,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,7 +18,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, OutputError
 from rodshell.results.folder import ResultFolder, reading
 from rodshell.results.manifest import inside

@@ -18,11 +18,10 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from warnings import warn
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError, OutputError, OutputWarning
 from rodshell.results.manifest import (
     MANIFEST,

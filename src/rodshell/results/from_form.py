@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, median
+from rodshell.arrays import Floats
 from rodshell.checks import Checks
 from rodshell.formfinding import Agreement as FoundAgreement
 from rodshell.formfinding import Draped, Footprint, PatchForm
@@ -286,7 +286,7 @@ def _drape(draped: Draped) -> Drape:
         more["strong_bending"] = StrongBending(**asdict(draped.figures.strong_bending))
     if draped.figures.net_deviation is not None:
         off = np.abs(draped.figures.net_deviation)
-        more["net_deviation"] = NetDeviation(max=float(off.max()), median=median(off))
+        more["net_deviation"] = NetDeviation(max=float(off.max()), median=float(np.median(off)))
     return Drape(
         method=draped.method.name,
         status=draped.report.status.value,

@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, floor, isfinite, log10, pi
 from typing import Any
 
-from rodshell.dataclass import dataclass
 from rodshell.results.records import Record
 from rodshell.results.results import Results, SelfWeight
 from rodshell.units import percent_text, stress_text

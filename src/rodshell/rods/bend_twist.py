@@ -28,14 +28,13 @@ source. An edge that turns by half a revolution from its source has no frame: th
 The branch of m_ref holds while m_ref changes by less than pi, which a node that is nearly folded may exceed.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
 from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS

@@ -6,12 +6,12 @@ A slack cable has exactly no energy, no force and no stiffness; its weight does 
 becomes taut, the force does not.
 """
 
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 

@@ -5,9 +5,9 @@ the load that acts for the shortest time decides for a combination [EN 1995-1-1:
 so that the bending of the erected shell is judged by the permanent strength.
 """
 
+from dataclasses import dataclass
 from typing import Literal
 
-from rodshell.dataclass import dataclass
 from rodshell.rods.materials import Material, PresetName
 
 Duration = Literal["permanent", "long", "medium", "short", "instantaneous"]

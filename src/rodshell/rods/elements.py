@@ -12,14 +12,13 @@ edge: at the solution the strain vanishes and N0 is the axial force.
 """
 
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.kernels import njit
 from rodshell.threads import in_threads
 from rodshell.validation import brief

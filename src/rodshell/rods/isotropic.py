@@ -14,13 +14,12 @@ triangles, each by
     tan(solid / 2) = a.(b x c) / (1 + a.b + b.c + c.a)   [Van Oosterom and Strackee 1983].
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
 from rodshell.rods.bend_twist import BendTwist, spread, strain_rates

@@ -4,9 +4,9 @@ The figures of a preset are characteristic, short-term values at the moisture an
 What building codes make of them for duration of load, moisture and safety is in `rods.design_strength`.
 """
 
+from dataclasses import dataclass
 from typing import Any, Literal, Self, get_args
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.units import shown
 from rodshell.validation import brief, keep, number, positive

@@ -4,11 +4,10 @@ A section has two axes, those of the material directors m1 and m2. The second mo
 *towards* m1 and m2: I1 is the integral of the square of the coordinate along m1.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from math import pi, tanh
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.rods.materials import Material as Material
 from rodshell.rods.materials import PresetName

@@ -11,10 +11,11 @@ A section that changes along a rod keeps its shape and its material. Which of it
 GJ of a rectangle and of an ellipse is that of the changed section.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.rods.section import Ellipse, GivenSection, RectangularSection, Rod
 

@@ -12,13 +12,12 @@ turns back at a limit point, where K is singular but the bordered system is not.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.rods.elements import Elements, twist_angles
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status

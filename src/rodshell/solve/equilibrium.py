@@ -11,7 +11,7 @@ The steps are those of `newton_step`. `SolveReport` says how a solve ended, here
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from math import isfinite
@@ -19,7 +19,6 @@ from math import isfinite
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import OutOfTimeError
 from rodshell.rods.elements import Elements
 from rodshell.solve.newton_step import NewtonStep, TooManyModesError

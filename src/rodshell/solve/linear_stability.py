@@ -20,13 +20,14 @@ inertias I tied by C2.
 
 import numpy as np
 from scipy.sparse import csc_matrix, diags, eye, triu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, StabilityError
 from rodshell.model import Assembly, Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.solve.implicit_euler import Motion
-from rodshell.solve.sparse_ldl import Factors, Qdldl, SingularError
+from rodshell.solve.sparse_ldl import Factors, Multifrontal, SingularError
 from rodshell.solve.tangent import FIRST_SHIFT, generic
 
 NO_NODES = np.empty(0, dtype=np.intp)
@@ -47,7 +48,7 @@ class ExplicitTies:
     def __init__(self, motion: Motion, free: Freedom) -> None:
         self._blocks = [element.blocks for element in (*motion.elements, *motion.explicit)]
         self._assembly = Assembly.of(self._blocks, free)
-        self._solver = Qdldl(self._assembly.indptr, self._assembly.indices)
+        self._solver = Multifrontal(self._assembly.indptr, self._assembly.indices)
         self._factors: Factors | None = None
 
     def look(self, motion: Motion, state: Floats, free: Freedom, stopped: Ints = NO_NODES) -> None:
@@ -161,15 +162,13 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     free : the free directions, without blocked ones.
     curvature : (N, 3, 3) what constraints that turn with the state add to the stiffness [N/m].
     """
-    from scipy.sparse.linalg import LinearOperator, eigsh  # here, as most forms do not need it
-
     elements: tuple[Elements, ...] = (*motion.elements, *motion.explicit, _Curvature(curvature))
     stiffness = tangent_stiffness(elements, state, free)
     root = 1.0 / np.sqrt(free.reduce_diagonal(motion.mass))
     scaled = csc_matrix(diags(root) @ stiffness @ diags(root))
     identity, shift = eye(free.size, format="csc"), FIRST_SHIFT * float(np.abs(scaled.diagonal()).mean())
     upper = triu(scaled + shift * identity, format="csc")
-    solver = Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64))
+    solver = Multifrontal(upper.indptr.astype(np.int64), upper.indices.astype(np.int64))
     while (factors := solver.factor(upper.data)).negative:
         shift *= GROWTH
         upper = triu(scaled + shift * identity, format="csc")

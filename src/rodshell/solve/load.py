@@ -12,13 +12,12 @@ unsymmetric and is left out: its inertia would say nothing on stability.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch, add_product
 from rodshell.solve.problem import Problem

@@ -11,13 +11,13 @@ the step.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import sqrt
 from typing import Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.solve.arc_length import STRAYED, ArcLength, Point
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load

@@ -13,14 +13,16 @@ takes the state for straight on: it misses what a shell sinks before it buckles,
 the path says.
 """
 
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, diags
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError, StabilityError
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load, LoadedAssembly
@@ -209,8 +211,6 @@ def _largest(tangent: Tangent, upper: csc_matrix, count: int, least: float) -> t
     for _ in range(TRIES):
         wanted = min(wanted, available)
         if size <= DENSE or wanted >= size - 1:
-            from scipy.linalg import eigh
-
             values, vectors = eigh(matrix.toarray(), stiffness.toarray())
             order = np.argsort(values)[::-1]
         else:
@@ -250,8 +250,6 @@ def _above(tangent: Tangent, upper: csc_matrix, value: float) -> int:
 
 
 def _lanczos(tangent: Tangent, matrix: csc_matrix, stiffness: csc_matrix, count: int) -> tuple[Floats, Floats]:
-    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh  # here, as most forms do not need it
-
     size = tangent.freedom.size
     inverse = LinearOperator((size, size), matvec=tangent.factors.solve, dtype=float)
     start = generic(size, 1)[0]

@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodshell.arrays import Floats, Ints
 from rodshell.kernels import njit
@@ -230,9 +232,6 @@ def narrow_or_dissected(coordinates: Floats) -> Callable[[Sequence[Ints], Freedo
 
 def _chain_order(element_blocks: Sequence[Ints], count: int) -> Ints:
     """Blocks in an order in which neighbours in a stencil are near each other."""
-    from scipy.sparse import coo_matrix  # here, as most forms do not need it
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
-
     pairs = [np.column_stack([b[:, k], b[:, k + 1]]) for b in element_blocks for k in range(b.shape[1] - 1)]
     row, column = np.vstack([*pairs, np.empty((0, 2), dtype=np.intp)]).T
     graph = coo_matrix((np.ones(len(row), dtype=np.int8), (row, column)), shape=(count, count)).tocsr()

@@ -8,12 +8,11 @@ part of it is taken. This is a trust region whose measure are the modes; the ene
 those strains.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all

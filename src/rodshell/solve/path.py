@@ -16,14 +16,14 @@ the elements where the descent starts, so that metres, radians and soft and stif
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import OutOfTimeError
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
+from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.newton_matrix import SparseSum
 from rodshell.solve.problem import Problem, Supports
 
@@ -299,8 +299,6 @@ def relax(
     -------
     Its report counts the descent's work too.
     """
-    from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused  # here, as most paths need no descent
-
     begin = time.perf_counter()
     edges = problem.stretch.with_forces(None)
     motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, ())

@@ -6,19 +6,18 @@ enters Newton's matrix. Forces on a twist angle are moments [N m] in the first c
 """
 
 from collections.abc import Callable
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.elements import Elements, Stretch, twist_angles
-from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl, product, upper_triangle
+from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, product, upper_triangle
 from rodshell.validation import array, finite, function_of, keep, number, vector
 
 if TYPE_CHECKING:
@@ -248,10 +247,10 @@ def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | 
     ----------
     assembly : of the matrices.
     free : the free directions of the blocks.
-    flat_coordinates : (n, 2) of the blocks [m]; None: ordered by approximate minimum degree.
+    flat_coordinates : (n, 2) of the blocks [m]; None: ordered by minimum degree.
     """
     if flat_coordinates is None:
-        return Qdldl(assembly.indptr, assembly.indices)
+        return Multifrontal(assembly.indptr, assembly.indices)
     return Multifrontal(
         assembly.indptr, assembly.indices, flat_coordinates.compress(free.count > 0, axis=0), blocks=assembly.rows
     )

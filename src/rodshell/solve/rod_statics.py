@@ -6,13 +6,12 @@ change along the way, where natural strains are let go bit by bit, so that `foll
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
 from rodshell.model import Freedom

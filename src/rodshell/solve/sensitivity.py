@@ -14,13 +14,13 @@ parameters. Masses W are held, and those of twist angles must be zero, since suc
 moves with the state.
 """
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.model.edge_properties import EA, LENGTH, PROPERTIES, EdgeProperties
 from rodshell.rods.elements import add_product
 from rodshell.solve.equilibrium import Equilibrium

@@ -5,6 +5,7 @@ What a motion leaves behind is a `TimeSeries`: its states at chosen times, in me
 
 import time as clock
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum
 from math import ceil
 from pathlib import Path
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import ConvergenceError, InputError, OutputError
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused, Step
 from rodshell.solve.linear_stability import refuse_unstable

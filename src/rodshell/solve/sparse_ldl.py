@@ -1,20 +1,21 @@
 """Sparse symmetric indefinite systems: LDL^T without pivoting, the analysis of a pattern apart from the factors.
 
-Two solvers have one interface (`LinearSolver`): `Qdldl`, ordered by approximate minimum degree, for small systems of
-any pattern; and `Multifrontal`, for the matrices of large grids. A solver is what follows from the pattern alone: it
-never changes and serves any number of matrices. Each factorisation gives `Factors` of its own.
+A solver is what follows from the pattern alone: it never changes and serves any number of matrices. Each factorisation
+gives `Factors` of its own.
 
 In a multifrontal factorisation the columns of the factor fall into *supernodes* with one row structure. Each has a
 dense *front*: its own columns, summed with the update matrices of its children in the elimination tree; its pivots are
 eliminated, what remains is the update matrix for its parent (Duff and Reid 1983). Dense work on contiguous blocks
-(`dense`), the order of elimination by nested dissection of the unknowns' coordinates (`dissect`), the symbolic phase
-once per pattern (`symbolic`).
+(`dense`), the order of elimination by nested dissection of the unknowns' coordinates (`dissect`) or, where they have
+none, by minimum degree; the symbolic phase once per pattern (`symbolic`).
 """
 
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import splu
 
 from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
@@ -33,10 +34,6 @@ from rodshell.solve.dense import (
 from rodshell.solve.simd_kernels import matrix_view
 from rodshell.solve.symbolic import Plan, blocks_of, coupled, plan_of
 from rodshell.threads import in_threads, threads
-
-if TYPE_CHECKING:  # imported where they are used: most forms need neither, and they take longer than the forms
-    import qdldl
-    from scipy.sparse import csc_matrix
 
 ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
 SURELY = 1e-14  # and after this small a one, no other is looked at
@@ -85,56 +82,6 @@ class LinearSolver(Protocol):
         ...
 
 
-class Qdldl:
-    """LDL^T by QDLDL, ordered by approximate minimum degree.
-
-    Parameters
-    ----------
-    indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
-    """
-
-    def __init__(self, indptr: Longs, indices: Longs) -> None:
-        self._indptr, self._indices = indptr, indices
-
-    def factor(self, data: Floats, *, reuse: Factors | None = None) -> "QdldlFactors":
-        import qdldl
-
-        matrix = upper_triangle(self._indptr, self._indices, data)
-        solver = reuse.given_away() if isinstance(reuse, QdldlFactors) else None
-        try:
-            if solver is None:
-                solver = qdldl.Solver(matrix, upper=True)
-            else:
-                solver.update(matrix, upper=True)
-        except RuntimeError as error:
-            raise SingularError(str(error)) from error
-        pivots = np.asarray(solver.factors()[1])
-        if not np.isfinite(pivots).all():
-            raise SingularError("the factorisation is not finite")
-        if not pivots.all():  # QDLDL's update does not say so, and leaves the pivots after it as they were
-            raise SingularError("a pivot of the factorisation is zero")
-        return QdldlFactors(matrix, solver, int(np.count_nonzero(pivots < 0)))
-
-
-class QdldlFactors:
-    """Factors by QDLDL (see `Factors`)."""
-
-    def __init__(self, matrix: "csc_matrix", solver: "qdldl.Solver", negative: int) -> None:
-        self._matrix, self.negative = matrix, negative
-        self._solver: qdldl.Solver | None = solver
-
-    def given_away(self) -> "qdldl.Solver | None":
-        """The solver, for other factors; these cannot be used any more."""
-        solver, self._solver = self._solver, None
-        return solver
-
-    def solve(self, right: Floats) -> Floats:
-        assert self._solver is not None, GIVEN_AWAY
-        x = np.asarray(self._solver.solve(right))
-        residual = right - self._matrix @ x - self._matrix.T @ x + self._matrix.diagonal() * x
-        return np.asarray(x + self._solver.solve(residual))
-
-
 GIVEN_AWAY = "the memory of these factors was given to another factorisation"
 
 
@@ -153,7 +100,7 @@ class Multifrontal:
     ----------
     indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
     coordinates : (n, d) where each unknown lies, or (b, d) where each of the `blocks` does, for nested dissection; None
-        orders by approximate minimum degree.
+        orders by minimum degree.
     blocks : of unknowns that lie at one place; None: they are looked for.
     """
 
@@ -276,8 +223,6 @@ def upper_triangle(indptr: Longs, indices: Longs, data: Floats) -> "csc_matrix":
     indptr, indices : the pattern, upper triangle in compressed columns.
     data : (nnz,) its values.
     """
-    from scipy.sparse import csc_matrix
-
     return csc_matrix((data, indices, indptr), shape=(len(indptr) - 1, len(indptr) - 1))
 
 
@@ -328,14 +273,12 @@ def _block_begins(coordinates: Floats) -> Longs:
 
 
 def _minimum_degree(indptr: Longs, indices: Longs) -> Longs:
-    """The AMD order, as QDLDL finds it."""
-    import qdldl
-
+    """The order by minimum degree, as SuperLU finds it."""
     size = len(indptr) - 1
     data = np.full(len(indices), 1e-3 / max(1, size))
-    data[indptr[1:] - 1] = 1.0
-    solver = qdldl.Solver(upper_triangle(indptr, indices, data), upper=True)
-    return np.asarray(solver.factors()[2], dtype=np.int64)
+    data[indptr[1:] - 1] = 0.5
+    upper = upper_triangle(indptr, indices, data)
+    return np.argsort(splu(upper + upper.T, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0).perm_c).astype(np.int64)
 
 
 @njit(error_model="numpy", nogil=True)

@@ -7,11 +7,13 @@ curvature times its contact forces. Where edges are inextensible, their stiffnes
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigsh
+from threadpoolctl import threadpool_limits
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.elements import Elements, Stressed, Stretch
@@ -343,9 +345,6 @@ def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, toleran
     )
     if settled and values[0] > 0:
         return np.asarray(row)
-    from scipy.sparse.linalg import LinearOperator, eigsh  # here, as it is rare: a stiffness that has jumped
-    from threadpoolctl import threadpool_limits
-
     size = start.shape[1]
     operator = LinearOperator((size, size), matvec=inverse, dtype=float)
     with threadpool_limits(limits=1, user_api="blas"):

@@ -9,6 +9,7 @@ import json
 import secrets
 from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager, suppress
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,6 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rodshell.case.keys import case_keys
 from rodshell.case.link import LARGEST, LARGEST_UPLOAD, OUTLINES, SURFACES, UPLOAD, require_small, upload_name
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.output.viewer import viewer_script, viewer_style
 from rodshell.studio.jobs import Jobs

@@ -12,7 +12,7 @@ import re
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,7 +20,6 @@ from typing import Annotated, Any
 from pydantic import AfterValidator
 
 from rodshell.case.load import BUILT_IN
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.studio.kept import BLOCK, NAME, Room, read_record, write_record
 from rodshell.studio.process import Heard, WorkerProcess

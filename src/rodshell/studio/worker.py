@@ -14,7 +14,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from io import BytesIO
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
@@ -24,8 +24,11 @@ from typing import TYPE_CHECKING, Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from rodshell.case.link import UPLOAD
-from rodshell.dataclass import dataclass
+from rodshell.case.load import load_case
 from rodshell.errors import InputError, RodshellError
+from rodshell.job import Job
+from rodshell.studio.preview import Preview
+from rodshell.studio.showing import checked
 
 if TYPE_CHECKING:
     from rodshell.job import Job
@@ -124,8 +127,6 @@ def job_of(order: Order) -> "Job":
     ------
     InputError : the case names another file, or cannot be used.
     """
-    from rodshell.case.load import load_case
-    from rodshell.job import Job
 
     def uploaded(value: object) -> str:
         name = value.removeprefix(UPLOAD) if isinstance(value, str) and value.startswith(UPLOAD) else ""
@@ -167,9 +168,6 @@ class _Worker:
             self._send(order, "done", {"cpu": process_time() - start})
 
     def _find(self, order: Order) -> None:
-        from rodshell.studio.preview import Preview
-        from rodshell.studio.showing import checked
-
         self._preview = show = self._preview or Preview()
         job = job_of(order)
         plain = job.changed(refine__vary="") if job.case.refine.vary else job

@@ -7,16 +7,17 @@ together. A sample (Latin hypercube, Sobol) is such a table too, so that a sweep
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from math import isfinite, pi, prod, tau
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import qmc
 
 from rodshell.arrays import Floats
 from rodshell.case import Case
 from rodshell.case.load import FILE_KEYS
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.units import shown
@@ -204,8 +205,6 @@ def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
     ------
     InputError : Sobol points, whose count is not a power of two.
     """
-    from scipy.stats import qmc
-
     if method == "sobol":
         power = (count - 1).bit_length()
         if count != 1 << power:

@@ -5,11 +5,11 @@ computing anything again.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from typing import Any
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.results.results import Results, json_schema
 from rodshell.units import shown

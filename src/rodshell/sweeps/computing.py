@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import OutputError, RodshellError
 from rodshell.job import Job
 from rodshell.progress import Progress, require_progress

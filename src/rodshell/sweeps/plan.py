@@ -2,7 +2,9 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
+from importlib.util import find_spec
 from itertools import product
 from math import prod
 from os import PathLike
@@ -11,7 +13,6 @@ from typing import Any, Literal, get_args
 
 from rodshell.case import BUILT_IN
 from rodshell.case.load import flattened, toml_of
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.sweeps.axes import BASE, Axis, read_axes
@@ -276,6 +277,8 @@ def _limit(given: Mapping[str, Any], name: str, kind: Literal["time", "memory"])
     limit = parse_quantity(value, kind, f"run.{name}")
     if limit <= 0:
         raise InputError(f"run.{name} = {shown(value)}: must be larger than zero")
+    if kind == "memory" and find_spec("psutil") is None:
+        raise InputError(f'run.{name} needs the package psutil: pip install "rodshell[sweep]"')
     return limit
 
 

@@ -5,11 +5,11 @@ The charts are plotly's; the page holds its library, the table once, and picture
 
 import json
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rodshell.case.link import studio_link
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.output.pictures import picture_svg
 from rodshell.output.svg import inline

@@ -3,11 +3,10 @@
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
-from rodshell.dataclass import dataclass
 from rodshell.progress import Progress, silent
 from rodshell.results.records import printable
 from rodshell.sweeps.columns import CONVERGED, is_usable

@@ -6,6 +6,7 @@ and on what was found, so that an interrupted search continues, and a longer one
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import ceil
 from os import PathLike
 from pathlib import Path
@@ -13,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.progress import Progress, silent
 from rodshell.sweeps.asktell import AskTell

@@ -1,13 +1,13 @@
 """The plan of a search: base, variables, objectives and constraints, read from a TOML file or a mapping."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.sweeps.axes import Axis, Span, flat_keys, read_listed, read_span

@@ -12,11 +12,11 @@ import stat
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 
-from rodshell.dataclass import dataclass
 from rodshell.errors import OutputError, RodshellError
 from rodshell.untrusted import limit, raised
 

@@ -16,8 +16,6 @@ from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
 
-import psutil
-
 from rodshell.errors import OutputError, RodshellError
 
 TICK = 0.1  # s between two looks at a process
@@ -140,6 +138,8 @@ class Worker:
         if time_limit is not None and seconds > time_limit:
             return f"it took longer than the time limit of {time_limit:g} s"
         if memory_limit is not None:
+            import psutil
+
             try:
                 used = psutil.Process(self._process.pid).memory_info().rss
             except psutil.Error:

@@ -12,6 +12,12 @@ from queue import SimpleQueue
 from time import process_time
 from typing import Any, TextIO
 
+from rodshell.errors import OutputError, RodshellError
+from rodshell.job import Job
+from rodshell.sweeps.columns import row_of
+from rodshell.sweeps.identity import program_version
+from rodshell.sweeps.store import FOUND
+
 SMALL = {"layout.rods": "5x5", "layout.spacing": "80 mm", "layout.edge": "40 mm"}
 
 
@@ -41,8 +47,6 @@ def _reply(replies: TextIO, content: dict[str, Any]) -> None:
 
 def _load_kernels() -> None:
     """Run a small job, so that the time of the first job is that of a job."""
-    from rodshell.job import Job
-
     Job.load("hemisphere", SMALL).run()
 
 
@@ -54,12 +58,6 @@ def reply_to(task: dict[str, Any]) -> dict[str, Any]:
     task : "case", its text; "until", the last stage; "archive", the folder for its files, or None; "version", of the
         coordinator.
     """
-    from rodshell.errors import OutputError, RodshellError
-    from rodshell.job import Job
-    from rodshell.sweeps.columns import row_of
-    from rodshell.sweeps.identity import program_version
-    from rodshell.sweeps.store import FOUND
-
     if task["version"] != program_version():
         return {"mismatch": program_version()}
     begun = process_time()

@@ -1,12 +1,12 @@
 """A target that is cut along its creases: smooth pieces, each with a field of its own, that meet at seams."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.targets.creases import KINK, NEAR
 from rodshell.targets.field_fitting import CLOSE, Fit

@@ -10,6 +10,7 @@ from itertools import combinations, pairwise, product
 from math import radians
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import on_curve
@@ -54,8 +55,6 @@ class Creases:
     @cached_property
     def edges(self) -> Ints:
         """(e, 2) vertices of the edges at which the mesh is creased."""
-        from scipy.spatial import cKDTree
-
         mesh, (i, j), edges = self.mesh, self.neighbours.faces.T, self.neighbours.edges
         normals, centres = unit(mesh.doubled), mesh.vertices[mesh.faces].mean(axis=1)
         bent = np.flatnonzero(_angle(normals[i], normals[j]) > KINK)

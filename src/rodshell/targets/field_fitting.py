@@ -1,12 +1,11 @@
 """From a triangle mesh to its smooth field: least squares of its samples, continuation past an open rim."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
 from rodshell.targets.samples import LONGEST, Samples, fill_openings, mesh_samples

@@ -1,15 +1,15 @@
 """A target given by a surface in triangles: its smooth field, where the shell ends, and its highest point."""
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from rodshell.arrays import Bools, Floats, Ints, distinct
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.targets.creases import Creases
@@ -303,13 +303,11 @@ class Freeform(Target):
     @cached_property
     def _facets_by_size(self) -> "list[tuple[cKDTree, Ints, float]]":
         """Trees of facets' centres in plan, one for each power of two of their widths; the facets; and that width."""
-        from scipy.spatial import cKDTree
-
         plan = self.surface.vertices[self.surface.faces, :2]
         low, high = plan.min(axis=1), plan.max(axis=1)
         reach = np.maximum(np.linalg.norm(high - low, axis=1), 1e-9 * self._extent)  # twice of what is enough
         octave = np.ceil(np.log2(reach)).astype(int)
-        groups = [(np.flatnonzero(octave == k), 2.0**k) for k in distinct(octave).tolist()]
+        groups = [(np.flatnonzero(octave == k), 2.0**k) for k in np.unique(octave).tolist()]
         return [(cKDTree(0.5 * (low + high)[some]), some, far) for some, far in groups]
 
     def _heights_of_facets(self, xy: Floats) -> Floats:
@@ -334,8 +332,6 @@ class Freeform(Target):
 
     def _heights_of_fillings(self, xy: Floats) -> Floats:
         """z (n,) of the uppermost cubic on the surface, or filling an opening, near points of the plan, or NaN."""
-        from scipy.spatial import cKDTree
-
         centres = self.field.centres[: self._fitted.cubics]
         near = cKDTree(centres[:, :2]).query_ball_point(xy, self.field.spacing)
         return np.array([centres[found, 2].max() if found else np.nan for found in near])

@@ -2,16 +2,16 @@
 
 import io
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import cos, radians
 from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.targets.apart import cause
 from rodshell.targets.curve_files import read_curves
@@ -264,8 +264,6 @@ def smoothed(grey: Floats, step: float) -> Floats:
 
 def _splined(values: Floats, weight: float) -> Floats:
     """The z (n, m) that minimise |z - values|^2 + weight |second differences of z along the columns|^2."""
-    from scipy.linalg import solveh_banded
-
     count = len(values)
     bands = np.zeros((3, count))  # of weight D^T D, D the second differences; the upper ones
     for k, factor in enumerate((1.0, -2.0, 1.0)):

@@ -1,7 +1,7 @@
 """A height function with its derivatives at any point of the plan, and whether it is smooth enough for a target."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite
 from typing import Any
@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.targets.jet import Jet, differences
 from rodshell.targets.rim import Disc, Rectangle

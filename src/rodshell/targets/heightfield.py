@@ -7,7 +7,7 @@ import ast
 import operator
 import re
 from collections.abc import Callable
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from math import e, inf, isfinite, pi
@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.targets.height_function import Heights, climb, relative_radius, require_smooth, sample, trusted_region
 from rodshell.targets.jet import Jet

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints, distinct
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.targets.apart import unreadable
 from rodshell.targets.gltf import gltf_counts, gltf_parts
@@ -58,7 +58,7 @@ def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = 
     if not len(faces):
         raise InputError(f"{path} has no faces, or is damaged: export the surface as a mesh of triangles")
     listed, notes = len(vertices), Notes()
-    loose = listed - len(distinct(faces))
+    loose = listed - len(np.unique(faces))
     if name is None and loose > LOOSE * listed:
         notes = (
             f"{loose} of the {listed} vertices of {path.name} belong to no face: if it lacks any, export it again",

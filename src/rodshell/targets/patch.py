@@ -1,12 +1,12 @@
 """Patches: the parts into which seams cut a target, each itself a target that ends at them."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import unit
 from rodshell.targets.target import Gap, Implicit, Target

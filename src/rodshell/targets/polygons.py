@@ -1,9 +1,10 @@
 """Faces with any number of corners, split into triangles of the best shape."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints, distinct
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot
 from rodshell.targets.trianglemesh import require_indices
@@ -54,7 +55,7 @@ class Polygons:
             )
         first = np.cumsum(self.sizes) - self.sizes
         parts, of = [np.empty((0, 3), dtype=np.intp)], [np.empty(0, dtype=np.intp)]
-        for count in distinct(self.sizes[self.sizes > 2]).tolist():
+        for count in np.unique(self.sizes[self.sizes > 2]).tolist():
             faces = np.flatnonzero(self.sizes == count)
             for some in np.array_split(faces, -(-len(faces) * count**2 // AT_ONCE)):
                 around = self.corners[first[some][:, None] + np.arange(count)]

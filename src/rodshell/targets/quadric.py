@@ -1,13 +1,13 @@
 """The paper's targets [HQK Eqs 13a-c] and the spherical cap: quadrics over a base plane."""
 
 from abc import abstractmethod
+from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.targets.rim import Disc, Domain, EllipseDomain

@@ -7,15 +7,16 @@ little, and alike (`Rim.of`). Jagged edges of meshes are smoothed.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
+from scipy.sparse import coo_matrix, diags_array
+from scipy.sparse.linalg import spsolve
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.geometry.curves import TOUCH, on_curve
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
@@ -475,9 +476,6 @@ def _rows(jogs: Ints, count: int) -> list[Ints]:
 def _splined(loop: Floats, edge: Floats, free: Bools, weight: float) -> Floats:
     """The z (n, 3) that minimise |(z - loop) / edge|^2 + weight |third differences of z around the loop / edge|^2,
     with the vertices that are not free held."""
-    from scipy.sparse import coo_matrix, diags_array
-    from scipy.sparse.linalg import spsolve
-
     count = len(loop)
     rows = np.arange(count)
     third = coo_matrix(

@@ -1,11 +1,13 @@
 """Samples of the smooth surface that a triangle mesh represents; openings in it are filled by caps."""
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.spatial import ConvexHull, QhullError
 
 from rodshell.arrays import Bools, Floats
-from rodshell.dataclass import dataclass
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.targets.trianglemesh import TriangleMesh, unique_rows
 
@@ -135,8 +137,6 @@ def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Sampl
 
 def _doors(rim: Floats, spacing: float) -> list[Floats]:
     """Deep bays of a closed polyline (n, 3): parts of it inside its convex hull, in the plane that fits it best."""
-    from scipy.spatial import ConvexHull, QhullError
-
     if len(rim) < 4:
         return []
     centred = rim - rim.mean(axis=0)
@@ -162,8 +162,6 @@ def _doors(rim: Floats, spacing: float) -> list[Floats]:
 
 def _cap(rim: Floats, samples: Samples, spacing: float) -> tuple[Floats, Floats] | None:
     """Points and normals (n, 3) on a lattice over the plane of a rim (k, 3); None where no smooth cap fits."""
-    from scipy.interpolate import RBFInterpolator
-
     centre = rim.mean(axis=0)
     axis = cross(np.roll(rim, -1, axis=0) - centre, rim - centre).sum(axis=0)  # the hole is on the right of its loop
     axis /= max(float(np.linalg.norm(axis)), 1e-300)

@@ -13,12 +13,12 @@ Neighbours of points are found in a list of cells, searched by compiled loops: p
 cells of one size are faster than a tree.
 """
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.targets.target import Implicit

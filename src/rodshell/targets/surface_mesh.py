@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints, distinct
+from rodshell.arrays import Floats, Ints
 from rodshell.targets.target import Target
 
 CELLS = 56  # along the longer side of the plan
@@ -36,7 +36,7 @@ def surface_mesh(target: Target, around: Floats, *, cells: int = CELLS) -> tuple
     if len(crossings):
         points = np.concatenate([points, _at_the_end(target, plan, crossings)])
     faces = np.concatenate([faces[count == 3], cut])
-    used = distinct(faces)
+    used = np.unique(faces)
     return points[used], np.searchsorted(used, faces)
 
 

@@ -1,13 +1,15 @@
 """A triangle mesh as a surface: vertices merged, faces oriented alike, in one smooth piece; others are refused."""
 
+from dataclasses import dataclass
 from functools import cached_property
 from math import cos, degrees, radians
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from rodshell.arrays import Bools, Floats, Ints, Longs
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
 
@@ -232,9 +234,6 @@ def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
 
 def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]:
     """The mesh without stray objects: faces that no edge connects to the rest."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     first, edge = unique_rows(np.column_stack([np.minimum(a, b), np.maximum(a, b)]).astype(np.int64))
     count = len(mesh.faces)
@@ -322,17 +321,11 @@ class Neighbours:
 
     def pieces(self, keep: Bools, faces: int) -> Ints:
         """Index (m,) of the piece of each face, where only the edges `keep` (e,) connect faces."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         i, j = self.faces[keep].T
         return np.asarray(connected_components(coo_matrix((np.ones(len(i)), (i, j)), (faces, faces)), False)[1])
 
     def turned(self, faces: int, name: str, mesh: TriangleMesh) -> Bools:
         """(m,) which faces are oriented against the first one."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import breadth_first_order
-
         i, j = self.faces.T
         if not len(i):  # a single face, and SciPy cannot look up no entries
             return np.zeros(faces, dtype=bool)
@@ -361,8 +354,6 @@ def _volume(mesh: TriangleMesh) -> float:
 def turns_at(mesh: TriangleMesh, neighbours: Neighbours) -> Floats:
     """Cosines (e,) of the angles by which a mesh turns at the edges between two faces, and from what is on one side of
     them to what is on the other: the larger of both."""
-    from scipy.sparse import coo_matrix
-
     i, j = neighbours.faces.T
     # A sliver's own normal is noise: it is judged with the two rows of faces behind it, by their areas near its edges.
     ends = mesh.vertices[neighbours.edges]

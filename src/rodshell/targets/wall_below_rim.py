@@ -6,14 +6,13 @@ A grid that falls under gravity meets this body. The rim of analytic targets and
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.dataclass import dataclass
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
 from rodshell.targets.rim import CORNER, UPRIGHT, Domain, Rim

@@ -5,13 +5,13 @@ distances start at one end, so that errors do not add up.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, distinct, median
-from rodshell.dataclass import dataclass
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
 from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
@@ -77,7 +77,7 @@ class FlatPlan:
         steps = [np.diff(np.sort([at for _, at in rod.joints])) for rod in self.rods]
         steps = [step[step > 1e-6] for step in steps]
         known = np.concatenate(steps) if steps else np.empty(0)
-        return 1e3 * median(known) if len(known) else self.extent / 10
+        return 1e3 * np.median(known) if len(known) else self.extent / 10
 
     @cached_property
     def notes(self) -> list[str]:
@@ -231,7 +231,7 @@ def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
     """
     found = []
     for patch in _patches(plan):
-        x, y = (distinct(np.round([_offset(plan.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
+        x, y = (np.unique(np.round([_offset(plan.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
         met = np.zeros((len(y), len(x)), dtype=bool)
         for u, v in patch:
             row, column = (int(np.abs(offsets - _offset(plan.rods[k])).argmin()) for offsets, k in ((y, u), (x, v)))
