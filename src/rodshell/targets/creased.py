@@ -9,7 +9,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
 from rodshell.targets.creases import KINK, NEAR
-from rodshell.targets.field_fitting import CLOSE, Fit
+from rodshell.targets.field_fitting import Fit
 from rodshell.targets.freeform import TIE, Freeform
 from rodshell.targets.patch import Seam
 from rodshell.targets.target import Deviation, Implicit, Target
@@ -18,6 +18,7 @@ from rodshell.targets.trianglemesh import Neighbours, smooth_piece
 STEP = 0.02  # of the half extent: distance of the points at which continued pieces are followed to where they meet
 ROUNDS = 2  # in which seams along creases that faces bridge are moved to where the pieces meet
 CLEAR = 0.25  # of the largest turn along a crease: where it fades to less, where it runs is not clear
+FOLLOWED = 5e-4  # of the size: a mesh that one field follows as closely is not cut
 DENSE = 0.04  # of the size: distance of the points by which the patches are found
 
 
@@ -172,7 +173,7 @@ def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
         target = target.uncut
     if not isinstance(target, Freeform):
         return target
-    if not drawn or (not target.creased and target.deviation.max < CLOSE * target.size):
+    if not drawn or (not target.creased and target.deviation.max < FOLLOWED * target.size):
         target.require_usable()
         return target
     lines = [target.creases.along(seam) for seam in drawn]
