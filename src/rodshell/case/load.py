@@ -25,7 +25,7 @@ Raw = dict[str, Any]
 
 def _paper(rods: tuple[int, int]) -> Raw:
     """A grid of the paper [HQK section 3.1] with so many rods along x and y."""
-    grid = {"rods": rods, "spacing": 0.03, "length": 1.2, "edge": 0.005}
+    grid = {"rods": rods, "spacing": 0.03, "length": 1.2}
     return {"layout": grid, "rod": {"section": {"radius": 0.001}, "material": {"youngs_modulus": 1e6}}}
 
 

@@ -10,8 +10,8 @@ from rodshell.arrays import Floats
 from rodshell.dataclass import dataclass
 from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
 from rodshell.formfinding.methods import MethodName
-from rodshell.layout import FlatGrid, FlatRod
-from rodshell.nets import chebyshev_net
+from rodshell.formfinding.trim import ends_past_net
+from rodshell.layout import FlatGrid
 from rodshell.paper.figure import (
     CASES,
     FINAL,
@@ -138,14 +138,11 @@ def _drape(case: Case, method: MethodName, fall: Fall, progress: Progress) -> Dr
     draped = drape(case.layout, ROD, case.target, method=options[method], progress=case_progress)
     trimmed = trim(draped)
     seconds = perf_counter() - begun
-    exact: dict[str, FlatRod] = {rod.name: rod for rod in chebyshev_net(case.target, case.layout).rods}
-    rods = trimmed.mesh.grid.rods
-    of_net = [exact[rod.name] for rod in rods]
-    ends, net = (np.array([[rod.start, rod.end] for rod in found]) for found in (rods, of_net))
-    if draped.figures.net_deviation is not None:
-        past = dict(zip([rod.name for rod in draped.rods], draped.figures.net_deviation, strict=True))
-        ends += np.array([past[rod.name] for rod in rods]) * [-1.0, 1.0]
-    return DrapeRun(case, method, draped, trimmed, seconds, ends, net)
+    past, cuts = ends_past_net(trimmed), np.array([(rod.start, rod.end) for rod in trimmed.mesh.grid.rods])
+    assert past is not None
+    outwards = past * [-1.0, 1.0]
+    net = cuts if method == "bound" else cuts - outwards
+    return DrapeRun(case, method, draped, trimmed, seconds, net + outwards, net)
 
 
 def rows_svg(drapes: Sequence[DrapeRun]) -> str:

@@ -182,7 +182,7 @@ def timed_fall(case: Case, coupling: Coupling, step: float, falling: float, prog
 
 
 def _fall(case: Case, coupling: Coupling, step: float, falling: float, progress: Progress) -> Draped:
-    fall = Fall(coupling=coupling, time_step=step, duration=falling, settle=False)
+    fall = Fall(coupling=coupling, time_step=step, duration=falling, drag=0.0, settle=False)
     return drape(case.layout, ROD, case.target, method=fall, progress=progress)
 
 
