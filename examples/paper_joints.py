@@ -1,7 +1,7 @@
 """The paper's Fig 4: one of two crossing rods is twisted, or turned [Eq 7], at 10 rpm; does the other follow?
 
-With linkers it does, in both demonstrations. A pin holds the rods together out of their plane and in twist: it passes (a)
-and, being free about its axis, cannot pass (b). Rods, supports and time stepping are in `rodshell/paper/fig4.py`.
+With linkers it does, in both demonstrations. A pin holds the rods together out of their plane and in twist: it passes
+(a) and, being free about its axis, cannot pass (b). Rods, supports and steps are in `rodshell/paper/fig4.py`.
 """
 
 import numpy as np
