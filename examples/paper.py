@@ -2,7 +2,7 @@
 
 W. Huang, L. Qin, M. Khalid Jawed, J. Appl. Mech. 88 (2021). The paper's dome and rod [Eq 13a, section 3.2], on a wider
 grid so that it runs in seconds. For another target change the first line; for the paper's grid, `rodshell paper fig6`.
-Linkers resist the scissoring of the net, more so on a coarse mesh [docs/equations.md, E10]: the shell leaves its target.
+Linkers resist the scissoring of the net, more so on a coarse mesh [docs/equations.md, E10]: the shell leaves it.
 """
 
 import numpy as np
