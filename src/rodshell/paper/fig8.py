@@ -107,7 +107,7 @@ class Fig8(Figure):
         """Exponents of the unknowns in the times of the sizes, by method and target [-]."""
         return {
             method: {
-                target: _slope([float(one.dofs) for one in same], [one.seconds for one in same])
+                target: _slope([float(run.dofs) for run in same], [run.seconds for run in same])
                 for target, same in _by_target(of_sizes(self.timings, method)).items()
             }
             for method in ("explicit", "ours")
@@ -180,7 +180,7 @@ def _slope(x: Sequence[float], y: Sequence[float]) -> float:
 
 def of_sizes(timings: Sequence[Timing], method: str) -> list[Timing]:
     """The runs of a method at all sizes."""
-    return [one for one in timings if one.method == method and one.step in (0.0, SIZE_STEP)]
+    return [run for run in timings if run.method == method and run.step in (0.0, SIZE_STEP)]
 
 
 def _by_target(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
