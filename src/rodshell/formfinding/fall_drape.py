@@ -19,7 +19,7 @@ from rodshell.formfinding.gravity_drape import anchor_point, initial_grid, lost_
 from rodshell.formfinding.methods import Draped, DrapeFigures, Fall, smallest_joint_angle
 from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force
 from rodshell.geometry.frames import dot
-from rodshell.joints import Joint, SharedDofs
+from rodshell.joints import ImplicitPenalty, Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell
 from rodshell.progress import Progress, silent
@@ -204,8 +204,8 @@ class _FallSimulation:
         spent = process_time() - self._begun
         if spent < SLOW:
             return said
-        shared = isinstance(self.fall.coupling, SharedDofs)
-        fewer = "a longer layout.edge has fewer" if shared else 'drape.coupling "shared" has fewer, and the same rest'
+        tied = isinstance(self.fall.coupling, ImplicitPenalty)
+        fewer = 'drape.coupling "shared" has fewer, and the same rest' if tied else "a longer layout.edge has fewer"
         unknowns = self.shell.freedom().size
         return f"{said}; {spent / steps:.1g} s of processor time a step, for {unknowns} unknowns: {fewer}"
 

@@ -214,9 +214,9 @@ def _scatter(x: Floats, drawn: Sequence[tuple[str, str, Floats]]) -> Iterator[st
         return 30 + (PANEL - 36) * (np.asarray(across) / wide + 1) / 2, foot * (high - np.asarray(up)) / (high - low)
 
     for tick in nice_ticks(low, high, 5):
-        y = float(at(0.0, tick)[1])
-        yield tag("line", x1=30, x2=PANEL, y1=y, y2=y, stroke=INK if tick == 0 else LINE, stroke_width=0.8)
-        yield label(f"{tick:g}", 26, y + 3, 9.0, fill=SOFT, text_anchor="end")
+        height = float(at(0.0, tick)[1])
+        yield tag("line", x1=30, x2=PANEL, y1=height, y2=height, stroke=INK if tick == 0 else LINE, stroke_width=0.8)
+        yield label(f"{tick:g}", 26, height + 3, 9.0, fill=SOFT, text_anchor="end")
     for tick in (-wide, 0.0, wide):
         yield label(f"{tick:.0f}", float(at(tick, 0.0)[0]), foot + 12, 9.0, fill=SOFT, text_anchor="middle")
     for k, (name, colour, y) in enumerate(drawn):

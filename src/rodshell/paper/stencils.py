@@ -24,7 +24,7 @@ from rodshell.targets import Hemisphere
 EDGE, NODES = 5e-3, 5
 RADIUS, DEPTH, HANGING = 0.2, 0.02, 0.04  # [m] of the section in contact; deep, to be seen
 COLUMNS = ("figure", "what", "unknowns", "bend stencils", "ties of nodes", "of angles")
-Places = dict[int, Floats]  # of blocks, in a panel
+Drawn = dict[int, Floats]  # of blocks, in a panel
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,10 @@ def _rod(rod: ElasticRod) -> Iterator[str]:
     """An arc: nodes x_i, angles theta_i at the middles of edges, and the second of three stencils."""
     turn = np.linspace(-0.9, 0.9, NODES)
     nodes = 0.5 * PANEL + 0.42 * PANEL * np.column_stack([np.sin(turn) / np.sin(0.9), 1.2 - 1.6 * np.cos(turn)])
-    places = dict(enumerate(nodes)) | {NODES + k: (nodes[k] + nodes[k + 1]) / 2 for k in range(NODES - 1)}
+    drawn = dict(enumerate(nodes)) | {NODES + k: (nodes[k] + nodes[k + 1]) / 2 for k in range(NODES - 1)}
     yield _line(nodes, INK, 1.2)
-    yield _line(np.array([places[block] for block in rod.elements[0].blocks[1]]), FAMILY["u"], 3.5)
-    for block, at in places.items():
+    yield _line(np.array([drawn[block] for block in rod.elements[0].blocks[1]]), FAMILY["u"], 3.5)
+    for block, at in drawn.items():
         node, number = block < NODES, block % NODES + 1
         yield from _mark(at, f"x{number}" if node else f"\N{GREEK SMALL LETTER THETA}{number}", INK, hollow=not node)
 
@@ -104,22 +104,22 @@ def _element(shell: Shell) -> Iterator[str]:
     """Two rods and two linkers, each on its own blocks; those that are tied are joined by dashed lines."""
     linkers = next(element for element in shell.elements if isinstance(element, LinkerBend)).blocks
     apart = _apart(shell)
-    places = _places(shell, linkers)
+    drawn = _drawn(shell, linkers)
     for number, blocks in enumerate(linkers.tolist()):
-        yield _line(np.array([places[block] for block in blocks[::2]]), FLAT, 3.0 if apart else 8.0, stroke_opacity=0.6)
+        yield _line(np.array([drawn[block] for block in blocks[::2]]), FLAT, 3.0 if apart else 8.0, stroke_opacity=0.6)
         for k, block in enumerate(blocks[::2] if apart else ()):
-            yield from _mark(places[block], f"x^{number + 1},{k + 1}", FLAT)
+            yield from _mark(drawn[block], f"x^{number + 1},{k + 1}", FLAT)
     for rod, family in enumerate("uv"):
         blocks = shell.node_blocks[rod * NODES : (rod + 1) * NODES]
-        yield _line(np.array([places[block] for block in blocks.tolist()]), FAMILY[family], 1.6)
+        yield _line(np.array([drawn[block] for block in blocks.tolist()]), FAMILY[family], 1.6)
         for k, block in enumerate(blocks.tolist()):
             yield from _mark(
-                places[block], f"x{rod + 1},{k + 1}" if apart or k != 2 else "joint" if rod else "", FAMILY[family]
+                drawn[block], f"x{rod + 1},{k + 1}" if apart or k != 2 else "joint" if rod else "", FAMILY[family]
             )
     for element in shell.elements:
         if isinstance(element, Ties):
             for a, b in element.blocks.tolist():
-                yield _line(np.array([places[a], places[b]]), SOFT, 0.9, stroke_dasharray="3 2")
+                yield _line(np.array([drawn[a], drawn[b]]), SOFT, 0.9, stroke_dasharray="3 2")
 
 
 def _apart(shell: Shell) -> bool:
@@ -127,23 +127,23 @@ def _apart(shell: Shell) -> bool:
     return len(set(shell.node_blocks.tolist())) == len(shell.node_blocks)
 
 
-def _places(shell: Shell, linkers: np.ndarray) -> Places:
+def _drawn(shell: Shell, linkers: np.ndarray) -> Drawn:
     """Where each block is drawn: in the flat grid; rods and linkers that are apart aside from each other."""
     mesh, scale = shell.mesh, 0.42 * PANEL / (2 * EDGE)
     flat = 0.5 * PANEL + scale * mesh.flat[:, :2] * [1.0, -1.0]
     middles = (flat[mesh.edges[:, 0]] + flat[mesh.edges[:, 1]]) / 2
     at = np.vstack([flat, middles])
-    places: Places = {block: at[like].copy() for block, like in enumerate(shell.like.tolist())}
+    drawn: Drawn = {block: at[like].copy() for block, like in enumerate(shell.like.tolist())}
     if not _apart(shell):
-        return places
+        return drawn
     angles = shell.first_angle + NODES - 1  # of rod 2
     for block in (*range(NODES, 2 * NODES), *range(angles, angles + NODES - 1)):
-        places[block] += [9.0, -9.0]
+        drawn[block] += [9.0, -9.0]
     for blocks in linkers.tolist():
-        ends = (places[blocks[0]] + places[blocks[-1]]) / 2 - places[blocks[2]]
+        ends = (drawn[blocks[0]] + drawn[blocks[-1]]) / 2 - drawn[blocks[2]]
         for block in blocks:
-            places[block] += 1.3 * ends
-    return places
+            drawn[block] += 1.3 * ends
+    return drawn
 
 
 def _contact() -> Iterator[str]:
