@@ -1,6 +1,7 @@
 """Figure 8 at a coarse size: what is timed is what the table says."""
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
@@ -45,6 +46,17 @@ def test_six_sizes_span_the_papers_range_and_more_unknowns_take_longer() -> None
     nodes = [sum(size.rods) * (round(1.2 / size.edge) + 1) for size in fig8.sizes_of(CASES[0])]
     assert min(nodes) < 400
     assert max(nodes) > 10_000
+
+
+def test_all_documents_have_the_ratio_of_the_figure() -> None:
+    """One ratio of speed, measured one way: that of docs/paper/fig8/result.json."""
+    docs = Path(__file__).parents[2] / "docs"
+    ratios = json.loads((docs / "paper" / "fig8" / "result.json").read_text())["ratios"]
+    readme, benchmarks = (docs.parent / "README.md").read_text(), (docs / "performance.md").read_text()
+    assert f"takes {ratios['hemisphere']:.0f} times the processor time" in readme
+    said = dict(re.findall(r"the paper's fall of 2 s over ours, (\w+) \| (\d+) times", benchmarks))
+    assert said == {name: f"{ratio:.0f}" for name, ratio in ratios.items()}
+    assert min(ratios.values()) > 50
 
 
 @pytest.mark.slow
