@@ -37,9 +37,9 @@ COMPARED = {  # what the paper shows in this place
     "fig7": 'The paper: the flat grids "match well with the analytical solution in both of these two cases".',
     "fig8": "The paper, on one thread of an i7-6600U at some 8000 unknowns: 50 s (hemisphere), 30 s (paraboloid), 20 s "
     "(ellipsoid), which may be simulated times or computing times: the diamonds in (b). Its chart against unknowns has "
-    "h = 0.1 s, at which explicit ties are unstable (E7); ours has 5 ms, at which all six sizes are stable. The machine "
-    "did other work: a fall is slowed by it all the time, while of our own runs, which are short, the least of four "
-    "counts.",
+    "h = 0.1 s, at which explicit ties are unstable (E7); ours has 5 ms, at which all six sizes are stable. The "
+    "machine did other work: a fall is slowed by it all the time, while of our own runs, which are short, the least "
+    "of four counts.",
     "genetic": 'The paper: a hemispherical gridshell "may take approximately" 100 generations of 500 individuals, or '
     "50,000 forward simulations, where its direct method needs one. It shows the algorithm's G0 for the paraboloid and "
     "the ellipsoid, from reference 30, as a line in its figure, without numbers. There is one search for each target, "

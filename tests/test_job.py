@@ -68,7 +68,7 @@ def test_options_a_file_and_python_make_the_same_job(tmp_path: Path) -> None:
 
 
 def test_a_job_of_objects_is_the_job_of_their_case() -> None:
-    layout = rs.GridLayout.orthogonal(rods=(17, 17), spacing=0.03, length=1.2)
+    layout = rs.GridLayout.orthogonal(rods=(17, 17), spacing=0.03, length=1.2, edge=0.005)
     job = rs.Job(rs.Hemisphere(SIZE), layout, ROD)
     assert job == rs.Job.load("hemisphere")
     other = rs.Job(

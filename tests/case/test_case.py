@@ -21,7 +21,7 @@ radius = "200 mm"
 rods = [17, 17]
 spacing = "30 mm"
 length = "1.2 m"
-edge = "auto"
+edge = "5 mm"
 rotate = "0 deg"
 offset = [0.0, 0.0]
 [rod]
@@ -70,7 +70,7 @@ def test_built_in_cases_have_the_papers_values(name: str, target: dict[str, obje
         "rods": rods,
         "spacing": (0.03, 0.03),
         "length": 1.2,
-        "edge": "auto",
+        "edge": 0.005,
         "rotate": 0.0,
         "offset": (0.0, 0.0),
         "left_out": (),
@@ -149,7 +149,7 @@ def test_an_override_is_what_the_file_would_say(load: Any) -> None:
     overrides |= {"drape.anchor": "0.1,0", "rod.material.youngs_modulus": "25 GPa"}
     text = """
     target.radius = "250 mm"
-    layout = { rods = [13, 11], spacing = [0.04, "50 mm"], length = "1.2 m" }
+    layout = { rods = [13, 11], spacing = [0.04, "50 mm"], length = "1.2 m", edge = 0.005 }
     drape.anchor = ["100 mm", 0]
     rod.section.radius = "1 mm"
     rod.material.youngs_modulus = 25e9
