@@ -146,6 +146,10 @@ def shared_rows() -> Iterator[Row]:
         size = 1e3 * TARGETS[name].size
         note = f"rest after {rest.time:.1f} s, growth {rest.fastest_growth:.2f}/s; {draped.report.seconds:.0f} s"
         yield Row(f"{name}, shared DOFs", "not at rest", float(not rest.at_rest), 0, "", note)
+        lost = not hanging(name).converged
+        yield Row(f"{name}, gravity statics", "not at rest", float(lost), 0, "", hanging(name).report.status.value)
+        if lost:
+            continue
         off = apart(draped, hanging(name))
         yield Row(f"{name}, shared DOFs", "nodes off gravity statics", off / size, 1e-3, "R", f"{off:.3f} mm")
         if name == "hemisphere":
