@@ -194,6 +194,9 @@ class Run:
         method = found.method
         if isinstance(method, Fall) and case.drape.frames is not None and case.drape.held is None:
             method = replace(method, stream=self.frames_in / case.drape.frames)
+        if isinstance(method, Fall) and self.announce is not None:
+            height = length_text(method.height)
+            self.announce(f"the flat grid falls from {height} above the target until it is at rest; then it is trimmed")
         earlier = self.earlier.unrefined if self.earlier is not None else None
         streams = isinstance(method, Fall) and method.stream is not None
         return find_stages(

@@ -12,6 +12,7 @@ import rodshell as rs
 from rodshell.case import load_case
 from rodshell.cli import main
 from rodshell.errors import InputError, OutputError, StabilityError
+from rodshell.formfinding import fall_drape
 from rodshell.formfinding.methods import Draped, Fall
 from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
@@ -19,6 +20,7 @@ from rodshell.results.manifest import read_manifest
 from rodshell.solve.equilibrium import Status
 from rodshell.solve.simulate import TimeSeries
 from tests.formfinding.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
+from tests.nets.sphere_net import sphere_net_end
 
 TENTH = 0.1e-3  # [m]
 DRAG = 5.0  # 1/s: the hanging tails, pendulums of 0.3 m, stop swinging within two seconds
@@ -94,6 +96,67 @@ def test_a_fall_that_is_cut_short_says_that_it_is_not_at_rest() -> None:
     assert not draped.converged
     assert draped.report.status is Status.MOVING
     assert "NOT AT REST after 0.3 s" in draped.warnings[0]
+
+
+@pytest.mark.parametrize("size", [0.2, 27.0])
+def test_a_fall_has_two_edges_a_spacing_unless_the_edge_is_given(size: float) -> None:
+    """15 mm on the paper's grids, by the same rule at any size; a given edge is kept, be it the usual sixth."""
+    target, spacing = rs.Hemisphere(size), 0.4 * size
+    for edge, wanted in (("auto", spacing / 2), (spacing / 6, spacing / 6)):
+        layout = rs.GridLayout.orthogonal(rods=(3, 3), spacing=spacing, length=4.0 * size, edge=edge)
+        draped = rs.drape(layout, PAPER_ROD, target, method=Fall(duration=1e-3))
+        assert draped.layout.edge == pytest.approx(wanted)
+        assert draped.mesh.edge_lengths.max() == pytest.approx(wanted)
+        assert rs.drape(layout, PAPER_ROD, target).layout.edge == pytest.approx(spacing / 6)
+
+
+def test_the_built_in_hemisphere_falls_with_the_papers_unknowns() -> None:
+    found = load_case("hemisphere", {"drape.method": "paper"}).build()
+    assert found.layout.edge == 0.015  # some 8000 unknowns [HQK 3.3], E21
+    assert load_case("hemisphere").build().layout.edge == 0.005
+
+
+def test_a_slow_fall_says_what_makes_it_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fall_drape, "SLOW", 0.0)
+    said: dict[str, str] = {}
+    for coupling in (SharedDofs(), ImplicitPenalty()):
+        fall = Fall(coupling=coupling, duration=0.1)
+        rs.drape(
+            coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall, joint=Linker(),
+            progress=lambda stage, detail, residual, name=coupling.name: said.update({name: detail}),
+        )  # fmt: skip
+    assert "a step, for" in said["shared"]
+    assert said["shared"].endswith("a longer layout.edge has fewer")
+    assert said["implicit"].endswith('drape.coupling "shared" has fewer, and the same rest')
+
+
+@pytest.mark.slow
+def test_the_summary_of_a_fall_begins_with_its_rest_and_its_ends_against_the_exact_net(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = [
+        "--rods",
+        "9x9",
+        "--spacing",
+        "40 mm",
+        "--pop_up.ends",
+        "pinned",
+        "--checks.stages",
+        "0",
+        "--only",
+        "csv",
+    ]
+    main(["form", "hemisphere", "--method", "paper", *options, "--out", str(tmp_path / "fallen")])
+    first, second = capsys.readouterr().out.splitlines()[:2]
+    found = re.search(
+        r"at rest after [\d.]+ s; rod ends off the exact net's: max ([\d.]+) mm, median ([\d.]+) mm", first
+    )
+    assert found
+    assert "own weight" in second
+    rods = rs.read(tmp_path / "fallen").results.rods
+    errors = [abs(end - sphere_net_end(RADIUS, abs(rod.offset))) for rod in rods for end in (rod.end, -rod.start)]
+    assert float(found[1]) == pytest.approx(1e3 * max(errors), abs=0.006)  # as it is printed
+    assert float(found[2]) == pytest.approx(1e3 * np.median(errors), abs=0.006)
 
 
 @pytest.mark.slow

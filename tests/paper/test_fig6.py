@@ -81,6 +81,18 @@ def test_the_files_hold_tables_and_one_picture_a_method(tmp_path: Path) -> None:
         assert len(lines) >= 4 * (rods - 2)  # four panels; lines that miss the target are dropped when trimmed
 
 
+def test_the_differences_show_every_rod_end_by_every_method(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dots at the heights of the errors: their spread is that of the table's rows, in one scale."""
+    monkeypatch.setattr(drapes, "stored_footprint", lambda name: None)
+    root = ElementTree.fromstring(figure().pictures()["fig6-differences"])
+    heights = [float(dot.get("cy", "nan")) for dot in root.findall(".//{http://www.w3.org/2000/svg}circle")]
+    errors = np.concatenate([by(method).errors for method in METHODS])
+    assert len(heights) == len(errors)
+    fit = np.polyfit(errors, heights, 1)
+    assert fit[0] < 0  # y runs downwards
+    np.testing.assert_allclose(heights, np.polyval(fit, errors), atol=0.02)
+
+
 @pytest.mark.slow
 def test_a_fall_that_does_not_rest_is_the_status_of_the_figure() -> None:
     moving = DrapeFigure("fig6", "a title", drape_all([CASE], lambda *told: None, fall=Fall(duration=0.8)))

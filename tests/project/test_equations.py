@@ -13,7 +13,8 @@ from rodshell.paper.fig4 import LENGTH, RATE, run_in_time
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-LINES = [line for line in PAGE.splitlines() if line.startswith("| ")]
+TABLE, _, MATHEMATICS = PAGE.partition("## In mathematics")
+LINES = [line for line in TABLE.splitlines() if line.startswith("| ")]
 ROWS = [[cell.strip() for cell in line.strip("|").split("|")] for line in LINES][1:]
 NUMBERED = ["1a", "1b", "1c", "2", "3a-c", "4", "5", "6", "7a-c", "8", "9", "10", "11", "12", "13a-c", "Algorithm 1"]
 NAMED = re.compile(r"`([\w/]+\.py): ([\w.]+)`")
@@ -44,6 +45,24 @@ def test_every_erratum_is_numbered_once_and_the_table_names_none_that_is_not_the
     named = {name for row in ROWS for name in re.findall(r"E\d+", row[4])}
     assert named <= set(written)
     assert not re.search(r"^- (?!\*\*E)", PAGE, re.MULTILINE)  # no erratum without a number
+
+
+@pytest.mark.parametrize("number", range(1, 24))
+def test_every_erratum_names_its_check(number: int) -> None:
+    found = re.search(rf"\*\*E{number}\*\*.*?\n  Check: (.*?)\.\n", PAGE, re.DOTALL)
+    assert found
+    checks = NAMED.findall(found[1])
+    assert checks
+    assert "**E" not in found[0][5:]  # its own
+    for path, name in checks:
+        assert re.search(rf"^def {name}\(", (ROOT / "tests" / path).read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def test_every_numbered_equation_is_written_out() -> None:
+    headed = re.findall(r"^\*\*(?:Eqs? )?([^*]+)\*\*", MATHEMATICS.partition("## Errata")[0], re.MULTILINE)
+    written = [number for head in headed for number in re.findall(r"\d+|Algorithm", head)]
+    assert {"1", "2", "3", "4", "5", "6", "7", "8", "10", "11", "12", "13", "Algorithm"} <= set(written)
+    assert MATHEMATICS.count("$$") % 2 == 0
 
 
 def test_targets_are_those_of_equation_13() -> None:

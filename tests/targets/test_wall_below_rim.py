@@ -70,7 +70,7 @@ def test_a_grid_may_fall_on_a_mesh_from_high_above():
     layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, edge=0.03, length=0.9)
     ends = []
     for target in BODIES["base plane"]:
-        draped = rs.drape(layout, ROD, target, method=rs.Fall(height=0.16))
+        draped = rs.drape(layout, ROD, target, method=rs.Fall(height=0.16, drag=0.0))  # drag slows the creep to rest
         assert draped.converged
         ends.append(draped.positions)
     assert ends[1] == pytest.approx(ends[0], abs=1e-3 * RADIUS)  # as still as "at rest" is

@@ -229,7 +229,7 @@ class Case(Table):
         anchor = None if self.drape.anchor == "auto" else self.drape.anchor
         joint, method = built(self.joint), built(self.drape)
         target = cut_at(target or built(self.target), [Seam.of(line) for line in self.seams.lines])
-        layout = built(self.layout, target)
+        layout = built(self.layout, target).with_edges(method.edges_a_span)
         shortest = min(map(min, (layout.spacing, *(p.spacing for p in self.seams.patches if p.spacing is not None))))
         self._require_stock(shortest)
         self._require_allowance(target)

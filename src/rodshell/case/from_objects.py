@@ -120,7 +120,8 @@ def _target_keys(shape: dict[str, Any]) -> dict[str, Any]:
 
 def _layout_keys(layout: GridLayout, heading: float | Auto) -> dict[str, object]:
     rotate = "auto" if heading == "auto" else _within_a_turn(heading)
-    return {**layout.parameters(), "rotate": rotate, "left_out": layout.left_out}
+    edge = "auto" if layout.auto_edge else layout.edge
+    return {**layout.parameters(), "edge": edge, "rotate": rotate, "left_out": layout.left_out}
 
 
 def _layout_table(table: LayoutTable, layout: GridLayout, rotate: float | Auto) -> LayoutTable:

@@ -116,13 +116,12 @@ def load_case(
             f"this case cannot be run again: no case file can describe {what}: keep the Python that makes it"
         )
     raw = {**deepcopy(dict(otherwise or {})), **raw}
-    if (
-        isinstance(source, str | PathLike)
-        and str(source) in BUILT_IN
-        and {"seams.lines", "seams.file"} & overrides.keys()
-    ):
-        for key in ("rods", "length"):  # of the whole; what seams cut has them from its patches
-            raw.get("layout", {}).pop(key, None)
+    if isinstance(source, str | PathLike) and str(source) in BUILT_IN:
+        layout = raw.get("layout", {})
+        for key in ("rods", "length") if {"seams.lines", "seams.file"} & overrides.keys() else ():
+            layout.pop(key, None)  # of the whole; what seams cut has them from its patches
+        if overrides.get("drape.method") == "paper":
+            layout.pop("edge", None)  # 5 mm as the paper states; its falls had longer ones, as any fall has (E21)
     return _validated(raw, overrides, files)
 
 

@@ -67,6 +67,7 @@ def drape(
             f"layout crossing {degrees(layout.crossing):.4g} degrees: a grid that hangs or falls on its target finds "
             "its angles itself: leave it out, or bind the grid to the target (method = bound)"
         )
+    layout = layout.with_edges(method.edges_a_span)
     if isinstance(method, Bound):
         return bound_drape(target, layout, rod, anchor=anchor, warm_start=warm_start, joint=joint, progress=progress)
     if isinstance(method, Gravity):

@@ -7,6 +7,7 @@ because touching nodes that are stopped at each step creep. How fast it would sl
 
 from collections.abc import Callable
 from dataclasses import replace
+from time import process_time
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from rodshell.formfinding.gravity_drape import anchor_point, initial_grid, lost_
 from rodshell.formfinding.methods import Draped, DrapeFigures, Fall, smallest_joint_angle
 from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force
 from rodshell.geometry.frames import dot
-from rodshell.joints import Joint
+from rodshell.joints import ImplicitPenalty, Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell
 from rodshell.progress import Progress, silent
@@ -35,10 +36,12 @@ STILL = 1e-7  # of weight times size: kinetic energy
 BALANCED = 1e-3  # of the weight of the heaviest node: out-of-balance force on a node
 USUAL_STEP = 0.01  # [s] on a target of 0.2 m; times are proportional to the square root of lengths
 USUAL_DURATION = 6.0
+USUAL_DRAG = 12.0  # [1/s]: near critical for the tails, which swing longest and else for more than 6 s
 USUAL_SIZE = 0.2  # [m]
 OF_LIMIT = 0.9  # share of the stability limit of explicit ties, whichever nodes touch, that is taken as time step
 UNSTABLE = -1e-3  # [1/s2]: the free turn about the vertical has 0 up to round-off
 CHECKS = 10  # steps between two checks whether it is at rest
+SLOW = 20.0  # s of processor time, after which the fall says what makes it slow
 LIMITS = 4  # checks for rest between two checks of the step limit
 
 
@@ -107,15 +110,16 @@ class _FallSimulation:
         massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # also the linkers' nodes, which fall and land
         all_massive = len(massive) == len(shell.like)  # then a slice, which is faster
         pull = GravityForce(slice(None) if all_massive else massive, (0.0, 0.0, -fall.acceleration))
-        self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
+        self._slowness = float(np.sqrt(target.size / USUAL_SIZE))
+        self.drag = USUAL_DRAG / self._slowness if fall.drag is None else fall.drag
+        self.motion = Motion.of(shell, forces=(pull, Damping(rate=self.drag)))
         self.target, self.shell, self.fall, self._progress = target, shell, fall, progress
         self.load = pull.held(0.0, np.zeros_like(shell.mass), np.zeros_like(shell.mass), shell.mass)
-        self._heaviest = float(-self.load[:, 2].min())
-        self._weight = float(-self.load[:, 2].sum())
+        self._still = STILL * float(-self.load[:, 2].sum()) * target.size
+        self._balanced = BALANCED * float(-self.load[:, 2].min())
         self._law = ModifiedMass(target, massive, fall.stopped, fall.friction)
         self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.flat_coordinates))
         self._ties: ExplicitTies | None = None
-        self._slowness = float(np.sqrt(target.size / USUAL_SIZE))
         self._out_of_time = ""
         self._energies = list[tuple[float, float]]()  # times [s] and kinetic energies [J]
 
@@ -126,7 +130,7 @@ class _FallSimulation:
         state = self.shell.state(positions, normals=normals)
         step = fall.time_step or min(USUAL_STEP * self._slowness, self._safe_step(state))
         duration = fall.duration or USUAL_DURATION * self._slowness
-        self._step, self._duration = step, duration
+        self._step, self._duration, self._begun = step, duration, process_time()
         never = int(np.ceil(duration / step)) + 1
         try:
             return simulate(
@@ -182,15 +186,28 @@ class _FallSimulation:
                 self._refuse_unstable(sample)
             energy, force = self.activity(sample)
             self._energies.append((sample.time, energy))
-            where = f"falling, {100 * sample.time / self._duration:.0f} % of {self._duration:.3g} s"
             try:
-                self._progress("drape", f"{where}, kinetic energy {energy:.1e} J", force)
+                self._progress("drape", self._where(sample.time, count, energy, force), force)
             except OutOfTimeError as error:
                 self._out_of_time = str(error)
                 return True
             return self.fall.settle and self.rests(energy, force)
 
         return stop
+
+    def _where(self, time: float, steps: int, energy: float, force: float) -> str:
+        """How far the fall is from rest; and what makes it slow, once it takes long."""
+        said = (
+            f"falling, t = {time:.2f} s of at most {self._duration:.3g} s, {len(self.touching.nodes)} nodes touch; "
+            f"energy {energy / self._still:.1g} and force {force / self._balanced:.1g} times those of rest"
+        )
+        spent = process_time() - self._begun
+        if spent < SLOW:
+            return said
+        tied = isinstance(self.fall.coupling, ImplicitPenalty)
+        fewer = 'drape.coupling "shared" has fewer, and the same rest' if tied else "a longer layout.edge has fewer"
+        unknowns = self.shell.freedom().size
+        return f"{said}; {spent / steps:.1g} s of processor time a step, for {unknowns} unknowns: {fewer}"
 
     @property
     def touching(self) -> Touching:
@@ -204,13 +221,12 @@ class _FallSimulation:
 
     def rests(self, energy: float, force: float) -> bool:
         """Whether this kinetic energy [J] and out-of-balance force [N] count as rest."""
-        return energy < STILL * self._weight * self.target.size and force < BALANCED * self._heaviest
+        return energy < self._still and force < self._balanced
 
     def advice(self, rest: Rest) -> str:
         """A drag and a duration that would bring the grid to rest, from the kinetic energy and its decay."""
-        usual, still = USUAL_DURATION * self._slowness, STILL * self._weight * self.target.size
-        force = rest.force_residual / (BALANCED * self._heaviest)
-        return rest_advice(self._energies, still, force, usual, self.fall.drag)
+        force = rest.force_residual / self._balanced
+        return rest_advice(self._energies, self._still, force, USUAL_DURATION * self._slowness, self.drag)
 
     def contact_pulls(self, last: Sample) -> int:
         """Number of touching nodes that the target would have to pull."""

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.errors import InputError
+from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
+from rodshell.nets import chebyshev_net
 from rodshell.validation import array, finite, instance, whole
 
 NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
@@ -164,6 +165,25 @@ def map_back(trimmed: Trimmed) -> Footprint:
     """The same cuts on the flat grid: the footprint G0 [HQK 3.2]."""
     instance("trimmed", trimmed, Trimmed, "what rodshell.trim returned")
     return Footprint(trimmed.mesh)
+
+
+def ends_past_net(trimmed: Trimmed) -> Floats | None:
+    """(m, 2) how far the trimmed rods run past the ends of the exact net's, at start and end [m].
+
+    Of a bound drape, whose G0 is that of the net: how far the draped rods would. None where there is no such net.
+    """
+    draped, rods = trimmed.draped, trimmed.mesh.grid.rods
+    if draped.figures.net_deviation is not None:
+        past = dict(zip([rod.name for rod in draped.rods], draped.figures.net_deviation, strict=True))
+        return np.array([past[rod.name] for rod in rods])
+    try:
+        net = chebyshev_net(draped.target, draped.layout, anchor=draped.anchor, eccentricity=draped.eccentricity)
+    except RodshellError:
+        return None
+    exact = {rod.name: rod for rod in net.rods}
+    if not exact.keys() >= {rod.name for rod in rods}:
+        return None
+    return np.array([[exact[rod.name].start - rod.start, rod.end - exact[rod.name].end] for rod in rods])
 
 
 def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:

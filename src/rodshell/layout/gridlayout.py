@@ -1,6 +1,6 @@
 """Two families of parallel rods, orthogonal in the flat grid, before they are cut to a target."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import degrees, pi
 from numbers import Real
 from typing import Literal
@@ -36,6 +36,7 @@ class GridLayout:
         the last of them the spacing continues. Empty for a family whose rods are all equally spaced.
     left_out : names of rods that are not built; their lines still shape the net.
     crossing : angle between the families on the target, where its axes cross [rad]; the flat grid stays orthogonal.
+    auto_edge : whether the edge was left to the method of draping, see `with_edges`.
 
     Raises
     ------
@@ -52,6 +53,7 @@ class GridLayout:
     lines: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     left_out: tuple[str, ...] = ()
     crossing: float = pi / 2
+    auto_edge: bool = False
 
     def __post_init__(self) -> None:
         for name in ("spacing", "offset"):
@@ -83,7 +85,7 @@ class GridLayout:
 
     def __repr__(self) -> str:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        if self.edge == auto_edge(self.spacing):
+        if values.pop("auto_edge"):
             values["edge"] = "auto"
         if any(self.lines):
             values["lines"] = "..."
@@ -113,7 +115,7 @@ class GridLayout:
         rods : number of rods along x and along y, or "auto" for every line that touches the target.
         spacing : between neighbouring rods: one length, or one for each family [m].
         length : of every rod before trimming [m], or "auto" for the length that is needed.
-        edge : longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing.
+        edge : longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing, and half of it for a `Fall`.
         rotate : angle of family u against the target's x axis [rad].
         offset : shift (x, y) of the lattice against the axes through the anchor [m].
         left_out : names of rods that are not built.
@@ -128,7 +130,14 @@ class GridLayout:
         _require_two("spacing", pair)
         pair = (positive("layout spacing", pair[0], "m"), positive("layout spacing", pair[1], "m"))
         longest = auto_edge(pair) if isinstance(edge, str) and edge == "auto" else edge
-        return GridLayout(rods, pair, length, longest, rotate, offset, left_out=left_out, crossing=crossing)
+        auto = longest is not edge
+        return GridLayout(
+            rods, pair, length, longest, rotate, offset, left_out=left_out, crossing=crossing, auto_edge=auto
+        )
+
+    def with_edges(self, a_span: int) -> "GridLayout":
+        """The layout with so many edges to the smaller spacing, unless its edge was given."""
+        return replace(self, edge=min(self.spacing) / a_span) if self.auto_edge else self
 
     def phase(self, family: Family) -> float:
         """Offset of one line of the lattice of a family [m]; the others are whole spacings away."""
@@ -171,7 +180,7 @@ class GridLayout:
 
     def parameters(self) -> dict[str, object]:
         """The layout in SI, as it is written in a case file."""
-        keys = (key.name for key in fields(self) if key.name not in ("lines", "left_out"))
+        keys = (key.name for key in fields(self) if key.name not in ("lines", "left_out", "auto_edge"))
         return {key: getattr(self, key) for key in keys}
 
     def flat_grid(self, counts: tuple[int, int], length: float) -> FlatGrid:

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
 FIGURES = {
     "fig1": "three shells popped up, and the boundaries between which their rods' ends move",
+    "stencils": "Figs 2, 3 and 5 in one: unknowns and stencils of a rod, of rods with linkers, and of contact",
     "fig4": "two rods at one joint, of which one is twisted or turned: does the other follow?",
     "fig6": "the three targets from the flat grid to G0, by the paper's method, gravity statics and the bound drape",
     "fig7": "the hemisphere at spacings of 4 and 5 cm, by the same three",

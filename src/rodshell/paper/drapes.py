@@ -1,24 +1,29 @@
 """Figures 6 and 7: the paper's targets draped by its method, by gravity statics and bound, against the exact net."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Bools, Floats
 from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
 from rodshell.formfinding.methods import MethodName
-from rodshell.layout import FlatGrid, FlatRod
-from rodshell.nets import chebyshev_net
+from rodshell.formfinding.trim import ends_past_net
+from rodshell.layout import FlatGrid
+from rodshell.output.svg import label, tag
 from rodshell.paper.figure import (
     CASES,
+    FAMILY,
     FINAL,
     FLAT,
     HEIGHT,
     INK,
+    LINE,
+    PANEL,
     ROD,
+    SOFT,
     WIDE_CASES,
     Case,
     Figure,
@@ -32,9 +37,11 @@ from rodshell.paper.figure import (
 )
 from rodshell.paper.genetic_records import stored_footprint
 from rodshell.progress import Progress
+from rodshell.results.wording import nice_ticks
 
-FALL = Fall(height=HEIGHT, drag=3.0)  # shared DOFs: the paper's *mapping*
+FALL = Fall(height=HEIGHT)  # shared DOFs: the paper's *mapping*
 METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")
+METHOD_COLOURS = {"paper": FAMILY["v"], "gravity": FAMILY["u"], "bound": FLAT}
 WORDS = {"paper": "paper's, in time", "gravity": "gravity statics", "bound": "bound to the target"}
 COLUMNS = (
     "target", "rods", "method", "unknowns", "time [s]", "ends off the net, max [mm]", "rms [mm]", "how it rests",
@@ -138,14 +145,11 @@ def _drape(case: Case, method: MethodName, fall: Fall, progress: Progress) -> Dr
     draped = drape(case.layout, ROD, case.target, method=options[method], progress=case_progress)
     trimmed = trim(draped)
     seconds = perf_counter() - begun
-    exact: dict[str, FlatRod] = {rod.name: rod for rod in chebyshev_net(case.target, case.layout).rods}
-    rods = trimmed.mesh.grid.rods
-    of_net = [exact[rod.name] for rod in rods]
-    ends, net = (np.array([[rod.start, rod.end] for rod in found]) for found in (rods, of_net))
-    if draped.figures.net_deviation is not None:
-        past = dict(zip([rod.name for rod in draped.rods], draped.figures.net_deviation, strict=True))
-        ends += np.array([past[rod.name] for rod in rods]) * [-1.0, 1.0]
-    return DrapeRun(case, method, draped, trimmed, seconds, ends, net)
+    past, cuts = ends_past_net(trimmed), np.array([(rod.start, rod.end) for rod in trimmed.mesh.grid.rods])
+    assert past is not None
+    outwards = past * [-1.0, 1.0]
+    net = cuts if method == "bound" else cuts - outwards
+    return DrapeRun(case, method, draped, trimmed, seconds, net + outwards, net)
 
 
 def rows_svg(drapes: Sequence[DrapeRun]) -> str:
@@ -174,6 +178,50 @@ def _panels(run: DrapeRun) -> list[list[str]]:
         standing(target, cut.mesh, cut.positions),
         _plan(run),
     ]
+
+
+def differences_svg(drapes: Sequence[DrapeRun]) -> str:
+    """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm.
+
+    Parameters
+    ----------
+    drapes : case by case, each by every method.
+    """
+    panels = []
+    for name in dict.fromkeys(run.case.label for run in drapes if run.draped.converged):
+        same = [run for run in drapes if run.case.label == name and run.draped.converged]
+        drawn = [(WORDS[run.method], METHOD_COLOURS[run.method], 1e3 * run.errors) for run in same]
+        if (sought := _sought(same[0])) is not None:
+            along = np.abs(np.where(_along_u(same[0]), sought[:, 0], sought[:, 1]))
+            drawn.append(("genetic algorithm", FINAL, 1e3 * (along - np.abs(same[0].net.ravel()))))
+        offsets = 1e3 * np.repeat([rod.offset for rod in same[0].trimmed.mesh.grid.rods], 2)
+        panels.append((f"({name})  {same[0].case.target.name}", list(_scatter(offsets, drawn))))
+    return rows_of_panels([("Rod ends past those of the exact net [mm], against the offset of their rod [mm]", panels)])
+
+
+def _along_u(run: DrapeRun) -> Bools:
+    """(2m,) whether the ends are those of rods along x."""
+    return np.repeat([rod.family == "u" for rod in run.trimmed.mesh.grid.rods], 2)
+
+
+def _scatter(x: Floats, drawn: Sequence[tuple[str, str, Floats]]) -> Iterator[str]:
+    """Dots of some series (name, colour, y) over the same x, with axes; the zero line is the net."""
+    everything = np.concatenate([[0.0], *(y for _, _, y in drawn)])
+    low, high, wide = float(everything.min()), float(everything.max()), float(np.abs(x).max())
+    foot = PANEL - 14.0 * len(drawn) - 16.0
+
+    def at(across: Floats | float, up: Floats | float) -> tuple[Floats, Floats]:
+        return 30 + (PANEL - 36) * (np.asarray(across) / wide + 1) / 2, foot * (high - np.asarray(up)) / (high - low)
+
+    for tick in nice_ticks(low, high, 5):
+        height = float(at(0.0, tick)[1])
+        yield tag("line", x1=30, x2=PANEL, y1=height, y2=height, stroke=INK if tick == 0 else LINE, stroke_width=0.8)
+        yield label(f"{tick:g}", 26, height + 3, 9.0, fill=SOFT, text_anchor="end")
+    for tick in (-wide, 0.0, wide):
+        yield label(f"{tick:.0f}", float(at(tick, 0.0)[0]), foot + 12, 9.0, fill=SOFT, text_anchor="middle")
+    for k, (name, colour, y) in enumerate(drawn):
+        yield from dots(np.column_stack(at(x, y)), colour, 2.6 - 0.9 * (k % 2))  # where two agree, both are seen
+        yield label(name, 30, foot + 26 + 14 * k, 10.0, fill=colour)
 
 
 def _plan(run: DrapeRun) -> list[str]:
@@ -237,8 +285,8 @@ class DrapeFigure(Figure):
         return {"drapes": [run.result() for run in self.drapes]}
 
     def pictures(self) -> dict[str, str]:
-        """The paper's method in NAME.svg, each other method in NAME-METHOD.svg."""
-        return {
+        """The paper's method in NAME.svg, each other in NAME-METHOD.svg; the ends of all in NAME-differences.svg."""
+        return {f"{self.name}-differences": differences_svg(self.drapes)} | {
             self.name if method == "paper" else f"{self.name}-{method}": rows_svg(
                 [run for run in self.drapes if run.method == method]
             )

@@ -26,9 +26,13 @@ from rodshell.solve.newton_matrix import Banded
 from rodshell.solve.problem import NO_CURVATURE
 
 FALLING = 2.0  # [s]
-STEPS = {"explicit": (0.01, 0.005, 0.0025), "shared": (0.1, 0.05, 0.02, 0.01), "implicit": (0.01,)}  # [s]
+STEPS = {"explicit": (0.01, 0.005, 0.0025), "shared": (0.1, 0.01), "implicit": (0.01,)}  # [s]
 USUAL_STEP = 0.01  # [s]; explicit ties of C1 = 1e6 EI are stable up to 10.8 ms at 15 mm edges
-EDGES = (0.03, 0.015)  # [m]
+SIZE_STEP = 0.005  # [s] of the falls of all sizes: explicit ties are stable up to 5.5 ms at 4 mm edges
+SIZES = ((2.0, 1.0), (2.0, 0.5), (1.0, 1.0), (1.0, 0.5), (1.0, 0.25), (1.0, 2 / 15))
+"""Spacings over the paper's, and edges a spacing: from 1,000 to 31,000 unknowns. The fourth is the usual mesh."""
+STATED = {"hemisphere": 50.0, "paraboloid": 30.0, "ellipsoid": 20.0}  # [s] at STATED_DOFS [HQK 3.3]
+STATED_DOFS = 8000
 C1 = 1e6 * ROD.bend_stiffness  # the paper's number, taken as N/m
 REPEATS = 4  # of our own drape, and of all that a fall costs but its steps; the least time counts
 COLUMNS = (
@@ -40,6 +44,7 @@ SIGNS = {
     "shared": "\N{WHITE CIRCLE}",
     "implicit": "\N{WHITE SQUARE}",
     "ours": "\N{BLACK DIAMOND}",
+    "the paper's own": "\N{WHITE DIAMOND}",
 }
 
 
@@ -93,12 +98,18 @@ class Fig8(Figure):
 
     def ratios(self) -> dict[str, float]:
         """Time of the paper's explicit scheme at `USUAL_STEP` over ours with the same mesh, by target [-]."""
-        ours = {timing.target: timing for timing in self.timings if timing.method == "ours"}
+        ours = {(timing.target, timing.edge): timing for timing in self.timings if timing.method == "ours"}
         paper = [timing for timing in self.timings if timing.method == "explicit" and timing.step == USUAL_STEP]
+        return {timing.target: timing.seconds / ours[timing.target, timing.edge].seconds for timing in paper}
+
+    def slopes(self) -> dict[str, dict[str, float]]:
+        """Exponents of the unknowns in the times of the sizes, by method and target [-]."""
         return {
-            timing.target: timing.seconds / ours[timing.target].seconds
-            for timing in paper
-            if timing.edge == ours[timing.target].edge
+            method: {
+                target: _slope([float(run.dofs) for run in same], [run.seconds for run in same])
+                for target, same in _by_target(of_sizes(self.timings, method)).items()
+            }
+            for method in ("explicit", "ours")
         }
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -110,14 +121,18 @@ class Fig8(Figure):
         return f"Fig 8 [HQK 3.3]: processor time; {FALLING:g} s of fall in the paper's scheme"
 
     def footing(self) -> str:
-        """The ratios."""
+        """The ratios, and the slopes."""
         ratios = "; ".join(f"{target} {ratio:.0f}" for target, ratio in self.ratios().items())
-        return f"times as long as ours: {ratios}"
+        lines = [f"explicit, {1e3 * USUAL_STEP:g} ms, over ours on the same mesh, times as long: {ratios}"]
+        for method, slopes in self.slopes().items():
+            found = "; ".join(f"{target} {slope:.2f}" for target, slope in slopes.items())
+            lines.append(f"time grows with the unknowns, {method}, to the power: {found}")
+        return "\n".join(lines)
 
     def content(self) -> dict[str, Any]:
-        """The runs and the ratios."""
+        """The runs, the ratios and the slopes."""
         timings = [asdict(timing) for timing in self.timings]
-        return {"falling": FALLING, "timings": timings, "ratios": self.ratios()}
+        return {"falling": FALLING, "timings": timings, "ratios": self.ratios(), "slopes": self.slopes()}
 
     def pictures(self) -> dict[str, str]:
         """Both charts."""
@@ -140,13 +155,41 @@ def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float 
     for case in cases:
         for coupling in couplings:
             timings += [timed_fall(case, coupling, step, falling, progress) for step in STEPS[coupling.name]]
-        others = [Case(case.label, case.target, case.rods, case.spacing, e) for e in EDGES if e != case.edge]
-        timings += [timed_fall(other, couplings[0], USUAL_STEP, falling, progress) for other in others]
-        timings.append(timed_ours(case))
+        for size in sizes_of(case):
+            if size.edge != case.edge:
+                timings.append(timed_fall(size, couplings[0], SIZE_STEP, falling, progress, counted=False))
+            timings.append(timed_ours(size))
     return Fig8(tuple(timings))
 
 
-def timed_fall(case: Case, coupling: Coupling, step: float, falling: float, progress: Progress) -> Timing:
+def sizes_of(case: Case) -> list[Case]:
+    """The case with fewer rods, and with other edges."""
+    sizes = []
+    for wider, edges in SIZES:
+        first, second = (int((count - 1) / wider) // 2 * 2 + 1 for count in case.rods)
+        spacing = wider * case.spacing
+        sizes.append(Case(case.label, case.target, (first, second), spacing, edges * spacing))
+    return sizes
+
+
+def _slope(x: Sequence[float], y: Sequence[float]) -> float:
+    """Exponent of x in y, by least squares of their logarithms."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def of_sizes(timings: Sequence[Timing], method: str) -> list[Timing]:
+    """The runs of a method at all sizes."""
+    return [run for run in timings if run.method == method and run.step in (0.0, SIZE_STEP)]
+
+
+def _by_target(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
+    names = dict.fromkeys(timing.target for timing in timings)
+    return {name: [timing for timing in timings if timing.target == name] for name in names}
+
+
+def timed_fall(
+    case: Case, coupling: Coupling, step: float, falling: float, progress: Progress, *, counted: bool = True
+) -> Timing:
     """A fall in the paper's scheme, of `falling` seconds with the time step `step` [s]; without its bare solves.
 
     Parameters
@@ -156,8 +199,9 @@ def timed_fall(case: Case, coupling: Coupling, step: float, falling: float, prog
     step : time step [s].
     falling : simulated time [s].
     progress : is called at each time step.
+    counted : whether explicit ties are counted in bare solves.
     """
-    bare = BareSolves(case, coupling, step) if isinstance(coupling, ExplicitPenalty) else None
+    bare = BareSolves(case, coupling, step) if counted and isinstance(coupling, ExplicitPenalty) else None
 
     def case_progress(stage: str, detail: str, residual: float) -> None:
         progress(f"{case.target.name}, {coupling.name}, {1e3 * step:g} ms, {stage}", detail, residual)
@@ -181,7 +225,7 @@ def timed_fall(case: Case, coupling: Coupling, step: float, falling: float, prog
 
 
 def _fall(case: Case, coupling: Coupling, step: float, falling: float, progress: Progress) -> Draped:
-    fall = Fall(coupling=coupling, time_step=step, duration=falling, settle=False)
+    fall = Fall(coupling=coupling, time_step=step, duration=falling, drag=0.0, settle=False)
     return drape(case.layout, ROD, case.target, method=fall, progress=progress)
 
 
@@ -272,14 +316,21 @@ class BareSolves:
 
 def times_svg(timings: Sequence[Timing]) -> str:
     """Both charts, and what the signs mean."""
-    edge = next(timing.edge for timing in timings if timing.method == "ours")
+    edge = next(timing.edge for timing in timings if timing.in_lapack)  # the usual mesh
     by_step = [timing for timing in timings if timing.step and timing.edge == edge]
-    legend = [(name, TARGET_COLOURS.get(name, INK)) for name in dict.fromkeys(timing.target for timing in timings)]
+    by_size = [*of_sizes(timings, "explicit"), *of_sizes(timings, "ours")]
+    names = dict.fromkeys(timing.target for timing in timings)
+    stated = [
+        Series([STATED_DOFS], [STATED[name]], TARGET_COLOURS[name], SIGNS["the paper's own"])
+        for name in names
+        if name in STATED
+    ]
+    legend = [(name, TARGET_COLOURS.get(name, INK)) for name in names]
     charts = (
         Chart(_series(by_step, lambda timing: 1e3 * timing.step), "(a)  time step [ms]", "time [s]", legend),
-        Chart(_series(timings, lambda timing: float(timing.dofs)), "(b)  unknowns", "time [s]"),
+        Chart([*_series(by_size, lambda timing: float(timing.dofs)), *stated], "(b)  unknowns", "time [s]"),
     )
-    methods = {timing.method for timing in timings}
+    methods = {*(timing.method for timing in timings), "the paper's own"}
     return charts_svg(charts, "   ".join(f"{sign} {method}" for method, sign in SIGNS.items() if method in methods))
 
 
@@ -290,5 +341,5 @@ def _series(timings: Sequence[Timing], across: Callable[[Timing], float]) -> lis
         same = [timing for timing in timings if (timing.target, timing.method) == (target, method)]
         points = sorted((across(timing), timing.seconds) for timing in same)
         x, y = zip(*points, strict=True)
-        result.append(Series(x, y, TARGET_COLOURS.get(target, INK), SIGNS[method]))
+        result.append(Series(x, y, TARGET_COLOURS.get(target, INK), SIGNS[method], lined=True))
     return result

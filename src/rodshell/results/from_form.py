@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from rodshell.arrays import Floats
 from rodshell.checks import Checks
 from rodshell.formfinding import Agreement as FoundAgreement
-from rodshell.formfinding import Draped, Footprint, PatchForm
+from rodshell.formfinding import Footprint, PatchForm, Trimmed
 from rodshell.formfinding.bound_drape import shape_of_net
 from rodshell.formfinding.finite_sections import is_flat
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.seams import End
+from rodshell.formfinding.trim import ends_past_net
 from rodshell.joints import joint_parameters
 from rodshell.joints.joint import Joint as JointModel
 from rodshell.kernels import description
@@ -102,7 +103,7 @@ def form_results(form: PatchForm) -> Results:
         crossings_without_joint=_without_joint(form.footprint.mesh.grid),
         end_tangents=form.boundary.tangents.tolist(),
         agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
-        drape=_drape(form.draped),
+        drape=_drape(form.trimmed),
         pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
     )
     return found if form.draped.net is None else found.changed(net=_net(form.draped.net))
@@ -165,7 +166,7 @@ def patches_results(form: PatchedForm) -> Results:
         **_grid(form.footprint, form.boundary.points, form.dropped, form.rod),
         end_tangents=form.boundary.tangents.tolist(),
         agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
-        drape=_drape_of_all([_drape(found.draped) for found in form.patches.values()]),
+        drape=_drape_of_all([_drape(found.trimmed) for found in form.patches.values()]),
         pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
     )
 
@@ -275,8 +276,11 @@ def _net(net: ChebyshevNet) -> Net:
     return Net.model_validate(shape_of_net(net))
 
 
-def _drape(draped: Draped) -> Drape:
-    """Figures of a drape."""
+def _drape(trimmed: Trimmed) -> Drape:
+    """Figures of a drape; of one that did not converge nothing was trimmed."""
+    draped, off = trimmed.draped, trimmed.draped.figures.net_deviation
+    if off is None and draped.converged:
+        off = ends_past_net(trimmed)
     more: dict[str, Any] = {}
     if draped.rest is not None:
         more["fall"] = Rest(**asdict(draped.rest))
@@ -284,9 +288,8 @@ def _drape(draped: Draped) -> Drape:
         more["eccentricity"] = draped.eccentricity
     if draped.figures.strong_bending is not None:
         more["strong_bending"] = StrongBending(**asdict(draped.figures.strong_bending))
-    if draped.figures.net_deviation is not None:
-        off = np.abs(draped.figures.net_deviation)
-        more["net_deviation"] = NetDeviation(max=float(off.max()), median=float(np.median(off)))
+    if off is not None:
+        more["net_deviation"] = NetDeviation(max=float(np.abs(off).max()), median=float(np.median(np.abs(off))))
     return Drape(
         method=draped.method.name,
         status=draped.report.status.value,
@@ -419,7 +422,7 @@ def _patch(form: PatchedForm, name: str) -> Patch:
         ends_moved=form.moved[name],
         net=_net(laid.net),
         agreement={ends: _agreement(gap) for ends, gap in found.agreement.items()},
-        drape=_drape(found.draped),
+        drape=_drape(found.trimmed),
         pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in found.popped.items()},
     )
 

@@ -39,8 +39,8 @@ Length = Callable[[float | None], str]
 def summary_text(results: Results) -> str:
     """What was found, how good it is, and what to read first."""
     length, verdict = shown_length(results), verdict_of(results)
-    lines = [f"{results.name or 'rodshell'}: {verdict.headline}"]
-    lines += [f"            {reason}" for reason in verdict.reasons[1:]]
+    said = [*_fallen(results, length), verdict.headline, *verdict.reasons[1:]]
+    lines = [f"{results.name or 'rodshell'}: {said[0]}", *(f"            {reason}" for reason in said[1:])]
     laths = f"; {lengths_text(results)}" if laths_text(results) else ""
     lines.append(f"  grid      {len(results.rods)} rods, {_joints(results, length)}{laths}")
     if results.rod:
@@ -157,6 +157,18 @@ def _patches(results: Results, length: Length) -> Iterator[str]:
         yield line
 
 
+def _fallen(results: Results, length: Length) -> Iterator[str]:
+    """How a fall onto the target ended, of which the rest is a consequence."""
+    if results.drape is None or (fall := results.drape.fall) is None:
+        return
+    if not fall.at_rest:
+        yield f"the grid fell on the target and is NOT AT REST after {rounded(fall.time or 0.0)} s"
+        return
+    off = results.drape.net_deviation
+    net = f"; rod ends off the exact net's: max {length(off.max)}, median {length(off.median)}" if off else ""
+    yield f"the grid fell on the target and is at rest after {rounded(fall.time or 0.0)} s{net}"
+
+
 def _net_and_drape(results: Results, length: Length) -> Iterator[str]:
     """How exact the surface, the net and the drape are."""
     if results.target and (fit := results.target.deviation):
@@ -167,11 +179,13 @@ def _net_and_drape(results: Results, length: Length) -> Iterator[str]:
     if drape := results.drape:
         work = sum(level.factorizations or 0 for level in drape.levels)
         gap = "gap" if drape.method == "bound" else "deepest node inside by"
+        edges = f", edges of {length(results.layout.edge)}" if drape.fall and results.layout else ""
         yield (
-            f"  drape     {drape.method}: {drape.dofs} unknowns, {work} factorisations, {gap} {length(drape.max_gap)}, "
+            f"  drape     {drape.method}: {drape.dofs} unknowns{edges}, {work} factorisations, "
+            f"{gap} {length(drape.max_gap)}, "
             f"strain {small(drape.max_strain)}, negative modes {drape.negative_modes}"
         )
-        if off := drape.net_deviation:
+        if (off := drape.net_deviation) and not drape.fall:
             yield f"            drape against net, rod ends: max {length(off.max)}, median {length(off.median)}"
 
 
