@@ -1,5 +1,6 @@
 """Pop-ups with every kind of joint, and what their joints carry, by free bodies."""
 
+from dataclasses import replace
 from functools import cache
 from math import inf
 
@@ -10,6 +11,7 @@ from numpy.linalg import norm
 import rodshell as rs
 from rodshell.checks.reactions import joint_loads, reactions
 from rodshell.joints.crossings import RodNodes
+from rodshell.rods.elements import Stretch
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports
 
@@ -160,3 +162,13 @@ def test_eccentric_joints_refuse_rods_that_need_three_layers():
     grid = rs.straight_rods([[[-1, 0], [1, 0]], [[0.3, -1], [0.3, 1]], [[-1, -0.8], [1, 1.0]]])
     with pytest.raises(rs.InputError, match="two layers of rods, but R03 crosses rods of both"):
         rs.Shell.of(rs.mesh_grid(grid, 0.25), ROD, joint=rs.Pin(eccentricity=1e-3))
+
+
+def test_an_energy_between_rods_that_cannot_tell_its_moments_is_refused() -> None:
+    """Springs from rod to rod beside a joint turn them, which would be reported as 0 N m."""
+    done = popped("ball", "pinned")
+    shell, mesh = done.shell, done.shell.mesh
+    beside = shell.node_blocks[mesh.at_crossings[:3] + 1]
+    springs = Stretch.elastic(beside, np.full(3, 0.5 * SPACING), np.ones(3))
+    with pytest.raises(rs.InputError, match="the energy Stretch between rods acts on nodes alone"):
+        joint_loads(replace(shell, between=(*shell.between, springs)), done.state)

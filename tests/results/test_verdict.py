@@ -1,12 +1,16 @@
 """The verdict as a function of the figures: what makes a result good, what has to be checked, what cannot be built."""
 
+import re
 from copy import deepcopy
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.results import Results, Verdict
+from rodshell.results.findings import CODES
 from rodshell.results.results import EndsInTheAir
 from rodshell.results.summary import summary_text
 from rodshell.results.supports import in_the_air
@@ -481,8 +485,10 @@ def test_without_imperfections_the_factors_are_said_to_be_those_of_the_perfect_s
     said = "imperfections were not looked at"
     command = 'rodshell form case.toml --stability.imperfection "span/500"'
     for more in ([], [("warnings", ["a long tail"])]):  # good, and to be checked
-        (reason,) = [each for each in verdict(changed(("loads", perfect), *more)).reasons if said in each]
-        assert command in reason
+        found = verdict(changed(("loads", perfect), *more))
+        (k,) = [k for k, each in enumerate(found.reasons) if said in each]
+        assert command in found.reasons[k]
+        assert (found.findings[k].code, found.findings[k].offers) == ("no_imperfections", (command,))
         assert not any(said in reason for reason in verdict(changed(("loads", WINTER), *more)).reasons)
     assert verdict(changed(("loads", perfect))).level == "good"
 
@@ -641,3 +647,20 @@ def test_a_verdict_or_a_result_of_wrong_values_is_refused_in_a_sentence():
     assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match=r"Results: status cannot be 3: it must be a text"):
         Results(status=3)
+
+
+def test_each_sentence_of_a_verdict_is_a_finding_with_its_figures() -> None:
+    found = verdict(changed(("self_weight.pinned.load_factor", 1.2), ("self_weight.clamped.load_factor", 4.0)))
+    assert len(found.findings) == len(found.reasons)
+    (short,) = [one for one in found.findings if one.code == "reserve"]
+    assert (short.support, short.figure, short.limit) == ("pinned", 1.2, 1.5)
+
+
+def test_the_codes_of_findings_are_those_that_are_documented() -> None:
+    text = Path(__file__).parents[2].joinpath("docs", "files.md").read_text(encoding="utf-8")
+    table = text.partition("### Codes of findings")[2].partition("\n## ")[0]
+    assert re.findall(r"^\| `(\w+)` \| (.*) \|$", table, re.M) == [*CODES.items()]
+    source = "".join(
+        path.read_text(encoding="utf-8") for path in Path(rs.__file__).parent.joinpath("results").glob("*.py")
+    )
+    assert {code for code in CODES if f'"{code.removeprefix("erection_")}"' not in source} == set()

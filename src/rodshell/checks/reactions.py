@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import joint_normals, joint_tangents
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.crossings import LinkerBend
@@ -21,6 +22,8 @@ from rodshell.model import Shell
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.validation import brief
+
+POINT = 1e-3  # edges: nodes as close as that are one point
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +141,10 @@ def joint_loads(shell: Shell, state: Floats) -> JointLoads:
     ----------
     shell : with shared DOFs or eccentric joints, its source frames being at the state.
     state : (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
+
+    Raises
+    ------
+    InputError : an energy between rods cannot tell its moments.
     """
     mesh, positions = shell.mesh, shell.positions(state)
     met = mesh.at_crossings
@@ -227,7 +234,14 @@ def _between(shell: Shell, state: Floats, met: Ints) -> tuple[Floats, Floats]:
     elements = [element for element in shell.elements if isinstance(element, LinkerBend) or element in shell.between]
     for element in elements:
         angles = [c for c in range(element.blocks.shape[1]) if (element.blocks[:, c] >= first).all()]
-        if not angles or len(element.blocks) == 0:
+        if len(element.blocks) == 0:
+            continue
+        if not angles:  # at one point it transfers none, as a tie; else who knows about which
+            if np.ptp(state[element.blocks], axis=1).max() > POINT * mesh.edge_lengths.min():
+                raise InputError(
+                    f"loads of joints: the energy {type(element).__name__} between rods acts on nodes alone, so that "
+                    "the moments of joints are not known: let it act on twist angles too, or ask for reactions"
+                )
             continue
         rows, edges = _rows(element, state), element.blocks[:, angles] - first
         rods = mesh.edge_rods[edges]

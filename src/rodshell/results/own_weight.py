@@ -8,6 +8,7 @@ That holds where joints have no stiffness of their own: within 4 % on the exampl
 from collections.abc import Mapping, Sequence
 from math import inf, sqrt
 
+from rodshell.results.findings import Said
 from rodshell.results.records import Ends, RodType
 from rodshell.results.records import Section as RodSection
 from rodshell.results.results import Results, SelfWeight
@@ -44,7 +45,7 @@ def falling(results: Results) -> set[Ends]:
     return {end for end in _below(found, 1.0) if found[end].limit not in NOT_KNOWN}
 
 
-def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool]:
+def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], bool]:
     """What is said of shells that do not carry their own weight with the reserve that is asked for, or are not known
     to; and whether one of them stands.
 
@@ -53,7 +54,7 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
     results : with the checks of the self-weight.
     ends : whose shells are meant.
     """
-    found, said = _carried(results, ends), []
+    found, said = _carried(results, ends), list[Said]()
     parts = _below(found, 1.0)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
     bracing = " with its bracing" * is_braced(results)
@@ -61,43 +62,47 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[str], bool
         unknown_above = any(results.self_weight[end].limit == "not followed" for end in bare)
         carries = "is known to carry only" if unknown_above else "carries only"
         weight = _parts(bare, "its own weight")
-        said.append(
-            f"{_alone(bare)}the shell {carries} {weight} without its bracing: support it until that is in place"
-        )
+        words = f"{_alone(bare)}the shell {carries} {weight} without its bracing: support it until that is in place"
+        said.append(Said(words, "needs_bracing", _one(bare), min(bare.values()), 1))
     standing = [end for end, weighed in found.items() if end not in parts and weighed.limit not in (None, "no mass")]
     falling = {end: part for end, part in parts.items() if end not in lost}
     unknown = {end: part for end, part in parts.items() if end in lost}
     if falling:
         others = "".join(f"; with {end} ends it carries {_times(found[end])} its own weight" for end in standing)
-        said.append(
+        advice, offers = _other_rods(results, falling)
+        words = (
             f"{_alone(falling)}the shell does not stand under its own weight{bracing}: it carries only "
-            f"{_parts(falling)}{others}{_other_rods(results, falling)}"
+            f"{_parts(falling)}{others}{advice}"
         )
+        said.append(Said(words, "falls", _one(falling), min(falling.values()), 1, offers=offers))
     short = {end: part for end, part in _below(found, reserve(results)).items() if end in standing and end not in lost}
     if short:
         weights = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in short)
         others = "".join(f"; with {end} ends it carries {_times(found[end])}" for end in standing if end not in short)
-        said.append(
-            f"the shell{bracing} carries only {weights}, and {_asked(results)}{others}{_other_rods(results, short)}"
-        )
+        advice, offers = _other_rods(results, short)
+        words = f"the shell{bracing} carries only {weights}, and {_asked(results)}{others}{advice}"
+        said.append(Said(words, "reserve", _one(short), min(short.values()), reserve(results), offers=offers))
     if unknown:
-        said.append(
+        words = (
             f"{_alone(unknown)}it is not known whether the shell stands under its own weight{bracing}: it could be "
             f"followed only up to {_parts(unknown)}"
         )
-    said += [
-        f"with {end} ends the shell{bracing} carries {_times(found[end])} its own weight; above, it could not be "
-        "followed, and nothing is known"
-        for end in standing
-        if end in lost
-    ]
+        said.append(Said(words, "not_followed", _one(unknown), min(unknown.values()), 1))
+    for end in standing:
+        if end in lost:
+            words = (
+                f"with {end} ends the shell{bracing} carries {_times(found[end])} its own weight; above, it could not "
+                "be followed, and nothing is known"
+            )
+            said.append(Said(words, "not_followed", end, found[end].load_factor, reserve(results)))
     if any(weighed.limit == "no mass" for weighed in found.values()):
-        said.append(
+        words = (
             "no mass was given, so that it is not known what share of its own weight the shell carries: give "
             "rod.section.mass"
         )
+        said.append(Said(words, "no_mass"))
     if any(end not in found or found[end].limit is None for end in ends):
-        said.append(f"whether it carries its own weight{bracing} was not checked")
+        said.append(Said(f"whether it carries its own weight{bracing} was not checked", "not_checked"))
     return said, bool(standing or (bracing and not falling))
 
 
@@ -140,6 +145,11 @@ def is_braced(results: Results) -> bool:
     return any(shell.bracing for supported in results.loads.values() for shell in supported.values())
 
 
+def _one(factors: Mapping[Ends, float]) -> Ends | None:
+    """The end condition, where a finding is about one."""
+    return next(iter(factors)) if len(factors) == 1 else None
+
+
 def _alone(factors: Mapping[Ends, float]) -> str:
     """The end condition of a sentence that is about one."""
     return "".join(f"with {ends} ends " for ends in factors) if len(factors) == 1 else ""
@@ -168,8 +178,9 @@ def light(results: Results, ends: list[Ends]) -> dict[Ends, float]:
     return _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
 
 
-def _other_rods(results: Results, factors: Mapping[Ends, float]) -> str:
-    """Which rods of the same material would carry the shell with the reserve: a size that is sold, or in proportion.
+def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, tuple[str, ...]]:
+    """Which rods of the same material would carry the shell with the reserve, a size that is sold or in proportion, and
+    the command that forms it of them.
 
     Parameters
     ----------
@@ -178,16 +189,18 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> str:
     rod, kind = results.rod, (results.joint.kind if results.joint else None) or "ball"
     factors = {ends: factor for ends, factor in factors.items() if factor > 0}
     if not factors or rod is None or kind not in WITHOUT_STIFFNESS or is_braced(results):
-        return ""
+        return "", ()
     enough = ENOUGH * reserve(results)
     for ends, factor in sorted(factors.items(), key=lambda pair: pair[1]):
         for section in () if results.refinement else sizes_sold(rod):  # a refined rod's section varies along it
             gain, sharper = _gain(rod, section), _sharper(rod, section)
             if factor * gain >= enough and not _too_much(results, ends, sharper):
-                return (
+                words = (
                     f"; made of {size_text(section)}, it would carry about {rounded_down(factor * gain)} times its own "
-                    f"weight or more with {ends} ends{_share(results, ends, sharper)}{_again(results, section)}"
+                    f"weight or more with {ends} ends{_share(results, ends, sharper)}"
                 )
+                offers = _again(results, section)
+                return words + "".join(f" ({offer})" for offer in offers), offers
     ends, factor = max(factors.items(), key=lambda pair: pair[1])
     thicker = sqrt(enough / factor)
     made = (
@@ -195,17 +208,15 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> str:
         f"its own weight with {ends} ends, by an estimate"
     )
     if too_much := _too_much(results, ends, thicker):
-        return (
-            f"{made}, but they would {too_much}: support it, or take another material; rodshell check finds what "
-            "bracing adds"
-        )
-    return made + _share(results, ends, thicker)
+        words = "support it, or take another material; rodshell check finds what bracing adds"
+        return f"{made}, but they would {too_much}: {words}", ()
+    return made + _share(results, ends, thicker), ()
 
 
-def _again(results: Results, section: Section) -> str:
-    """The command that forms the shell with another section."""
+def _again(results: Results, section: Section) -> tuple[str, ...]:
+    """The command that forms the shell with another section; none without a target."""
     if results.target is None:
-        return ""
+        return ()
     now = results.rod.section.kind if results.rod and results.rod.section else None
     lengths = {
         key: f'"{rounded(1e3 * value, 4)} mm"'
@@ -214,7 +225,7 @@ def _again(results: Results, section: Section) -> str:
     }
     kind = {} if section.parameters()["kind"] == now else {"kind": section.parameters()["kind"]}
     words = " ".join(f"--rod.section.{key} {value}" for key, value in (kind | lengths).items())
-    return f" ({FORM_AGAIN} {words})"
+    return (f"{FORM_AGAIN} {words}",)
 
 
 def _gain(rod: RodType, section: Section) -> float:

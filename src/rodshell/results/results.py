@@ -281,6 +281,18 @@ else:
                 raise InputError(f"{cls.__name__}: a value contains itself: give plain ones") from None
 
 
+class Finding(Record):
+    """What one sentence of a verdict says, as data."""
+
+    code: Text = Field(description="what is judged, one of the codes in docs/files.md")
+    support: Text | None = key("the end condition; null: of all, or of none")
+    figure: Number = key("what was found, in `unit`")
+    limit: Number = key("what is compared with it, in the same unit")
+    unit: Text = Field(default="", description='"m", or "" for a number or a share')
+    place: Text | None = key("the rod, or the combination of loads")
+    offers: Rows[Text] = rows("commands that may mend it, to be run in the folder of the result")
+
+
 class Verdict(Record, metaclass=_Refusing):
     """What a result is worth."""
 
@@ -290,6 +302,7 @@ class Verdict(Record, metaclass=_Refusing):
         "computed, as where the computation did not converge, or one that might be built was not"
     )
     reasons: Annotated[tuple[Text, ...], FailFast()] = Field(min_length=1, description="sentences, the gravest first")
+    findings: Rows[Finding] = rows("what each of these sentences says, as data; empty in results of earlier versions")
 
     @property
     def headline(self) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import hypot
 
+from rodshell.results.findings import Said
 from rodshell.results.records import Point
 from rodshell.results.results import EndsInTheAir, Results
 from rodshell.results.wording import newtons, shown_length
@@ -47,7 +48,7 @@ def _forces(results: Results) -> Iterator[Sequence[Point]]:
             yield forces
 
 
-def air_findings(results: Results) -> Iterator[str]:
+def air_findings(results: Results) -> Iterator[Said]:
     """What has to hold rod ends that do not stand on the ground.
 
     Parameters
@@ -61,8 +62,9 @@ def air_findings(results: Results) -> Iterator[str]:
     force = found.largest_force
     under = "those under the loads among them" if results.loads else "before own weight and loads act"
     against = "" if force is None else f" against forces of up to {newtons(force)} each, {under}"
-    yield (
+    yield Said(
         f"{found.count} of {len(results.boundary)} rod ends lie up to {high} above the lowest: where they do not stand "
         f"on the ground, an edge beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has "
-        "to be designed"
-    )
+        "to be designed",
+        "ends_in_the_air", None, found.highest, 0, "m",
+    )  # fmt: skip

@@ -6,11 +6,13 @@ not checked, and then the result is not good.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
+from rodshell.results.findings import Said
 from rodshell.results.loaded import LoadedShell
 from rodshell.results.own_weight import falling, is_braced, light, reserve, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
-from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
+from rodshell.results.results import Clearance, Deployment, Finding, Level, Results, Verdict, WorstBent
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import (
     ENDS,
@@ -76,13 +78,13 @@ def verdict(results: Results) -> Verdict:
     grave = [sentence for ends in in_order for sentence in faults[ends]] + deployment + [*_erection(results)]
     if results.target and results.target.flat:
         warned = [word for word in results.warnings if word.startswith(FLAT)]
-        return _verdict("unbuildable", warned or [FLAT])
-    failed = [] if results.status == CONVERGED else [f"{NOT_COMPUTED}: {results.status}"]
+        return _verdict("unbuildable", [Said(word, "flat") for word in warned or [FLAT]])
+    failed = [] if results.status == CONVERGED else [Said(f"{NOT_COMPUTED}: {results.status}", "not_computed")]
     if not shells:
-        return _verdict("unknown", failed or ["there is no pop-up in this result"])
+        return _verdict("unknown", failed or [Said("there is no pop-up in this result", "not_computed")])
     best = _best(results, usable)
     off = 0.0 if best is None else best[1].max_relative or 0.0
-    far = [_off_words(results, *best)] if best is not None and off > OFF else []
+    far = [_off(results, *best)] if best is not None and off > OFF else []
     there = [ends for ends in shells if _status(shells[ends]) == CONVERGED and shells[ends].stable is not False]
     weight, stands = weight_findings(results, usable or there)
     lead = weight if there and not stands else []
@@ -90,7 +92,7 @@ def verdict(results: Results) -> Verdict:
     sinks = _sinks(results, usable)
     to_check = [
         *gravest, *weight, *sinks, *_loads(results, usable or there), *air_findings(results),
-        *_open_points(results, usable), *results.warnings,
+        *_open_points(results, usable), *(Said(word, "warning") for word in results.warnings),
     ]  # fmt: skip
     standing = set(usable) - falling(results)
     if lost and not standing and not deployment:
@@ -121,9 +123,12 @@ def facts(results: Results) -> list[str]:
     return [*_gaps(results), *_strength(results)]
 
 
-def _verdict(level: Level, reasons: Iterable[str]) -> Verdict:
-    """Each reason once."""
-    return Verdict(level=level, reasons=tuple(dict.fromkeys(reasons)))
+def _verdict(level: Level, said: Iterable[Said]) -> Verdict:
+    """Each reason once, with what it says in figures."""
+    once = dict[str, Finding]()
+    for one in said:
+        once.setdefault(one.text, one.finding())
+    return Verdict(level=level, reasons=tuple(once), findings=tuple(once.values()))
 
 
 def _status(shell: PopUp | None) -> str:
@@ -131,16 +136,17 @@ def _status(shell: PopUp | None) -> str:
     return (shell.status if shell else None) or CONVERGED
 
 
-def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
+def _shell_faults(results: Results, ends: Ends) -> Iterator[Said]:
     """Why the shell with these ends cannot be built."""
     shell = results.pop_up[ends]
     if _status(shell) != CONVERGED:
-        yield f"the pop-up with {ends} ends did not converge: {shell.status}"
+        yield Said(f"the pop-up with {ends} ends did not converge: {shell.status}", "not_computed", ends)
         return
     if shell.stable is False:
         modes = shell.negative_modes
         count = f" ({modes} buckling mode{'s' if modes != 1 else ''})" if modes else ""
-        yield f"with {ends} ends the shell is unstable{count} and would snap to another shape"
+        words = f"with {ends} ends the shell is unstable{count} and would snap to another shape"
+        yield Said(words, "unstable", ends, modes, 0)
     yield from _contact_faults(results, ends)
     yield from _fibre_faults(results, ends)
     yield from _load_faults(results, ends)
@@ -157,19 +163,23 @@ SAME_USE = 1.02  # of what the erected shell uses: more is the loads' doing
 UNLOADED = ("permanent", "slip_unloaded")  # of these no load is the cause
 
 
-def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
+def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
     """Combinations of loads under which the shell falls or breaks, and what is too much before they act."""
-    unloaded = dict[str, str]()
+    unloaded = dict[str, Said]()
     for name, by_ends in results.loads.items():
         found = by_ends.get(ends)
         if found is None:
             continue
         limit, used = found.limit_factor, found.utilisation
         if found.limit_kind == "unstable unloaded":
-            yield f"with {ends} ends the shell is unstable before the loads of {name} act"
+            words = f"with {ends} ends the shell is unstable before the loads of {name} act"
+            yield Said(words, "unstable", ends, place=name)
         elif limit is not None and limit < 1 and found.limit_kind != "not followed":
             how = "snaps through" if found.limit_kind == "limit point" else "buckles"
-            yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded_down(limit)} times these loads"
+            words = (
+                f"with {ends} ends the shell falls under {name}: it {how} at {rounded_down(limit)} times these loads"
+            )
+            yield Said(words, "falls_under_loads", ends, limit, 1, place=name)
         place, parts = found.governs, found.utilisations
         governs = (place.by if place else None) or ""
         uses = {governs: used or 0.0}
@@ -184,14 +194,20 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
         for by, share in before.items():
             if share > 1:
                 words = f"with {ends} ends {BY_WORDS[by].format(_too_much(share))}{where * (by == governs)}"
-                unloaded[by] = max(unloaded.get(by, ""), words, key=len)  # the same under all, or with its place
+                code = "slip" if by == "slip_unloaded" else "strength"
+                if len(words) > len(
+                    unloaded[by].text if by in unloaded else ""
+                ):  # the same under all, or with its place
+                    unloaded[by] = Said(words, code, ends, share, 1, place=place.rod if place else None)
         worst = max(uses, key=lambda by: uses[by], default="")
         if uses.get(worst, 0.0) > 1:
             at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
             words = BY_WORDS.get(worst, "the rods use {} of their design strength").format(_too_much(uses[worst]))
-            yield f"with {ends} ends {words} under {name}{at}{where * (worst == governs)}"
+            words = f"with {ends} ends {words} under {name}{at}{where * (worst == governs)}"
+            yield Said(words, "slip" if worst == "slip" else "strength_under_loads", ends, uses[worst], 1, place=name)
         if (braced := found.bracing_utilisation) is not None and braced > 1:
-            yield f"with {ends} ends the bracing uses {_too_much(braced)} of its design strength under {name}"
+            words = f"with {ends} ends the bracing uses {_too_much(braced)} of its design strength under {name}"
+            yield Said(words, "strength_of_bracing", ends, braced, 1, place=name)
     yield from unloaded.values()
 
 
@@ -213,7 +229,7 @@ def _too_much(share: float) -> str:
     return f"{max(101, round(100 * share))} %"
 
 
-def _contact_faults(results: Results, shape: str) -> Iterator[str]:
+def _contact_faults(results: Results, shape: str) -> Iterator[Said]:
     touching = results.contact.of(shape) if results.contact else None
     if not touching or not touching.pairs:
         return
@@ -221,13 +237,14 @@ def _contact_faults(results: Results, shape: str) -> Iterator[str]:
     rods = f"{first} and {second} overlap" if first != second else f"{first} runs into itself"
     worst = f"{touching.pairs} pairs of rods touch or cross, worst: " if touching.pairs > 1 else "rods touch: "
     where = f" near ({place(touching.where, rounding_of(results))})" if touching.where else ""
-    yield (
+    yield Said(
         f"{_shape(shape, touching)} {worst}{rods} by {_mm(results, -(touching.clearance or 0.0))}{where}: use thinner "
-        "rods (rod.section) or a larger spacing"
-    )
+        "rods (rod.section) or a larger spacing",
+        "contact", _ends(shape), touching.clearance, 0, "m", first,
+    )  # fmt: skip
 
 
-def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
+def _fibre_faults(results: Results, shape: str) -> Iterator[Said]:
     """Stress above the strength, strain beyond thin rods."""
     bent = bent_of(results, shape)
     used, strain = bent.utilisation, bent.max_bending_strain
@@ -237,15 +254,17 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
         if shape in ENDS and results.rod and "section" in (results.rod.chosen or {}):
             where += ": the section that was chosen is too thick; give a thinner one (rod.section)"
         if by_design_strength(results):
-            yield f"{_shape(shape, bent)} the rods use {share} of {strength_name(results, shape)}{where}"
+            words = f"{_shape(shape, bent)} the rods use {share} of {strength_name(results, shape)}{where}"
         else:
-            yield f"{_shape(shape, bent)} the rods would break: {share} of their strength{where}"
+            words = f"{_shape(shape, bent)} the rods would break: {share} of their strength{where}"
+        yield Said(words, "strength", _ends(shape), used, 1, place=bent.rod)
     if strain is not None and strain > THIN:
-        yield (
+        yield Said(
             f"{_shape(shape, bent)} bending strains the rods by {percent(strain)}: they are too thick for this "
             f"curvature, and the theory of thin rods is valid up to about {percent(THIN)}; use thinner rods or a "
-            "larger target"
-        )
+            "larger target",
+            "too_thick", _ends(shape), strain, THIN, place=bent.rod,
+        )  # fmt: skip
 
 
 def _on_the_way(results: Results) -> bool:
@@ -254,23 +273,27 @@ def _on_the_way(results: Results) -> bool:
     return met is not None and (met.share or 0.0) > 0
 
 
-def _erection(results: Results) -> Iterator[str]:
+def _erection(results: Results) -> Iterator[Said]:
     """What the rods do not withstand on the way that was computed, and other ways, which may spare them."""
     bent, thinner = bent_of(results, "deployment"), not light(results, list(results.self_weight))
     used = bent.utilisation
     said = [*_fibre_faults(results, "deployment")]
     if used is not None and used > 1 and holds_while_erected(results, used):
-        said.append(
-            f"{_shape('deployment', bent)} the rods use {_too_much(used)} of {strength_name(results, 'deployment')}"
-        )
+        words = f"{_shape('deployment', bent)} the rods use {_too_much(used)} of {strength_name(results, 'deployment')}"
+        said.append(Said(words, "strength", None, used, 1, place=bent.rod))
     if _on_the_way(results):
         said += _contact_faults(results, "deployment")
     if said:
-        said[-1] += (
+        said[-1] = said[-1].and_so(
             "; this is on one way, all ends moved evenly: erect it in another way that is checked, such as rod by rod "
             f"over a scaffold, lifted at its middle, or one family's ends first{', or use thinner rods' * thinner}"
         )
-    yield from said
+    yield from (replace(one, code=f"erection_{one.code}") for one in said)
+
+
+def _ends(shape: str) -> Ends | None:
+    """The end condition of a shape; None for the flat grid and the deployment."""
+    return shape if shape in ENDS else None
 
 
 def _shape(shape: str, found: WorstBent | Clearance) -> str:
@@ -286,7 +309,7 @@ def _best(results: Results, usable: list[Ends]) -> tuple[Ends, Agreement] | None
     return min(known.items(), key=lambda pair: pair[1].max_relative or 0.0, default=None)
 
 
-def _off_words(results: Results, ends: Ends, gap: Agreement) -> str:
+def _off(results: Results, ends: Ends, gap: Agreement) -> Said:
     """How far the best shell deviates; with clamped ends a convex shell fits the target, and dips are the cause."""
     where = f", near ({place(gap.where, rounding_of(results))})" if gap.where else ""
     drape = results.drape
@@ -297,14 +320,15 @@ def _off_words(results: Results, ends: Ends, gap: Agreement) -> str:
     bound = drape is not None and drape.method == "bound"
     dips = ends == "clamped" and bound and not buckles and not against_shear
     advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
-    return (
+    return Said(
         f"with {ends} ends, the nearest that can be used, the shell deviates from the target by up to "
         f"{_mm(results, gap.max)} "
-        f"({percent(gap.max_relative)} of its size){where}{advice}"
-    )
+        f"({percent(gap.max_relative)} of its size){where}{advice}",
+        "off_target", ends, gap.max_relative, OFF,
+    )  # fmt: skip
 
 
-def _sinks(results: Results, usable: list[Ends]) -> list[str]:
+def _sinks(results: Results, usable: list[Ends]) -> list[Said]:
     """That every shell that can be used takes another shape under its own weight: gaps are those without weight."""
     sizes = [gap.max / gap.max_relative for gap in results.agreement.values() if gap.max and gap.max_relative]
     sunk = {ends: results.self_weight[ends].deflection for ends in usable if ends in results.self_weight}
@@ -313,29 +337,30 @@ def _sinks(results: Results, usable: list[Ends]) -> list[str]:
         return []
     (ends, depth), *others = sorted(known.items(), key=lambda pair: pair[1])
     further = "".join(f", by {_mm(results, more)} with {other} ends" for other, more in others)
-    return [
+    words = (
         f"with {ends} ends the shell moves by {_mm(results, depth)} ({percent(depth / sizes[0])} of its size) under "
         f"its own weight{further}, so that it does not keep the shape whose gap to the target is given: use stiffer "
         "rods, or brace it"
-    ]
+    )
+    return [Said(words, "sinks", ends, depth / sizes[0], OFF)]
 
 
-def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
+def _open_points(results: Results, usable: list[Ends]) -> Iterator[Said]:
     """What has to be looked at although the shell can be built, and what is not known; more is among the warnings."""
     shells, status = results.pop_up, results.status
     stopped = any(_status(shell) != CONVERGED for shell in shells.values())
     if status not in (CONVERGED, "unknown") and not stopped and not any(status in word for word in results.warnings):
-        yield f"the job is not complete: {status}"
+        yield Said(f"the job is not complete: {status}", "not_computed")
     if any(shells[ends].stable is None for ends in usable):
-        yield "whether the shell is stable was not checked"
+        yield Said("whether the shell is stable was not checked", "not_checked")
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
     yield from _rods(results, usable)
     if results.target and not set(usable) <= set(results.agreement):
-        yield "the gap to the target was not checked"
+        yield Said("the gap to the target was not checked", "not_checked")
 
 
-def _loads(results: Results, ends: list[Ends]) -> Iterator[str]:
+def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
     """How far shells are known under loads where they could not be followed, and where imperfect ones fall.
 
     Parameters
@@ -345,80 +370,94 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[str]:
     for name, by_ends in results.loads.items():
         for end in ends:
             if end not in by_ends:
-                yield f"{name} with {end} ends was not checked"
+                yield Said(f"{name} with {end} ends was not checked", "not_checked", end, place=name)
                 continue
             found = by_ends[end]
             limit, imperfect = found.limit_factor or 0.0, found.imperfect_factor
             linear, stands = found.linear_factor, found.limit_factor is None or limit >= 1
             if linear is not None and linear < 1 and stands:
-                yield (
+                yield Said(
                     f"under {name} with {end} ends linear buckling is at {rounded_down(linear)} times these loads: "
                     "the shell carries them only in another shape, its nodes having moved by "
-                    f"{_mm(results, found.max_deflection)}"
-                )
+                    f"{_mm(results, found.max_deflection)}",
+                    "linear_buckling", end, linear, 1, place=name,
+                )  # fmt: skip
             if found.limit_kind == "not followed" and limit < 1:
-                yield (
+                yield Said(
                     f"whether the shell stands under {name} with {end} ends is not known: it could be followed only up "
-                    f"to {rounded_down(limit)} times these loads"
-                )
+                    f"to {rounded_down(limit)} times these loads",
+                    "not_followed", end, limit, 1, place=name,
+                )  # fmt: skip
             elif found.limit_kind == "not followed":
-                yield (
+                yield Said(
                     f"under {name} with {end} ends the shell could not be followed beyond {rounded_down(limit)} times "
-                    "the loads, and nothing is known above"
-                )
+                    "the loads, and nothing is known above",
+                    "not_followed", end, limit, 1, place=name,
+                )  # fmt: skip
             imperfectly = f"under {name} with {end} ends and imperfections"
             if found.imperfect_kind == "not followed" and imperfect is None:
-                yield f"{imperfectly} no equilibrium was found, and nothing is known of it"
+                yield Said(
+                    f"{imperfectly} no equilibrium was found, and nothing is known of it", "imperfect", end, place=name
+                )
             elif found.imperfect_kind == "not followed":
-                yield f"{imperfectly} nothing is known above {rounded_down(imperfect or 0.0)} times the loads"
+                words = f"{imperfectly} nothing is known above {rounded_down(imperfect or 0.0)} times the loads"
+                yield Said(words, "imperfect", end, imperfect, 1, place=name)
             elif found.imperfect_kind == "unstable unloaded":
-                yield f"with {end} ends and imperfections the shell is unstable before the loads of {name} act"
+                words = f"with {end} ends and imperfections the shell is unstable before the loads of {name} act"
+                yield Said(words, "imperfect", end, place=name)
             elif imperfect is not None and imperfect < 1:
-                yield f"{imperfectly} the shell falls at {rounded_down(imperfect)} times these loads"
+                words = f"{imperfectly} the shell falls at {rounded_down(imperfect)} times these loads"
+                yield Said(words, "imperfect", end, imperfect, 1, place=name)
 
 
-def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
+def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
     """Whether rods hold and pass each other."""
     met = results.contact
     if any(
         (met.of(ends) if met else None) is None or bent_of(results, ends).max_bending_strain is None for ends in usable
     ):
-        yield (
+        yield Said(
             "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
-            "rod.section.fibre_distances for that"
+            "rod.section.fibre_distances for that",
+            "not_checked",
         )
     if results.rod and (thin := thinner_than_sold(results.rod)):
-        yield f"the chosen section is {thin}: have it made, or choose another material or a larger target"
+        words = f"the chosen section is {thin}: have it made, or choose another material or a larger target"
+        yield Said(words, "not_sold")
     if results.bending is None or results.bending.strength is None:
         if width(results) > LARGE:
-            yield "no strength was given, so it is not known whether the rods hold (checks.strength)"
+            yield Said(
+                "no strength was given, so it is not known whether the rods hold (checks.strength)", "no_strength"
+            )
         return
     name = results.bending.strength_of
     used = max((bent_of(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
     if name and used > RESERVED and not by_design_strength(results):
-        yield (
+        yield Said(
             f"the rods permanently use {percent(used)} of {strength_name(results, ENDS[0])}: "
-            "reduce it for duration and moisture and give the reduced value as checks.strength, or use thinner rods"
-        )
+            "reduce it for duration and moisture and give the reduced value as checks.strength, or use thinner rods",
+            "strength_not_reduced", None, used, RESERVED,
+        )  # fmt: skip
 
 
-def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[str]:
+def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[Said]:
     """Whether the deployment was checked; what was found there is among a result's warnings."""
     deployment = results.deployment
     if not deployment:
         remedy = "" if late else ": this needs pinned ends (pop_up.ends) and checks.stages above 0"
         failed = _status(results.pop_up.get("pinned")) != CONVERGED
         why = ", since the pinned shell was not found" if failed else remedy
-        yield f"whether the shell is reached from flat was not checked{why}"
+        yield Said(f"whether the shell is reached from flat was not checked{why}", "not_checked")
     elif (
         "clamped" in usable
         and deployment.reached_from_flat
         and (deployment.clamped is None or deployment.clamped.reached_from_flat is None)
     ):
-        yield "whether the clamped shape is reached from the pinned one by turning the ends is not known"
+        words = "whether the clamped shape is reached from the pinned one by turning the ends is not known"
+        yield Said(words, "not_checked", "clamped")
 
 
-def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[str]:
+def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
     for ends, searched in results.other_shapes.items():
         near = [
             (shape.distance, shape.energy)
@@ -428,13 +467,14 @@ def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[str]:
         ]
         if ends in usable and near:
             distance, energy = min(near, key=lambda pair: pair[0])
-            yield (
+            yield Said(
                 f"with {ends} ends the shell has another stable shape, {percent(distance)} of its size away "
-                f"at {rounded(energy)} times the energy: check on site that it takes the intended one"
-            )
+                f"at {rounded(energy)} times the energy: check on site that it takes the intended one",
+                "other_shape", ends, distance, NEAR,
+            )  # fmt: skip
 
 
-def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
+def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
     """Why a result is good."""
     braced = is_braced(results)
     weighed = [results.self_weight[ends] for ends in usable]
@@ -447,29 +487,35 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
         if (gap := results.agreement.get(ends)) and gap.max_relative is not None
     ]
     near = f"; the gap to the target is at most {' and '.join(gaps)}, of its size" if gaps else ""
-    yield (
+    yield Said(
         f"with {' and '.join(usable)} ends the shell{' with its bracing' * braced} is stable and carries {weight} "
-        f"times its own weight, {rounded(reserve(results))} being asked for{near}"
-    )
+        f"times its own weight, {rounded(reserve(results))} being asked for{near}",
+        "stands", usable[0] if len(usable) == 1 else None, least, reserve(results),
+    )  # fmt: skip
     if not results.loads:
         known = results.strength is not None and results.strength.creep is not None
-        yield (
+        yield Said(
             "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
             "people) and imperfections were not checked"
-            f"{'' if known else ', nor creep, which is not known of these rods'}"
+            f"{'' if known else ', nor creep, which is not known of these rods'}",
+            "no_loads",
         )
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)
-        yield f"under {name} it is stable up to {shown_factor(least)} times these loads"
+        words = f"under {name} it is stable up to {shown_factor(least)} times these loads"
+        yield Said(words, "stands_under_loads", None, least, 1, place=name)
 
 
-def _perfect(results: Results) -> Iterator[str]:
+def _perfect(results: Results) -> Iterator[Said]:
     """That factors under loads are those of the perfect shell."""
     if any(found.imperfect_kind is None for by_ends in results.loads.values() for found in by_ends.values()):
-        yield (
+        offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
+        yield Said(
             "imperfections were not looked at, and the factors on the loads are those of the perfect shell: have them "
-            f'looked at ({FORM_AGAIN} --stability.imperfection "span/500")'
+            f"looked at ({offer})",
+            "no_imperfections",
+            offers=(offer,),
         )
 
 
