@@ -67,7 +67,7 @@ def test_what_was_computed_is_saved_with_its_exit_code(streams: str, tmp_path: P
             ended = run(FORM, tmp_path, capture_output=False, stdout=full, stderr=full)
     else:
         ended = run(FORM, tmp_path, **STREAMS[streams])
-    assert ended.returncode == 0
+    assert ended.returncode == 4  # its rubber rods do not carry their own weight
     assert (tmp_path / "out" / "hemisphere" / "result.json").read_bytes().startswith(b"{")
     assert (tmp_path / "out" / "hemisphere" / "schedule" / "rods.csv").is_file()
 

@@ -2,6 +2,7 @@
 
 import gc
 import os
+import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -50,6 +51,8 @@ def entry() -> None:
         os.environ.setdefault(blas, "1")
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # which it looks for in every installed package
     os.environ["PYTHONSAFEPATH"] = "1"
+    if not re.fullmatch(r"\d{1,12}", os.environ.get("SOURCE_DATE_EPOCH", "0")):  # libraries read it when they load
+        del os.environ["SOURCE_DATE_EPOCH"]
     with printed_streams():
         try:
             code = main()
