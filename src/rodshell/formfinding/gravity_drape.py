@@ -178,7 +178,6 @@ def _equilibrium(
             problem,
             state,
             forces,
-            descend=update == 0,
             most_iterations=most,
             progress=_reporting(progress, f"gravity, {level}, contact {update + 1} of at most {CONTACT_UPDATES}", most),
         )
