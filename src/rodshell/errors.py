@@ -53,7 +53,6 @@ class ConvergenceError(RodshellError):
 
     Parameters
     ----------
-    message : one sentence.
     report : what was reached, as the solver reports it.
     """
 

@@ -419,7 +419,6 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
     Parameters
     ----------
     form : whose shells are loaded, with each end condition that converged.
-    loads : and their combinations.
     progress : called with stage and figures.
 
     Raises

@@ -61,7 +61,6 @@ class Job:
 
     Parameters
     ----------
-    target : the shape wanted.
     layout : the flat grid asked for.
     rod : section and material of every rod.
     method : of the drape: `Bound()`, `Gravity()` or `Fall()`, see `drape`.
@@ -412,7 +411,6 @@ def refine(
 
     Parameters
     ----------
-    form : of a target.
     vary : families, one or several: "taper" (EI along rods), "double" (two laths over a share of each rod), "tails"
         (cut lengths), "clamps" (directions of clamped ends), "holes" (joints along rods), "offsets" (of rods).
     ends : the only end condition of the refined form; None: the first of the form's.

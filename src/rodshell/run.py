@@ -134,7 +134,6 @@ class Run:
         Parameters
         ----------
         rod : provisional, of which the first shell is made.
-        estimate : what decided it.
         stages_of : the shells of a rod.
         """
         fit, weight, before = estimate, self.options.judged_by(rod).shear_weight, self._sized_before()

@@ -20,7 +20,6 @@ def in_threads(work: Callable[[int, int], object], count: int, *, most: int | No
     Parameters
     ----------
     work : called with the number of a piece and that of the thread, from 0.
-    count : number of pieces.
     most : number of threads; by default `threads()`.
 
     Raises

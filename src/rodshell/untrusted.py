@@ -43,7 +43,6 @@ def raised(usual: float, needed: float) -> str:
 
     Parameters
     ----------
-    usual : the limit without RODSHELL_LIMITS.
     needed : what was refused, in the same unit.
     """
     return f"or set {FACTOR}={max(2, int(-(-needed // usual)))} to allow it"

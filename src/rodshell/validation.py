@@ -36,8 +36,6 @@ def instance(name: str, value: object, kind: type | UnionType, wanted: str = "")
 
     Parameters
     ----------
-    name : of the argument.
-    value : of the argument.
     kind : class or union of classes.
     wanted : what the value must be, in words; default "a rodshell KIND".
     """
@@ -72,7 +70,6 @@ def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice
 
     Parameters
     ----------
-    name : of the argument.
     value : one word, or a sequence of words, which may be empty.
     choices : the words that are allowed.
     """
@@ -143,7 +140,6 @@ def listed(name: str, value: object, wanted: str) -> tuple[Any, ...]:
 
     Parameters
     ----------
-    name : of the argument.
     value : of the argument; text is not a list of its letters, a mapping not one of its keys.
     wanted : what it must be, in words, such as "a list of rods".
     """
@@ -183,10 +179,8 @@ def numbers(name: str, value: object, wanted: str, count: int, unit: str = "") -
 
     Parameters
     ----------
-    name : of the argument.
     value : a sequence or an array.
     wanted : what it must be, in words, such as "two finite numbers x, y in m".
-    count : how many numbers.
     unit : of each; "" for plain numbers.
     """
     single = not hasattr(value, "__len__") or isinstance(value, str | bytes | dict) or getattr(value, "ndim", 1) == 0
@@ -260,7 +254,6 @@ def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
 
     Parameters
     ----------
-    name : of the argument.
     given : numbers of the `shape`, or of one that can be broadcast to it.
     shape : of the result; none for a single number.
     """
@@ -285,9 +278,7 @@ def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None
 
     Parameters
     ----------
-    name : of the argument.
     given : an array or nested sequences.
-    kind : of the array's elements.
     shape : length along each axis, None for any.
     """
     import numpy as np
@@ -359,8 +350,6 @@ def keep(record: Any, check: Callable[..., object], unit: str, *names: str, what
     ----------
     record : the dataclass; a field with the default None may be None.
     check : `number`, `positive` or `not_negative`.
-    unit : of the numbers.
-    names : of the fields.
     what : what messages call a field, with {} for its name.
     options : of `check`.
     """

@@ -42,7 +42,6 @@ class CaseKey:
     Parameters
     ----------
     path : dotted, such as "target.radius".
-    help : one line.
     kinds : of the table that has the key, where not every kind has it.
     choices : the words that it may take, where it is a choice.
     any_value : whether it may take values other than these words.

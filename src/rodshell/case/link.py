@@ -31,7 +31,6 @@ def studio_link(case: Case, *, address: str = ADDRESS) -> str:
 
     Parameters
     ----------
-    case : of a job.
     address : of the studio, as it prints it.
 
     Raises
@@ -58,10 +57,6 @@ def require_small(size: int) -> None:
 
 def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
     """What differs from a case without keys, in tables as in a case file; files as uploads, with their paths by name.
-
-    Parameters
-    ----------
-    case : of a job.
 
     Raises
     ------

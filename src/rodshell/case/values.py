@@ -45,11 +45,8 @@ class Held:
 
     Parameters
     ----------
-    value : the object.
-    what : it in words.
     by_value : whether two such objects are the same that are equal; else only one object is the same as itself.
     writable : whether a case file that leaves out what the keys do not describe gives the same form.
-    note : for such a file.
     """
 
     value: Any

@@ -54,10 +54,6 @@ def fibre_distance(rod: Rod) -> float | None:
 
     Where the section is not round it is that of its farthest point: the stress is then an upper bound. None for a
     given section without fibre distances.
-
-    Parameters
-    ----------
-    rod : section and material.
     """
     section = rod.section
     if isinstance(section, GivenSection):
@@ -162,7 +158,6 @@ def stress_is_known(rod: Rod, *, twisted: bool) -> bool:
 
     Parameters
     ----------
-    rod : section and material.
     twisted : the rods can be twisted.
     """
     return not _missing(rod, twisted)
@@ -274,7 +269,6 @@ def bending_of(
 
     Parameters
     ----------
-    shell : of equal rods.
     state : (N, 3) node positions [m] and twist angles [rad].
     rod : the section and material of every rod.
     shear_weight : of the shear stress against the normal stress, see `checks.bending`.
@@ -378,7 +372,6 @@ def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
 
     Parameters
     ----------
-    shell : whose edges are meant.
     frames : the shell's bending and twist, whose frames are transported to the state.
     state : (N, 3) node positions [m] and twist angles [rad].
     """
@@ -394,7 +387,6 @@ def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
 
     Parameters
     ----------
-    mesh : the rods.
     positions : (n, 3) of its nodes [m].
     """
     if (mesh.grid.joint_counts() == 0).any():
@@ -407,7 +399,6 @@ def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = Non
 
     Parameters
     ----------
-    mesh : the rods.
     positions : (n, 3) of its nodes [m].
     clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
     """

@@ -54,7 +54,6 @@ class Checks:
 
     Parameters
     ----------
-    bending, reactions, joints : by end condition.
     deployment : from flat, with pinned ends, or None; `deployment_bending` the bending of its stages, the flat grid
         first.
     self_weight : by end condition, what share of its own weight the shell carries.

@@ -62,7 +62,6 @@ def contact_of(shell: Shell, state: Floats, rod: Rod) -> Contact:
 
     Parameters
     ----------
-    shell : of equal rods.
     state : (N, 3) node positions [m] and twist angles [rad].
     rod : the section of every rod.
     """

@@ -101,7 +101,6 @@ class Deployment:
         are driven on straight lines; None where that could not be followed.
     elsewhere : where it comes to rest instead.
     guided : the shares between which it has to be guided off the path that leads elsewhere.
-    factorizations : that it took.
     """
 
     share: Floats
@@ -148,7 +147,6 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
     Parameters
     ----------
     shell : with pinned ends, its source frames being at the equilibrium.
-    found : its equilibrium without loads.
     stages : number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root of
         the way.
     progress : called with each share of the deployment that is looked for.

@@ -66,11 +66,8 @@ class OtherShapes:
 
     Parameters
     ----------
-    tried : number of starts.
     popped_through : whether popping through was among them.
     largest_kick : over half the shell's width.
-    found : each shape once.
-    factorizations : that it took.
     """
 
     tried: int
@@ -224,7 +221,6 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
 
     Parameters
     ----------
-    mesh : the grid.
     positions : (n, 3) of its nodes [m]; of rods in two layers on the surface between them.
 
     Returns

@@ -144,7 +144,7 @@ def joint_loads(shell: Shell, state: Floats) -> JointLoads:
 
     Raises
     ------
-    InputError : an energy between rods cannot tell its moments.
+    InputError : the moments of an energy between rods are not known.
     """
     mesh, positions = shell.mesh, shell.positions(state)
     met = mesh.at_crossings

@@ -35,7 +35,6 @@ class SelfWeightCheck:
     limit : why the factor is what it is. "limit point": the load cannot grow, the shell snaps through; "bifurcation":
         it gives way sideways; "none": it is stable up to `MOST`; "not followed": it is stable up to the factor, and
         nothing is known above; "no mass": the rods have none, so that nothing is known.
-    factorizations : what it took.
     """
 
     load_factor: float | None
@@ -87,12 +86,7 @@ def self_weight(
 
 
 def weakest(parts: Sequence[SelfWeightCheck]) -> SelfWeightCheck:
-    """Of patches that stand by themselves: the smallest factor, and the largest deflection if all carry their weight.
-
-    Parameters
-    ----------
-    parts : of each patch.
-    """
+    """Of patches that stand by themselves: the smallest factor; the largest deflection if all carry their weight."""
     least = min(parts, key=lambda part: part.at_least)
     sunk = [part.deflection for part in parts]
     deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)

@@ -103,7 +103,6 @@ class Fit:
 
         Parameters
         ----------
-        target : the surface.
         layout : of the rods on it.
         anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
         joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
@@ -147,7 +146,6 @@ class Fit:
         Parameters
         ----------
         shells : popped up from flat rods that are all alike.
-        rod : of which they are.
         shear_weight : strength over shear strength of its material.
         """
         bends = bends_of_pop_ups(shells, rod)
@@ -298,7 +296,6 @@ def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | N
 
     Parameters
     ----------
-    target : the surface.
     layout : of the rods on it.
     anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
     """
@@ -331,7 +328,6 @@ def bends_of_pop_ups(shells: Iterable[PopUp], rod: Rod) -> Bends:
 
     Parameters
     ----------
-    shells : at least one.
     rod : section and material of every rod.
     """
     parts = list[Bends]()
@@ -349,8 +345,6 @@ def largest_strain(rod: Rod, bends: Bends, *, shear_weight: float = VON_MISES) -
 
     Parameters
     ----------
-    rod : section and material.
-    bends : of rods like it.
     shear_weight : of the shear stress against the normal stress, see `checks.bending`.
     """
     assert rod.material is not None

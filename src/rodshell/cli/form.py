@@ -46,7 +46,6 @@ def run_case(case: "Case", name: str, output: RunOptions) -> int:
 
     Parameters
     ----------
-    name : of the folder out/NAME.
     output : where and what to write.
     """
     from rodshell.results.archive import kept_case, read_inputs

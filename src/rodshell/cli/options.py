@@ -120,7 +120,6 @@ class RunOptions:
 
     Parameters
     ----------
-    out : folder for the results.
     kinds : of files in addition to the archive; None: all that every installation can.
     limit : longest time for all but the files [s].
     """

@@ -184,7 +184,6 @@ def run_and_deliver(
 
     Parameters
     ----------
-    name : of the folder out/NAME.
     names : patterns of the files that are written in addition to result.json, states.npz and those of the kinds.
     pictures : more files of the form, by name.
     formed_before : the form is on disk already; where its loads cannot be checked it is not written again.

@@ -65,7 +65,6 @@ class Lath:
 
     Parameters
     ----------
-    rod : index of the rod.
     number : 1 is the rod itself, whole.
     start, stop : its cut ends, allowances included, from the rod's start [m].
     splices : distances from the rod's start [m].

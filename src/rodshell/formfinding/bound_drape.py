@@ -263,12 +263,7 @@ def _net_deviation(target: Target, mesh: GridMesh, ends: Floats, whole: Ints, sp
 
 
 def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
-    """Key figures of a net for the result file: its error [m], and its smallest angle and where that is [m].
-
-    Parameters
-    ----------
-    net : a marched net.
-    """
+    """Key figures of a net for the result file: its error [m], and its smallest angle and where that is [m]."""
     return {
         "error_estimate": net.error_estimate,
         "min_angle_deg": degrees(net.min_angle),

@@ -31,7 +31,6 @@ def drape(
 
     Parameters
     ----------
-    layout : the flat grid.
     rod : section and material of every rod.
     target : the surface, and where it ends.
     method : `Bound()` marches the inextensible net and binds the grid to it; `Gravity()` lets the rods hang on the

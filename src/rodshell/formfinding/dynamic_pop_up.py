@@ -71,7 +71,6 @@ class DynamicPopUp:
     Parameters
     ----------
     positions : (n, 3) of the footprint's nodes [m].
-    rest : how the motion ended.
     """
 
     positions: Floats

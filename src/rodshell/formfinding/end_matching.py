@@ -62,8 +62,6 @@ class MatchedEnd:
 
     Parameters
     ----------
-    point : index of that point.
-    rod : name of the rod.
     side : 0 at its start, 1 at its end.
     distance : from the point [m].
     """

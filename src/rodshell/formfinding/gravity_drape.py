@@ -50,7 +50,6 @@ def gravity_drape(
 
     Parameters
     ----------
-    method : the acceleration of gravity.
     anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
 
     Raises

@@ -175,7 +175,6 @@ class Draped:
 
     Parameters
     ----------
-    method : how it was draped.
     target, layout, rod, anchor : as they were given; anchor is x, y [m], or None.
     eccentricity : distance of the two layers of rods [m]; 0 where they meet.
     mesh : the whole mesh, with the lines and tails that are cut off later.
@@ -185,7 +184,6 @@ class Draped:
     figures : how well the grid lies on the target.
     net : the net that the drape started from; None where it started from the flat grid.
     rest : how the motion ended (`Fall`); else None.
-    warnings : sentences for the user.
     """
 
     method: Method

@@ -86,7 +86,6 @@ class PatchedForm:
     patch_nets, patches : of each patch by its name: its rods, and every stage of its form.
     meetings : where rods of two patches end at one point.
     moved : of each patch the largest distance between a rod end of its mesh and that point, to which it was moved [m].
-    ends : the requested end conditions.
     """
 
     target: Target

@@ -240,7 +240,6 @@ def find_stages(
 
     Parameters
     ----------
-    name : of the patch.
     warm_start : stages found before, from whose net and shells the new ones start.
     same_drape : whether nothing that the drape depends on has changed since: then drape and footprint of `warm_start`
         are taken over, and so are its pop-ups with the same ends, except those that a time limit stopped.

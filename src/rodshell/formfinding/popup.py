@@ -412,7 +412,6 @@ def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
 
     Parameters
     ----------
-    mesh : the flat grid.
     points : (2m, 3) where both ends of each rod in turn are to go [m].
     height : of the grid's plane [m].
 

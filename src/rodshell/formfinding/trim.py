@@ -82,10 +82,8 @@ class Trimmed:
 
     Parameters
     ----------
-    draped : the whole grid.
     mesh : of the trimmed rods; rods in layers have separate nodes in it, each on its own line.
     positions : (n, 3) of its nodes [m].
-    boundary : where the rods end.
     dropped : names of the rods that are left out, each with the reason.
     """
 

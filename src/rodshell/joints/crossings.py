@@ -153,7 +153,6 @@ def with_source(elements: T, state: Floats) -> T:
 
     Parameters
     ----------
-    elements : joints or ties.
     state : (N, 3) the state of the new source frames.
     """
     tangents = edge_tangents(state, elements.blocks, elements.legs)
@@ -184,7 +183,6 @@ def stencils(rod_nodes: RodNodes, pairs: Ints) -> Iterator[Stencils]:
 
     Parameters
     ----------
-    rod_nodes : of the mesh.
     pairs : (m, 2) rod nodes that meet, on the first and on the second rod.
     """
     sides = np.column_stack([rod_nodes.has_edge(pairs[:, rod], side) for rod in range(2) for side in range(2)])
@@ -413,7 +411,6 @@ class LinkerBend:
 
         Parameters
         ----------
-        corners : n, where they lie.
         blocks : (n, 5) their blocks: those of the corners, or copies of them.
         flat : (N, 3) state of the flat grid [m].
         stiffness : (n, 3) EI1, EI2 and GJ [N m2].

@@ -278,7 +278,6 @@ def elastic_joints(
 
     Parameters
     ----------
-    rod_nodes : of the mesh.
     crossings : (m,) indices of the grid's crossings.
     joints : m, the joint at each of them.
     rod_stiffness : (k, 3) EI1, EI2 and GJ at each rod node [N m2].

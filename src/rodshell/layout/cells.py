@@ -44,12 +44,7 @@ class Pattern:
 
 
 def grid_cells(grid: FlatGrid) -> Ints:
-    """(k, 4) crossings of each cell, in their order around it.
-
-    Parameters
-    ----------
-    grid : rods and crossings.
-    """
+    """(k, 4) crossings of each cell, in their order around it."""
     rods, next_to = grid.crossings.rods.tolist(), dict[tuple[int, int], list[int]]()  # joints next to one on a rod
     for rod, row in _rows(grid).items():
         for k, joint in enumerate(row):
@@ -68,11 +63,6 @@ def diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     """(d, 2) crossings that each diagonal joins; both of a cell follow each other, one for each way of the pattern.
 
     The first way of a cell goes up in the flat grid, from left to right; for rods of a table its x axis decides.
-
-    Parameters
-    ----------
-    grid : rods and crossings.
-    pattern : which diagonals.
     """
     cells = grid_cells(grid)
     pairs = np.stack([cells[:, [0, 2]], cells[:, [1, 3]]], axis=1)
@@ -96,7 +86,6 @@ def rim_diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
 
     Parameters
     ----------
-    grid : rods and crossings.
     pattern : of two diagonals of a field one is left out, as in cells; with lines the others of its way are.
     """
     rows, rods = _rows(grid), grid.crossings.rods.tolist()
@@ -171,12 +160,7 @@ def _direction(points: Floats, a: int, b: int) -> Floats:
 
 
 def flat_joints(grid: FlatGrid) -> Floats:
-    """(c, 2) place of each crossing in the flat grid [m].
-
-    Parameters
-    ----------
-    grid : rods and crossings.
-    """
+    """(c, 2) place of each crossing in the flat grid [m]."""
     first, at = grid.crossings.rods[:, 0].tolist(), grid.crossings.at[:, 0].tolist()
     return np.array([grid.rods[rod].point(s) for rod, s in zip(first, at, strict=True)]).reshape(-1, 2)
 

@@ -104,7 +104,6 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
 
     Parameters
     ----------
-    rods : whole rods.
     pieces : rods, each of which is one of the whole rods or a piece of one.
 
     Returns
@@ -186,7 +185,6 @@ class FlatGrid:
 
         Parameters
         ----------
-        rods : straight rods.
         margin : crossings closer to an end of either rod are not joined [m].
 
         Raises
@@ -410,7 +408,6 @@ def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> Ints:
 
     Parameters
     ----------
-    rods : number of rods.
     crossings : pairs of indices of rods that cross.
 
     Returns

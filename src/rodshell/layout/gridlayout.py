@@ -241,7 +241,6 @@ def rod_names(family: Family, count: int) -> list[str]:
 
     Parameters
     ----------
-    family : of the rods.
     count : number of rods of the family, which determines the number of digits.
     """
     letter, digits = family.upper(), max(2, len(str(count)))

@@ -208,7 +208,6 @@ class GridMesh:
         Parameters
         ----------
         positions : (n, 3) of the nodes of this mesh [m].
-        fine : the other mesh.
         rods : for each rod of `fine` the rod of this mesh that it is a part of; default: the same.
 
         Returns
@@ -262,7 +261,6 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
 
     Parameters
     ----------
-    grid : rods and joints.
     edge : longest edge [m]; infinite: as few edges as possible.
     marks : for each rod the material coordinates of further points that must be nodes [m].
 
@@ -430,7 +428,6 @@ def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
 
     Parameters
     ----------
-    mesh : to be cut.
     grid : pieces of its rods, cut at nodes, and their joints.
 
     Returns
@@ -500,7 +497,6 @@ def spans_along(mesh: GridMesh, ends: Floats, whole: Ints) -> Ints:
 
     Parameters
     ----------
-    mesh : of the whole rods.
     ends : (m, 2) material coordinates of start and end of each piece [m].
     whole : (m,) the rod of the mesh that it belongs to.
     """
@@ -562,7 +558,6 @@ def side_by_side(meshes: Mapping[str, GridMesh], gap: float) -> SideBySide:
 
     Parameters
     ----------
-    meshes : the grids by name.
     gap : between two grids [m].
     """
     low = {name: mesh.flat[:, :2].min(axis=0) for name, mesh in meshes.items()}

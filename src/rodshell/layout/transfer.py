@@ -20,7 +20,6 @@ def transferred_nodes(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
     Parameters
     ----------
     values : (m, d) at the m nodes of `mesh`, of any unit.
-    mesh, to : the two meshes.
     """
     total, count = np.zeros((to.node_count, values.shape[1])), np.zeros((to.node_count, 1))
     along_rods = list[tuple[Ints, Floats, Floats]]()
@@ -43,7 +42,6 @@ def transferred_edges(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
     Parameters
     ----------
     values : (f,) at the f edges of `mesh`, of any unit.
-    mesh, to : the two meshes.
     """
     result = np.zeros(len(to.edges))
     for rod, old in corresponding_rods(mesh, to):

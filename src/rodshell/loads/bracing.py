@@ -59,7 +59,6 @@ class Cables:
 
         Parameters
         ----------
-        structure : erected.
         target : whose openings the cables must not cross.
 
         Raises
@@ -114,7 +113,6 @@ def braced_diagonals(
 
     Parameters
     ----------
-    mesh : of the grid.
     positions : (n, 3) of its nodes [m].
     target : whose openings the diagonals must not cross.
     pattern, across_openings : as of `Cables`.

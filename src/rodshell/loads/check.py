@@ -76,7 +76,6 @@ class LoadedShell:
     mode_factors : (j,) linear buckling factors of `modes`.
     modes : (j, n, 3) lowest linear buckling modes, the largest component being 1.
     mode : (n, 3) how the shell gives way at the limit, or None.
-    factorizations : what it took.
     """
 
     at_factor: float
@@ -130,7 +129,6 @@ class LoadChecks:
 
     Parameters
     ----------
-    asked : the loads and combinations.
     shells : by combination and end condition; an end condition whose shell did not converge is left out.
     braced : (d, 2) crossings that each brace joins, the rod ends counted on from them; without bracing there are none.
     limits : what the rods are judged by.
@@ -196,8 +194,6 @@ def check_shells(
     Parameters
     ----------
     stages : of the form; of one in patches these are loaded together, their seams held as supports are.
-    loads : with their combinations.
-    limits : of the rods.
     progress : called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found until
         then is returned.
 
@@ -252,7 +248,6 @@ def unchecked(loads: Loads, *, refused: str = "", stopped: str = "") -> LoadChec
 
     Parameters
     ----------
-    loads : and their combinations.
     refused, stopped : why: the loads do not fit the form, or a computation failed.
     """
     none: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
@@ -306,12 +301,7 @@ def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm | Patched
 
 
 def mechanism(structure: Structure) -> str | None:
-    """Which motion has no stiffness, and what to do, in words; None: every motion has one.
-
-    Parameters
-    ----------
-    structure : in equilibrium without loads.
-    """
+    """Which motion has no stiffness, and what to do, in words; None: every motion has one."""
     stiffness, motion = softest_motion(structure.equilibrium)
     if abs(stiffness) > ROUND_OFF:
         return None
@@ -391,8 +381,6 @@ def loaded_shell(
     structure : in equilibrium without the loads.
     load : what acts at the combination's factor 1.
     loads : for how stability is looked at, and for holes and slip of joints.
-    limits : of the rods.
-    duration : of the combination.
     progress : called with what is being done.
     """
 

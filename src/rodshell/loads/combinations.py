@@ -62,7 +62,6 @@ class Loads:
 
     Parameters
     ----------
-    loads : by name.
     combinations : by name, the factors of loads by their names.
     bracing : that is put in before the loads act; None: none.
     locked_joints : how pins are tightened after that, before the loads act; None: they stay free.
@@ -86,12 +85,7 @@ class Loads:
     __repr__ = brief
 
     def duration(self, combination: str) -> Duration:
-        """How long a combination acts: as long as the load in it that acts for the shortest time.
-
-        Parameters
-        ----------
-        combination : its name.
-        """
+        """How long a combination acts: as long as the load in it that acts for the shortest time."""
         acting = [name for name, factor in self.combinations[combination].items() if factor > 0]
         each = [self.durations.get(name, LASTING[type(self.loads[name])]) for name in acting]
         return max(each, key=DURATIONS.index, default="permanent")

@@ -20,8 +20,6 @@ def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, comb
     ----------
     stages : of a form in one piece, popped up with these ends.
     ends : how the rods' ends are held.
-    loads : with their combinations.
-    combination : its name.
 
     Returns
     -------

@@ -65,7 +65,6 @@ class Laths:
 
         Parameters
         ----------
-        structure : erected.
         target : whose openings the laths must not cross.
 
         Raises

@@ -48,12 +48,7 @@ class LockedJoints:
             raise InputError("locked joints without shear stiffness are free: give one, or leave locked_joints out")
 
     def require_pins(self, joint: Joint) -> None:
-        """Raise InputError where joints of a kind cannot be locked.
-
-        Parameters
-        ----------
-        joint : of the shell.
-        """
+        """Raise InputError where joints of a kind cannot be locked."""
         if not isinstance(joint, Pin):
             raise InputError(
                 f"locked_joints: {joint.name} joints cannot be locked: pins are free about their normal until they are "

@@ -115,7 +115,6 @@ class Limits:
 
         Parameters
         ----------
-        rod : section and material.
         asked : what was given for it.
         characteristic : bending strength [Pa]; None: not known.
         of_preset : whether it is the preset's; a given one is taken as it is, for every duration.
@@ -171,7 +170,6 @@ def preset_limits(rod: Rod, service_class: int | None) -> Limits:
 
     Parameters
     ----------
-    rod : section and material.
     service_class : of timber, as of `Strength`.
     """
     material = rod.material
@@ -239,9 +237,7 @@ def utilisation(
     state : (N, 3) node positions [m] and twist angles [rad].
     rod : section and material of every rod.
     forces : (e,) axial force of each edge, tension positive [N].
-    limits : of the rod.
     asked : holes, slip and effective lengths.
-    duration : of the loads.
     bent : the shell's bending, where it is known.
     moments : (c,) of locked joints about their normals [N m]; None or empty: none is locked.
     slip_moment : at which locked joints slip [N m]; None: not known.
@@ -317,7 +313,6 @@ def net_section(section: Section | GivenSection, hole: float) -> float:
 
     Parameters
     ----------
-    section : of the rod.
     hole : diameter [m].
 
     Raises
@@ -349,7 +344,6 @@ def net_factors(mesh: GridMesh, section: Section | GivenSection, hole: float) ->
 
     Parameters
     ----------
-    mesh : of the flat grid.
     section, hole : as of `net_section`; 0: there is no hole.
     """
     factors = np.ones(len(mesh.rod_nodes))

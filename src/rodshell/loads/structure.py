@@ -33,7 +33,6 @@ class LathLayer:
     ----------
     shell : the model of the laths alone, each straight when it is free of stress.
     blocks : (N,) the structure's block that holds each of its blocks.
-    rod : section and material.
     rows : crossings that each lath runs over.
     entries : entries of its mesh's `rod_nodes` at these crossings, lath by lath.
     """
@@ -73,7 +72,6 @@ class Structure:
     ----------
     shell : the model of the grid, its source frames being at the equilibrium.
     equilibrium : of grid and bracing without loads, its ends held.
-    rod : of the grid.
     braced : (d, 2) crossings that its bracing joins, the rod ends counted on from them.
     bracing_mass : (n,) mass of the bracing whose weight the mesh's nodes carry [kg]; None: there is no bracing.
     cables : its energy; None: there are no cables.
@@ -95,13 +93,7 @@ class Structure:
 
     @staticmethod
     def erected(popped: PopUp, rod: Rod) -> "Structure":
-        """The popped-up shell, without bracing.
-
-        Parameters
-        ----------
-        popped : the shell.
-        rod : of the grid.
-        """
+        """The popped-up shell, without bracing."""
         return Structure(popped.shell, popped.equilibrium, rod)
 
     @property

@@ -100,7 +100,6 @@ def surface_triangles(
 
     Parameters
     ----------
-    target : the surface.
     anchor : point of the plan that is a corner, where it lies inside [m].
     rotate : angle of the sides [rad].
     step : their length in plan [m].
@@ -131,7 +130,6 @@ def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
 
     Parameters
     ----------
-    target : the surface.
     step : longest side [m].
     """
     points, faces = _divided(target, target.surface.vertices, target.surface.faces, longest=step)

@@ -40,12 +40,7 @@ class Freedom:
 
     @staticmethod
     def free(blocks: int) -> "Freedom":
-        """So many `blocks`, each free along x, y and z.
-
-        Parameters
-        ----------
-        blocks : number of blocks.
-        """
+        """So many `blocks`, each free along x, y and z."""
         directions = np.zeros((blocks, 3, 3))
         directions.reshape(blocks, 9)[:, ::4] = 1.0  # its diagonals
         return Freedom(directions, np.full(blocks, 3, dtype=np.intp))
@@ -142,7 +137,6 @@ class Assembly:
     Parameters
     ----------
     indptr, indices : the pattern (CSC, upper triangle).
-    rows : the same in blocks.
     """
 
     indptr: Longs
@@ -203,7 +197,6 @@ class Assembly:
 
         Parameters
         ----------
-        index : of the element set.
         hessian : (m, 3k, 3k) element Hessians.
         blocks : (m, k) blocks of the elements.
         freedom : free directions, as many of each block as in the plan.

@@ -58,7 +58,6 @@ class EdgeProperties:
 
         Parameters
         ----------
-        shell : to be varied.
         joint : one for all its crossings, or one for each.
         table : (e, 5) its edges' EA [N], EI1, EI2, GJ [N m2] and rest length [m].
         """

@@ -62,11 +62,9 @@ class ElasticRod:
     closed : a ring; its last edge leads back to the first node.
     elements : bending and twist: `BendTwist`; where the rod is isotropic and naturally straight
         `IsotropicBendTwist`, or `IsotropicBend` if it has no twist angles.
-    stretch : the edges.
     mass : (N, 3) lumped mass of each block's components: of a node [kg]; of a twist angle the rotary inertia
         [kg m2] in component 0, else 0. Ghosts have none.
     bend_lengths : (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
-    clamps : the clamped ends.
     clamp_tangents : (c, 3) unit tangents along the rod there at rest.
     free_spin : the energy does not change when the rod spins about itself together with its ends.
     """
@@ -254,7 +252,6 @@ class ElasticRod:
 
         Parameters
         ----------
-        end : that is clamped.
         position : (3,) of the end [m].
         tangent : (3,) unit tangent along the rod there.
         """

@@ -130,7 +130,6 @@ class RodLine:
         Parameters
         ----------
         directors : (e, 3) first material directors of the edges.
-        end : the clamped end.
         """
         order = slice(0, 2) if end == "start" else slice(-1, -3, -1)
         (d0, d1), (t0, t1), (l0, l1) = directors[order], self.tangents[order], self.lengths[order]
@@ -144,8 +143,6 @@ class RodLine:
 
         Parameters
         ----------
-        size : number of blocks.
-        rods : of each edge.
         angles : blocks of the twist angles, or empty.
         """
         mass = np.zeros((size, 3))
@@ -213,7 +210,6 @@ class RodBends:
 
         Parameters
         ----------
-        line : the rod at rest.
         directors : (e, 3) first material directors of its edges.
         """
         state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))

@@ -98,7 +98,6 @@ def varied_rods(mesh: GridMesh, rods: Rod | Sequence[Rod]) -> Iterator[tuple[Rod
 
     Parameters
     ----------
-    mesh : of m rods.
     rods : the same for all, or m.
     """
     each = rods if isinstance(rods, Sequence) else (rods,) * len(mesh.grid.rods)

@@ -62,7 +62,6 @@ class Shell:
     node_count : number of the rods' nodes: the mesh's, or more where rods do not share them.
     within : energies of single rods and linkers: bending, and twist where needed.
     between : energies between rods and linkers: joints and ties.
-    stretch : the edges.
     ends : (2m,) block of each rod end, start and end of each rod in turn.
     ghosts : (2m,) block of the ghost node past each end, or empty if the ends are pinned.
     angles : number of twist angles, or 0.
@@ -490,11 +489,6 @@ def _inner_nodes(mesh: GridMesh) -> Ints:
 
 
 def last_edges(mesh: GridMesh) -> Floats:
-    """(2m,) rest length of the edge at each rod end of a `mesh` [m].
-
-    Parameters
-    ----------
-    mesh : with m rods.
-    """
+    """(2m,) rest length of the edge at each rod end of a `mesh` [m]."""
     s, first, stop = mesh.stations, mesh.rod_start, mesh.rod_stop
     return np.column_stack([s[first + 1] - s[first], s[stop - 1] - s[stop - 2]]).ravel()

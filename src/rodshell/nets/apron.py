@@ -29,7 +29,6 @@ def with_apron(
     Parameters
     ----------
     rods : each from end to end of the target.
-    net : in which they lie.
     lines : offsets of the lines of the lattice, see `ChebyshevNet` [m].
     clearance : distance of the first joint past an end from that end, at least [m].
     """
@@ -60,7 +59,6 @@ class _Family:
     stations : (n,) where the lines are crossed [m].
     offsets : (m,) of the lines [m].
     live : (m, n) where the net has nodes.
-    rods : of both families.
     clearance : see `with_apron` [m].
 
     Attributes

@@ -41,8 +41,6 @@ class ChebyshevNet:
 
     Parameters
     ----------
-    target : the surface.
-    layout : the flat grid.
     rods : rods and virtual rods, each from end to end of the target: the footprint G0.
     lines : offsets of all lines of the lattice near the target [m]: `lines[0]` (nu,) are the u of the lines of family
         v, `lines[1]` (nv,) the v of those of family u.
@@ -52,7 +50,6 @@ class ChebyshevNet:
     min_angle_at : x, y, z of the point where it is [m].
     dropped : rods of the layout that are not in `rods`, with the reason.
     pieces : of each rod of the layout that is on the target in several pieces, the names of those in `rods`.
-    warnings : sentences.
     """
 
     target: Target
@@ -112,15 +109,12 @@ def chebyshev_net(
 
     Parameters
     ----------
-    target : the surface.
-    layout : the flat grid.
     anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
     warm_start : a similar net, from which this one is computed faster; the result is the same to round-off.
     eccentricity : distance of the rods' centre lines at their joints [m]. Rods of family u are half of it below the
         target and those of family v half of it above, each on the parallel surface there: a rod's material length is
         that of its own line, so that the flat grid is the layout's straight lattice, and its ends are over the
         target's end, along the normal.
-    progress : called before each march.
 
     Raises
     ------
@@ -393,7 +387,6 @@ def piece_names(rod: str, count: int) -> list[str]:
     Parameters
     ----------
     rod : name of the whole rod.
-    count : number of its pieces.
     """
     return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
 

@@ -74,7 +74,6 @@ def march(
 
     Parameters
     ----------
-    target : the surface.
     u, v : ascending material coordinates of the lines, both containing 0 [m].
     anchor, heading : see `axes`.
     heights : see `Net`.
@@ -91,8 +90,6 @@ def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERA
 
     Parameters
     ----------
-    target : the surface.
-    start : where the axes cross.
     net : whose points on the axes are set.
     tolerance : see `geodesics`.
     """
@@ -118,7 +115,6 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
 
     Parameters
     ----------
-    target : the surface.
     anchor : (3,) point of the surface where the axes cross [m].
     heading : (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
         parts in the tangent plane are used.
@@ -135,7 +131,6 @@ class Layer:
 
     Parameters
     ----------
-    target : the surface.
     height : of the layer above it, along its normals [m].
     """
 
@@ -173,7 +168,6 @@ def geodesics(
 
     Parameters
     ----------
-    target : the surface.
     start : (k, 3) points of the surface [m].
     direction : (k, 3) unit tangents there.
     steps : k arrays of chord lengths [m].
@@ -277,8 +271,6 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
 
     Parameters
     ----------
-    target : the surface.
-    net : whose points are set.
     wanted : (nu, nv) nodes to find; default all.
     tolerance : of Newton's last change of a node, relative to the step; the error that is left is about its square.
     """
@@ -393,7 +385,6 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
     by_x, by_y : gradients of x^2/2 and y^2/2 by P [m].
     g : gradient of f at P.
     from_a, from_b : wanted lengths of x and y [m].
-    level : f at P.
     """
     inverse = inverse_of(by_x, by_y, g)
     return solution(inverse, past(x, from_a), past(y, from_b), level), inverse[3]
@@ -443,7 +434,6 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
     hessian : (3, 3) second derivatives of f at P.
     heights : (2,) h_u and h_v, of the layers above the surface [m].
     from_a, from_b : wanted lengths of x and y [m].
-    level : f at P.
     """
     steep = np.sqrt(dot(g, g))
     n = (g[0] / steep, g[1] / steep, g[2] / steep)

@@ -39,11 +39,6 @@ def inside_nodes(target: Target, net: Net) -> Bools:
 
     If the anchor is in an opening, they are connected with the first inside nodes along the axes.
 
-    Parameters
-    ----------
-    target : the surface.
-    net : on it.
-
     Returns
     -------
     (nu, nv) booleans.
@@ -164,7 +159,6 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
 
     Parameters
     ----------
-    target : the surface.
     sets : lines of one family of one net each.
     depth : pieces that are nowhere further inside than this only graze the end and are ignored [m].
 
@@ -308,7 +302,6 @@ def extrapolated(coarse: Cuts, fine: Cuts, lines: int, step: float) -> tuple[Cut
     Parameters
     ----------
     coarse, fine : cuts of the lines from the two marches.
-    lines : their number.
     step : distance within which ends are matched [m].
 
     Returns

@@ -79,9 +79,7 @@ def march_covering(
 
     Parameters
     ----------
-    target : the surface.
     u, v : (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
-    start : where the axes cross.
     margin : (2,) along u and v [m].
     near : the net in longer steps.
     coarser : the same net in yet longer steps, see `march_near`.
@@ -186,9 +184,6 @@ def find_lines(
 
     Parameters
     ----------
-    target : the surface.
-    layout : whose lines are wanted.
-    start : where the axes cross.
     near : a net that may be similar, or None.
     parts : steps of the march per spacing.
     heights : see `Net`.
@@ -274,10 +269,7 @@ def march_lines(
 
     Parameters
     ----------
-    target : the surface.
-    layout : of the lines.
     lines : see `find_lines`.
-    start : where the axes cross.
     every : 1 for all nodes, 2 for every second node.
     near : one or two nets in longer steps, the finer first.
     heights : see `Net`.

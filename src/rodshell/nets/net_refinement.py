@@ -56,8 +56,6 @@ def march_near(
     Parameters
     ----------
     target, u, v, heights : see `march`.
-    start : where the axes cross.
-    near : the similar net.
     coarser : the same net as `near` in longer steps, from which the start is extrapolated.
     wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
     converged : the last motion of nodes, relative to the target's size; the error that is left is its third power.
@@ -101,7 +99,6 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
 
     Parameters
     ----------
-    net : the known net.
     u, v : (nu,), (nv,) material coordinates wanted [m].
 
     Returns

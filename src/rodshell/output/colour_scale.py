@@ -186,7 +186,6 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
 
     Parameters
     ----------
-    pencil : draws it.
     scale : the map, its range and its caption.
     right : x at which the bar ends [drawing units].
     y : baseline of the numbers [drawing units].
@@ -250,8 +249,6 @@ def search_svg(title: str, trials: tuple[TrialLike, ...], best: TrialLike) -> st
 
     Parameters
     ----------
-    title : above the map.
-    trials : all that were tried.
     best : the one to be framed.
     """
     anchors = list(dict.fromkeys(trial.anchor for trial in trials))

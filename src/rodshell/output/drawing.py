@@ -156,7 +156,6 @@ def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[
     ----------
     x, y : where its baseline starts, is centred or ends.
     c, s : cosine and sine of the angle of its baseline.
-    size, letters : of the text.
     back : where it begins, see `BACK`.
     """
     width = LETTER * size * letters
@@ -325,7 +324,6 @@ class Pencil:
 
         Parameters
         ----------
-        text : what it says.
         at : (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
         size : of the font [mm].
         layer : a key of `LAYERS`.
@@ -350,7 +348,6 @@ class Pencil:
 
         Parameters
         ----------
-        name : of the drawing.
         title : of the drawing, in words.
         text : usual size of its texts [mm].
         """

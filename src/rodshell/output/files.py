@@ -37,7 +37,6 @@ def save(
     ----------
     kinds : of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: all but 3dm.
     force : also replace files that rodshell did not write, or that were changed since, where it has to write.
-    more : other files, by name.
     progress : called for each file; a time limit does not apply, since what was found is to be kept.
 
     Raises
@@ -126,7 +125,6 @@ def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
 
     Parameters
     ----------
-    archive : the result.
     kinds : of files, keys of `KINDS`; default: all but 3dm.
 
     Raises

@@ -111,12 +111,7 @@ def rods_of(archive: Archive) -> list[GridRod]:
 
 
 def joints_of(rods: list[GridRod]) -> list[GridJoint]:
-    """Every joint once, in the order of the rods; the rod that comes first is named first.
-
-    Parameters
-    ----------
-    rods : all of an archive.
-    """
+    """Every joint once, in the order of the rods; the rod that comes first is named first."""
     index = {rod.id: k for k, rod in enumerate(rods)}
     back = {(rod.id, other): at for rod in rods for other, at in rod.joints}
     return [
@@ -224,7 +219,6 @@ def caption_of(archive: Archive, state: str) -> str:
 
     Parameters
     ----------
-    archive : the result.
     state : a key of `CAPTIONS`.
     """
     if archive.is_lost(state):
@@ -237,7 +231,6 @@ def shape_of(archive: Archive, name: str) -> Shape:
 
     Parameters
     ----------
-    archive : the result.
     name : one of `shape_names`.
 
     Raises

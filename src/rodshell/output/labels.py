@@ -158,11 +158,9 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
 
     Parameters
     ----------
-    text : of the label.
     end : (2,) the rod's end that it belongs to.
     way : (2,) to the side that is tried first.
     size : of the text, in the unit of `end`.
-    room : what is taken.
     lines : (m, 2, 2) lines that the text must not cover.
     """
     first = float(np.arctan2(way[1], way[0]))
@@ -183,7 +181,6 @@ def take(label: Label, size: float, room: Room) -> None:
 
     Parameters
     ----------
-    label : that was placed.
     size : of its text, in the unit of its coordinates.
     room : in which its box is taken.
     """

@@ -42,12 +42,7 @@ SEAMS = (
 
 
 def loads_page(archive: Archive) -> dict[str, Any] | None:
-    """What the page shows; None where no loads were checked.
-
-    Parameters
-    ----------
-    archive : the result.
-    """
+    """What the page shows; None where no loads were checked."""
     results = archive.results
     shells = list(loaded_shells(results))
     if not shells:

@@ -154,11 +154,6 @@ def compas_json(archive: Archive, state: str) -> str:
 def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
     """The whole model.
 
-    Parameters
-    ----------
-    archive : the result.
-    plan : its flat plan.
-
     Raises
     ------
     InputError : rhino3dm is not installed.
@@ -272,7 +267,6 @@ def widths_along(along: Stiffness, flat: Floats) -> Floats:
 
     Parameters
     ----------
-    along : how its EI changes.
     flat : (k, 3) its nodes in the flat grid [m].
     """
     stations = np.linalg.norm(flat - flat[0], axis=1)

@@ -29,7 +29,6 @@ class DrawingStyle:
     Parameters
     ----------
     paper : of the PDF's sheets, landscape: A4 to A0.
-    project, revision : for the title block.
     tolerance : of lengths [m], by which they are also rounded (see `wording.rounding_of`); None:
         the title block says that it is not given.
     layers : for some of the layers (CUT, MARK, LABEL, BOUNDARY-FLAT, BOUNDARY-FINAL, DIM, TITLE) another name.
@@ -175,7 +174,6 @@ class OutputOptions:
         Parameters
         ----------
         rod : section and material of every rod.
-        joint : where rods cross.
         """
         if self.strength is not None:
             require_known_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)

@@ -103,7 +103,6 @@ def text_width(text: str, size: float, *, bold: bool = False) -> float:
 
     Parameters
     ----------
-    text : a single line.
     size : of the font; the width has the same unit.
     bold : whether the font is bold.
     """

@@ -41,7 +41,6 @@ class View:
     Parameters
     ----------
     low, high : (3,) corners of the box [m].
-    scale : drawing units per metre.
     shift : (2,) added to the projected coordinates, so that the box's upper left corner is (0, 0).
     size : (2,) width and height of the drawn box.
     """
@@ -217,7 +216,6 @@ def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
 
     Parameters
     ----------
-    archive : one with the mode.
     ends : end condition of the shell.
     state : name of the mode's array (n, 3).
     """

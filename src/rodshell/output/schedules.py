@@ -40,12 +40,7 @@ Show = Callable[[float | None], str]
 
 
 def head(column: str) -> tuple[str, str]:
-    """A column of a schedule as people read it: "cut_length_mm" is ("cut length", "mm"); "" where it has no unit.
-
-    Parameters
-    ----------
-    column : as in CSV.
-    """
+    """A column of a schedule as people read it: "cut_length_mm" is ("cut length", "mm"); "" where it has no unit."""
     words = column.split("_")
     unit = next((word for word in words[1:] if word in UNITS), "")
     name = " ".join(word for word in words if word != unit)
@@ -53,12 +48,7 @@ def head(column: str) -> tuple[str, str]:
 
 
 def heading(column: str) -> str:
-    """The same in one line: "cut length [mm]".
-
-    Parameters
-    ----------
-    column : as in CSV.
-    """
+    """The same in one line: "cut length [mm]"."""
     name, unit = head(column)
     return f"{name} [{unit}]" if unit else name
 
@@ -327,12 +317,7 @@ def foundations_table(archive: Archive) -> Table:
 
 
 def loaded_shells(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
-    """Every combination of loads with each end condition, and the shell under it.
-
-    Parameters
-    ----------
-    results : of the form.
-    """
+    """Every combination of loads with each end condition, and the shell under it."""
     for name, by_ends in results.loads.items():
         for ends, shell in by_ends.items():
             yield name, ends, shell

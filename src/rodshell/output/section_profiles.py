@@ -16,12 +16,7 @@ WHAT = {
 
 
 def profiles_svg(rods: Sequence[Rod]) -> str | None:
-    """The picture, or None where no section changes.
-
-    Parameters
-    ----------
-    rods : of a result.
-    """
+    """The picture, or None where no section changes."""
     alike = _alike(rods)
     if not alike:
         return None

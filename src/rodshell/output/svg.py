@@ -21,7 +21,6 @@ def number(value: float, digits: int = 2) -> str:
 
     Parameters
     ----------
-    value : any finite number.
     digits : most decimals that are shown.
     """
     text = f"{value:.{digits}f}"
@@ -36,7 +35,6 @@ def tag(name: str, *children: str, **attributes: Any) -> str:
     Parameters
     ----------
     name : such as "path".
-    children : markup that it holds.
     attributes : "-" is written "_"; a "_" at the end, which Python's own words need, is dropped: `class_`.
     """
     words = [name]
@@ -70,7 +68,6 @@ def document(view: tuple[float, float, float, float], *children: str, unit: str 
     Parameters
     ----------
     view : x, y, width and height of the view box.
-    children : markup.
     unit : of the file's size, which is that of the view box: "mm", or "" for pixels.
     """
     x, y, width, height = (number(value, 3) for value in view)

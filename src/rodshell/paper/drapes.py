@@ -62,7 +62,6 @@ class DrapeRun:
     Parameters
     ----------
     case, method : what was draped, and how.
-    draped, trimmed : the result.
     seconds : time of drape and trim.
     ends : (m, 2) start and end of each rod at the target's end [m]: those of G0; for the bound drape, whose G0 is that
         of the net, those of the draped rods.
@@ -128,7 +127,6 @@ def drape_all(
 
     Parameters
     ----------
-    cases : targets and grids.
     progress : is called at each iteration.
     fall : settings of the paper's method.
     methods : by which each case is draped.
@@ -153,12 +151,7 @@ def _drape(case: Case, method: MethodName, fall: Fall, progress: Progress) -> Dr
 
 
 def rows_svg(drapes: Sequence[DrapeRun]) -> str:
-    """A row of four panels for each drape: setup, draped, trimmed, and the flat grid with its ends.
-
-    Parameters
-    ----------
-    drapes : one for each row.
-    """
+    """A row of four panels for each drape: setup, draped, trimmed, and the flat grid with its ends."""
     rows = []
     for run in drapes:
         name, spacing = run.case.target.name, 1e3 * run.case.spacing
@@ -255,7 +248,6 @@ class DrapeFigure(Figure):
     Parameters
     ----------
     name : of the figure, such as "fig6".
-    title : above the table.
     drapes : case by case, each by every method.
     """
 

@@ -137,7 +137,6 @@ def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, edge: float = E
     Parameters
     ----------
     progress : is called at each iteration.
-    cases : targets and grids.
     edge : length of the edges [m].
     """
     _popped(replace(cases[0], edge=edge), progress)

@@ -52,8 +52,6 @@ class Run:
 
     Parameters
     ----------
-    demonstration : which one.
-    joint, coupling : their names.
     step : of the time stepping [s]; None for statics.
     times : (k,) [s]; of statics those at which the motion reaches each equilibrium.
     angles : (k,) by which rod 2 has turned about the axis of the motion [rad].
@@ -119,7 +117,6 @@ def run_in_time(
 
     Parameters
     ----------
-    demonstration, joint, coupling : what is run.
     until : end of the motion [s].
     step : of the record [s]; with explicit ties the time step divides it until it is stable.
     """
@@ -138,7 +135,6 @@ def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, 
 
     Parameters
     ----------
-    demonstration, joint, coupling : what is run.
     until : end of the motion [s].
     """
     shell = _shell(joint, coupling)
@@ -349,7 +345,6 @@ def lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
 
     Parameters
     ----------
-    runs : all of them.
     until : end of the time axis [s].
     """
     shown = [run for run in runs if run.step is not None and run.follows]

@@ -54,14 +54,11 @@ class Timing:
 
     Parameters
     ----------
-    target : its name.
     method : "explicit", "implicit", "shared" in time, or "ours".
     step : time step [s], 0 for ours.
     edge : length of the edges [m].
-    dofs : number of unknowns.
     seconds : processor time of the drape, for ours with trim and map back.
     steps : taken; those refused and repeated in halves count among the factorisations.
-    factorizations : number of them.
     in_lapack, in_own : time of the steps per factorisation, in bare solves by LAPACK and by our band; 0 without a band.
     step_in_lapack : time of a step with all its iterations and corrections for contact, in bare solves by LAPACK.
     """
@@ -145,7 +142,6 @@ def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float 
     Parameters
     ----------
     progress : is called at each time step.
-    cases : targets and grids.
     falling : simulated time of each fall [s].
     """
     couplings: tuple[Coupling, ...] = (ExplicitPenalty(C1=C1), SharedDofs(), ImplicitPenalty())
@@ -194,8 +190,6 @@ def timed_fall(
 
     Parameters
     ----------
-    case : target and grid.
-    coupling : how rods are tied.
     step : time step [s].
     falling : simulated time [s].
     progress : is called at each time step.

@@ -34,7 +34,6 @@ class Case:
     Parameters
     ----------
     label : its letter in the paper's figure.
-    target : the surface.
     rods : number of rods of the two families.
     spacing, edge : of the rods, and length of their edges [m].
     """
@@ -120,7 +119,6 @@ def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool =
     Parameters
     ----------
     target : drawn as a filled body.
-    mesh : of the grid.
     positions : (n, 3) of its nodes [m].
     hides : draw the rods on the body's far side pale.
     """
@@ -138,10 +136,8 @@ def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attribute
 
     Parameters
     ----------
-    mesh : of the grid.
     at : (n, 2) points of its nodes in the drawing.
     near : (n,) bool, nodes in front; None: all.
-    attributes : further SVG attributes.
     """
     for k, rod in enumerate(mesh.grid.rods):
         nodes = mesh.nodes_of(k)
@@ -161,7 +157,6 @@ def dots(at: Floats, colour: str, radius: float = 2.2) -> Iterator[str]:
     Parameters
     ----------
     at : (n, 2) points in the drawing.
-    colour : fill.
     radius : [drawing units].
     """
     for x, y in at.tolist():
@@ -174,8 +169,6 @@ def closed(at: Floats, colour: str, **attributes: Any) -> str:
     Parameters
     ----------
     at : (n, 2) points in the drawing.
-    colour : of the line.
-    attributes : further SVG attributes.
     """
     apart = at - at.mean(axis=0)
     order = np.argsort(np.arctan2(apart[:, 1], apart[:, 0]))
@@ -237,13 +230,7 @@ class Chart:
 
 
 def charts_svg(charts: Sequence[Chart], words: str = "") -> str:
-    """Logarithmic charts side by side, with `words` below all of them.
-
-    Parameters
-    ----------
-    charts : from left to right.
-    words : a line below.
-    """
+    """Logarithmic charts side by side, with `words` below all of them."""
     lines = max(-(-len(chart.legend) // LEGENDS) for chart in charts)
     wide, tall = CHART
     width, height = len(charts) * (wide + CHART_EDGE) + CHART_GAP, tall + 90 + 15 * lines + (22 if words else 0)
@@ -377,13 +364,7 @@ class Figure(ABC):
 
 
 def aligned(columns: Row, rows: Sequence[Row]) -> str:
-    """A table as text, with its `columns` aligned.
-
-    Parameters
-    ----------
-    columns : heads.
-    rows : cells of each row.
-    """
+    """A table as text, with its `columns` aligned."""
     table = [columns, *rows]
     widths = [max(len(row[k]) for row in table) for k in range(len(columns))]
     lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in table)

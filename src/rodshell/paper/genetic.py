@@ -37,8 +37,6 @@ class Comparison:
 
     Parameters
     ----------
-    case : target and grid.
-    history : of the search.
     direct : agreement of the direct method, pinned.
     best : agreement of the genetic algorithm's best, popped up again; None if it is not stable.
     apart : (2m,) distance between the rod ends of the two G0 [m].
@@ -161,7 +159,6 @@ def make(
     jobs : number of processes of new searches.
     generations : largest number of generations of new searches.
     target : name of the only target; None: all.
-    cases : targets and grids.
     folder : of the values of new searches.
 
     Raises
@@ -194,8 +191,6 @@ def find(
 
     Parameters
     ----------
-    case : target and grid.
-    folder : of the values.
     seed, jobs, population, most, progress : see `search`.
     """
     times = []
@@ -212,13 +207,7 @@ def find(
 
 
 def compare(case: Case, history: History) -> Comparison:
-    """The shell of the direct method, and the best of a `history` popped up again.
-
-    Parameters
-    ----------
-    case : target and grid.
-    history : of a finished search.
-    """
+    """The shell of the direct method, and the best of a `history` popped up again."""
     direct = _direct(case)
     popped = Design.of(direct).pop_up(history.variables)
     best = agreement(popped, case.target) if popped is not None and popped.report.stable else None

@@ -34,7 +34,6 @@ class Generation:
     ----------
     best : objective of the best individual so far [m].
     mean : mean objective of the survivors [m].
-    runs : pop-ups so far.
     fallen : those of them that were not stable.
     seconds : processor time of this generation's pop-ups [s].
     """
@@ -55,10 +54,7 @@ class History:
 
     Parameters
     ----------
-    target, seed, population : of the search.
-    generations : in their order.
     variables : (n,) of the best footprint [m].
-    rods : names of its rods.
     footprint : (2m, 2) its rod ends, start and end of each rod in turn [m].
     direct_seconds : processor time of the direct method on the same machine [s].
     """
@@ -148,7 +144,6 @@ class StoredValues:
 
     Parameters
     ----------
-    file : that holds them.
     digests : of the individuals of each generation.
     values : of the individuals of each generation.
     seconds : processor time of each generation [s].
@@ -210,7 +205,6 @@ class StoredValues:
 
         Parameters
         ----------
-        generation : its number.
         individuals : (k, n) variables.
         evaluate : yields the values of some of them.
         report : is called with the number of values after each.

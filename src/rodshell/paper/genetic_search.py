@@ -50,7 +50,6 @@ class Design:
 
     Parameters
     ----------
-    target, layout : of the direct result.
     lines : the flat grid's rods, whose lines count, not their ends.
     boundary : G, without a draped state.
     orbit : (2m,) index of the variable of each rod end, start and end of each rod in turn: the same for all ends that
@@ -108,7 +107,6 @@ class Design:
         Parameters
         ----------
         variables : (n,) distances of the rod ends from the middle of their rods [m].
-        patience : largest number of iterations.
         """
         footprint = self.footprint(variables)
         if footprint.mesh.grid.joint_counts().min() < FEWEST_JOINTS:
@@ -152,8 +150,6 @@ class Design:
 
         Parameters
         ----------
-        rng : random numbers.
-        count : of footprints.
         roughness : share of the bounds that is random at every end [-].
         """
         sides = np.array([[f"{line.family}-", f"{line.family}+"] for line in self.lines]).ravel()
@@ -232,11 +228,8 @@ def search(
 
     Parameters
     ----------
-    design : variables and objective.
     file : of all values, written after each generation and when interrupted; the search continues from it.
-    seed : of the random numbers.
     jobs : number of processes; the result does not depend on it.
-    population : individuals of a generation.
     most : generations after which a search that has not converged ends.
     progress : is called after each value.
 

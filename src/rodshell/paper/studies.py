@@ -55,10 +55,8 @@ class Line:
 
     Parameters
     ----------
-    changed : the parameter.
     value : its value, with its unit.
     factor : its value over that of the base case.
-    on : grid and method.
     change_rms, change_max : change of G0's rod ends against the base case [m]; NaN without a G0.
     off_net : rms distance of G0's rod ends from those of the exact net [m]; NaN without a G0.
     strain : largest axial strain of the draped grid [-].
@@ -122,7 +120,6 @@ def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Lin
     Parameters
     ----------
     progress : is called before each drape.
-    layout : the grid.
     """
     base = drape(layout, ROD, TARGET, method=Gravity())
     for changed, (powers, given) in _PARAMETERS.items():

@@ -50,8 +50,6 @@ class Refined:
     before, after : the same object where nothing was accepted; else the second has these ends alone.
     gates : by name, whether the design passes: the one that was accepted, else the best that was refused.
     refused : why the best design was refused, beginning with the gate's name, or why there is none; "" if accepted.
-    factorizations : of the search.
-    gate_factorizations : of all gates.
     stopped : when and where the search was out of time, or "".
     design : values of the variables of the design that was accepted; of a form in patches none.
     loaded : gaps before and after of the shell that carries its own weight, where it was refined for that; else none.
@@ -106,8 +104,6 @@ def refined(
 
     Parameters
     ----------
-    stages : the form.
-    vary : what is varied.
     ends : the only end condition of the refined form; None: the first asked for.
     under_weight : factor on its own weight with which the shell is brought to the target, in place of the unloaded one.
     dead_loads : (n, 3) further fixed loads on the nodes with which it is brought there [N]; of a form in one piece.

@@ -27,7 +27,6 @@ class Directions:
 
     Parameters
     ----------
-    structure : the shell.
     axes : (2, 2m, 3) unit vectors across the clamp's direction: out of the surface, and within it.
     box : of the variables, the tilts and turns of each end in turn [-].
     image : where an operation maps the variables.
@@ -77,7 +76,6 @@ class Directions:
 
         Parameters
         ----------
-        grid : before.
         values : (4m,) the design [-].
         """
         return replace(grid, boundary=replace(grid.boundary, tangents=self.tangents(values)))
@@ -91,10 +89,6 @@ class Clamps:
 
     def on(self, structure: Structure) -> Directions:
         """How much each clamp is tilted and turned.
-
-        Parameters
-        ----------
-        structure : the shell.
 
         Raises
         ------
@@ -122,7 +116,6 @@ class Slides:
 
     Parameters
     ----------
-    structure : the shell.
     along, inwards : (2m, 3) unit vectors in the surface, along its end and across it.
     box : of the variables [m].
     image : where an operation maps the variables.
@@ -173,7 +166,6 @@ class Slides:
 
         Parameters
         ----------
-        grid : before.
         values : (2m,) the design [m].
         """
         return replace(grid, boundary=replace(grid.boundary, points=grid.boundary.points + self.moved(values)))
@@ -197,12 +189,7 @@ class Supports:
     name = "supports"
 
     def on(self, structure: Structure) -> Slides:
-        """How far each rod end is moved.
-
-        Parameters
-        ----------
-        structure : the shell.
-        """
+        """How far each rod end is moved."""
         target, points = structure.target, structure.popped.boundary.points
         normals, step = target.gap(points).normal, PROBE * target.size
         steep = np.stack(

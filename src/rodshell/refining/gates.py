@@ -241,12 +241,7 @@ def _errors(form: PatchForm, span_error: float | None, seed: int) -> Floats:
 
 
 def spans(mesh: GridMesh) -> Ints:
-    """(e,) number of the span, between two joints or from a joint to an end, that each edge belongs to.
-
-    Parameters
-    ----------
-    mesh : the rods.
-    """
+    """(e,) number of the span, between two joints or from a joint to an end, that each edge belongs to."""
     joint = np.zeros(mesh.node_count, dtype=bool)
     joint[mesh.joint_pairs.ravel()] = True
     rods = mesh.edge_rods

@@ -29,10 +29,8 @@ class Step:
 
     Parameters
     ----------
-    number : of the evaluation.
     rms : relative gap, or None where no equilibrium was found.
     lowest : lowest eigenvalue over that before, or None.
-    radius : of the trust region.
     accepted : whether the design became the new one.
     values : (n,) of the variables.
     """
@@ -53,8 +51,6 @@ class Found:
     ----------
     accepted : the designs that were accepted, the best last.
     converged : whether no step is foreseen to gain more.
-    factorizations : made in all.
-    steps : every evaluation.
     stopped : when and where the search was out of time, or "".
     """
 
@@ -80,13 +76,10 @@ def gauss_newton(
 
     Parameters
     ----------
-    variables : what is chosen.
     first : the design to start from.
-    objectives : what is made small.
     allows : limits that a design must keep to be accepted.
     lowest_before : eigenvalue to which those of the steps are related; None: they are not computed.
     radius : first trust radius, in scales of the variables.
-    most : evaluations.
     progress : called after each evaluation; an OutOfTimeError that it raises ends the search with what was found.
     """
     box = variables.box

@@ -28,7 +28,6 @@ class Stations:
 
     Parameters
     ----------
-    structure : the shell.
     shifts : (k, n) displacement of every rod node along its rod by each variable [-].
     box : of the variables [m].
     image : where an operation maps the variables.
@@ -62,7 +61,6 @@ class Stations:
 
         Parameters
         ----------
-        grid : before.
         values : (n,) the design [m].
         """
         return replace(grid, mesh=restationed(grid.mesh, self.shifts @ values, self.across @ values))
@@ -75,12 +73,7 @@ class Tails:
     name = "tails"
 
     def on(self, structure: Structure) -> Stations:
-        """The change of the tail at the start and the end of each rod.
-
-        Parameters
-        ----------
-        structure : the shell.
-        """
+        """The change of the tail at the start and the end of each rod."""
         mesh = structure.mesh
         ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
         points = np.unique(np.append(ends, mesh.at_crossings))
@@ -103,10 +96,6 @@ class Offsets:
 
     def on(self, structure: Structure) -> Stations:
         """The growth of each rod's offset.
-
-        Parameters
-        ----------
-        structure : the shell.
 
         Raises
         ------
@@ -138,12 +127,7 @@ class Holes:
     name = "holes"
 
     def on(self, structure: Structure) -> Stations:
-        """The displacement of each joint along its first and along its second rod.
-
-        Parameters
-        ----------
-        structure : the shell.
-        """
+        """The displacement of each joint along its first and along its second rod."""
         mesh = structure.mesh
         holes = np.unique(mesh.at_crossings)
         rod = mesh.rod_of
@@ -182,7 +166,6 @@ def between(mesh: GridMesh, points: Ints) -> csr_array:
 
     Parameters
     ----------
-    mesh : the rods.
     points : entries of `rod_nodes`, ascending, with the ends of all rods among them.
     """
     every, s = np.arange(len(mesh.rod_nodes)), mesh.stations
@@ -199,7 +182,6 @@ def restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
 
     Parameters
     ----------
-    mesh : before.
     along : (k,) displacement of every rod node along its rod [m].
     across : (m,) growth of the rods' offsets [m].
     """

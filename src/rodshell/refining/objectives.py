@@ -125,7 +125,6 @@ class LowestEigenvalue:
     Parameters
     ----------
     least : share of the lowest eigenvalue before [-].
-    before : that eigenvalue.
     margin : the limit is approached from so much above it [-].
     weight : of an eigenvalue of zero, over a gap of the target's size [-].
     """

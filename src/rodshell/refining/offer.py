@@ -39,7 +39,6 @@ class Offer:
     before, after : root mean square of the gap over the target's size, as the form is and with double laths.
     shares : smallest and largest share of a rod's length that is then double, patch by patch.
     others : the gap with the form's other ends, as it is.
-    factorizations : that finding it took.
     """
 
     ends: Ends
@@ -81,7 +80,6 @@ def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Of
 
     Parameters
     ----------
-    stages : a form.
     progress : called as progress(stage, detail, residual).
 
     Returns

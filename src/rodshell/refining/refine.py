@@ -52,7 +52,6 @@ class Candidate:
     Parameters
     ----------
     point : its equilibrium on the mesh of the search.
-    grid : what is built.
     """
 
     point: Point
@@ -65,14 +64,10 @@ class Refinement:
 
     Parameters
     ----------
-    vary : names of the families.
     ends : how the rods' ends are held.
     before, after : the stages, with the popped-up shell of these ends alone.
     designs : those that were accepted on the way, the last best; the first is the shell before.
     converged : whether no further step would gain much.
-    factorizations : of the search.
-    steps : its evaluations.
-    variables : what was varied.
     stopped : when and where the search was out of time, or "".
     loaded : gaps before and after under the loads, where it was refined under loads; else None.
     as_found : whether its stiffnesses are built as they were found, see `built`.
@@ -211,8 +206,6 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
 
     Parameters
     ----------
-    refinement : that found both.
-    low, high : two of its designs.
     share : of the way [-].
 
     Returns
@@ -238,8 +231,6 @@ def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
 
     Parameters
     ----------
-    variables : what is varied.
-    point : the design.
     as_found : leave that factor as it is, since limits under loads decide on it.
     """
     structure, values = point.structure, point.values
@@ -257,10 +248,6 @@ def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
 
 def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:
     """The families that are meant.
-
-    Parameters
-    ----------
-    vary : names, or families.
 
     Raises
     ------
@@ -284,7 +271,6 @@ def structure_of(stages: PatchForm, ends: Ends) -> Structure:
 
     Parameters
     ----------
-    stages : of one shell.
     ends : how the rods' ends are held.
 
     Raises
@@ -309,8 +295,6 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
 
     Parameters
     ----------
-    structure : the shell.
-    variables : what is varied.
     start : other values than those without effect.
 
     Raises
@@ -352,7 +336,6 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
 
     Parameters
     ----------
-    stages : before.
     design : what is built, and the equilibrium that was found for it.
     ends : how the rods' ends are held.
 
@@ -385,7 +368,6 @@ def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
 
     Parameters
     ----------
-    stages : with the shell's pop-up.
     design : of which it is built, with its loaded equilibrium.
     ends : how the rods' ends are held.
     """

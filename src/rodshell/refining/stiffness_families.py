@@ -34,10 +34,7 @@ class Profiles:
 
     Parameters
     ----------
-    structure : the shell.
     variable_of : (m, r) variable that is number r of each rod's profile.
-    profile : of r numbers.
-    box : of the variables.
     stock : the only values that can be built, ascending; None: all within the box.
     common : whether adding the same to all of them multiplies every stiffness alike.
     """
@@ -50,12 +47,7 @@ class Profiles:
     common: bool = False
 
     def image(self, by: Operation) -> Image:
-        """Where an operation maps the variables.
-
-        Parameters
-        ----------
-        by : a symmetry.
-        """
+        """Where an operation maps the variables."""
         index = np.empty(len(self.box.start), dtype=np.intp)
         index[self.variable_of] = self.variable_of[by.rods]
         return Image(index, np.ones(len(index)))
@@ -65,7 +57,6 @@ class Profiles:
 
         Parameters
         ----------
-        grid : before.
         values : (n,) the design.
         """
         return replace(grid, mesh=grid.mesh.with_profiles(self.of_rods(values)))
@@ -145,12 +136,7 @@ class Taper:
     name = "taper"
 
     def on(self, structure: Structure) -> Profiles:
-        """The logarithms of the factors on EI; between them the profile is linear.
-
-        Parameters
-        ----------
-        structure : the shell.
-        """
+        """The logarithms of the factors on EI; between them the profile is linear."""
         rods = structure.mesh.grid.rods
         if self.per == "shell":
             group = np.zeros(len(rods), dtype=np.intp)
@@ -186,12 +172,7 @@ class DoubleLaths:
     name = "double"
 
     def on(self, structure: Structure) -> Profiles:
-        """The share, one for all rods.
-
-        Parameters
-        ----------
-        structure : the shell.
-        """
+        """The share, one for all rods."""
         zero = np.zeros((len(structure.mesh.grid.rods), 1), dtype=np.intp)
         box = Box(*np.array([[0.5], [self.least], [self.most], [0.3]]))
         return Profiles(structure, zero, lambda share: Profile.double(float(share[0])), box)
@@ -218,10 +199,6 @@ class Sections:
 
     def on(self, structure: Structure) -> Profiles:
         """The logarithm of the factor on EI of each rod.
-
-        Parameters
-        ----------
-        structure : the shell.
 
         Raises
         ------

@@ -31,7 +31,6 @@ def rounded(
     ----------
     variables : some of them with a list of values.
     found : the design with values in between.
-    objectives : what is made small.
     allows : limits that a design must keep.
 
     Returns

@@ -37,8 +37,6 @@ class Structure:
     ----------
     popped : the shell to be refined.
     rod : section and material of its rods, which have no profiles.
-    joint : where they cross.
-    target : the shape wanted.
     weight : factor on the shell's own weight under which it is wanted there [-]; 0: without it.
     dead_loads : (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
     """
@@ -77,12 +75,7 @@ class Structure:
         return result
 
     def load(self, edges: EdgeProperties) -> Floats | None:
-        """(N, 3) the load on a design [N]; None: none.
-
-        Parameters
-        ----------
-        edges : of the design.
-        """
+        """(N, 3) the load on a design [N]; None: none."""
         if not self.weight and self.dead_loads is None:
             return None
         return edges.load(len(self.popped.shell.like)) + self.constant_load
@@ -155,9 +148,6 @@ class Point:
     Parameters
     ----------
     values : (n,) of the variables: the design.
-    change : its effect.
-    edges : the shell with it.
-    equilibrium : of that shell.
     """
 
     structure: Structure
@@ -224,7 +214,6 @@ class Point:
         Parameters
         ----------
         values : (n,) the other design.
-        change : its effect.
 
         Returns
         -------

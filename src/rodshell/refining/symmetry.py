@@ -68,7 +68,6 @@ def symmetries(mesh: GridMesh, shape: Floats) -> tuple[Operation, ...]:
 
     Parameters
     ----------
-    mesh : the flat grid.
     shape : (n, 3) its popped-up nodes [m]; (n, 6) if the draped ones must have the symmetries, too.
     """
     centre = 0.5 * (mesh.flat.min(axis=0) + mesh.flat.max(axis=0)) * [1.0, 1.0, 0.0]
@@ -122,7 +121,6 @@ def ties(count: int, images: Sequence[Image]) -> csc_array:
 
     Parameters
     ----------
-    count : number of variables.
     images : where each symmetry maps them.
     """
     every = np.arange(count)

@@ -86,12 +86,7 @@ class Untied(Variables, Protocol):
         ...
 
     def image(self, by: Operation) -> Image:
-        """Where a symmetry maps the variables.
-
-        Parameters
-        ----------
-        by : the symmetry.
-        """
+        """Where a symmetry maps the variables."""
         ...
 
 
@@ -107,12 +102,7 @@ class Family(Protocol):
     def name(self) -> str: ...
 
     def on(self, structure: Structure) -> Untied:
-        """The variables on a shell.
-
-        Parameters
-        ----------
-        structure : the shell.
-        """
+        """The variables on a shell."""
         ...
 
 
@@ -122,7 +112,6 @@ class Tied:
 
     Parameters
     ----------
-    whole : the n variables.
     ties : (n, q) with one entry, 1 or -1, in each row: which of the q common values each variable has.
     """
 
@@ -154,12 +143,7 @@ class Tied:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Several sets of variables, one after the other.
-
-    Parameters
-    ----------
-    parts : the sets.
-    """
+    """Several sets of variables, one after the other."""
 
     parts: Sequence[Tied]
 
@@ -181,7 +165,6 @@ class Design:
         Parameters
         ----------
         values : (n,) of the variables.
-        logarithm : of the factor.
         """
         return np.concatenate([some + logarithm * part.whole.common for part, some in self._split(values)])
 
@@ -199,13 +182,7 @@ class Design:
 
 
 def design_of(structure: Structure, families: Sequence[Family]) -> Design:
-    """The variables of several families on a shell; where it is symmetric, so is every design.
-
-    Parameters
-    ----------
-    structure : the shell.
-    families : what is varied.
-    """
+    """The variables of several families on a shell; where it is symmetric, so is every design."""
     mesh, draped = structure.mesh, structure.popped.boundary.draped
     shapes = [structure.popped.positions, *([] if draped is None else [draped])]
     parts = [family.on(structure) for family in families]

@@ -41,7 +41,6 @@ def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> d
 
     Parameters
     ----------
-    case_toml : text of the case.
     where : the place of a file by its path in the case; None for one that is not read.
     """
     found, left = dict[str, bytes](), ALL_COPIES
@@ -62,7 +61,6 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
     ----------
     case_toml : with paths as they were given.
     inputs : contents of files that are copied, by these paths.
-    folder : of the result.
     """
     copies, new_names = dict[str, bytes](), dict[str, str]()
     for name in _names(case_toml):
@@ -272,7 +270,6 @@ def put_archive(archive: Archive, place: ResultFolder) -> None:
 
     Parameters
     ----------
-    archive : the result.
     place : the folder in which the files are staged.
 
     Raises

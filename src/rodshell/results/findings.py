@@ -66,5 +66,5 @@ class Said:
         )  # fmt: skip
 
     def and_so(self, words: str) -> Self:
-        """The same, whose sentence goes on."""
+        """The same, whose sentence continues."""
         return replace(self, text=self.text + words)

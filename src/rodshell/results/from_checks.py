@@ -47,23 +47,13 @@ PREFERRED: tuple[Ends, Ends] = ("clamped", "pinned")  # the final shape is the f
 
 
 def sharpest(checks: Checks) -> Floats | None:
-    """(k,) sharpest bend [1/m] of each entry of `rod_nodes` in any shape; None: nothing was checked.
-
-    Parameters
-    ----------
-    checks : of all shells.
-    """
+    """(k,) sharpest bend [1/m] of each entry of `rod_nodes` in any shape; None: nothing was checked."""
     known = [bent.curvature for bent in (*checks.bending.values(), *checks.deployment_bending)]
     return np.max(known, axis=0) if known else None
 
 
 def final_ends(checks: Checks) -> Ends | None:
-    """The end condition of the final shape: clamped if that was checked, else pinned; None: neither was.
-
-    Parameters
-    ----------
-    checks : of all shells.
-    """
+    """The end condition of the final shape: clamped if that was checked, else pinned; None: neither was."""
     return next((ends for ends in PREFERRED if ends in checks.bending), None)
 
 
@@ -369,23 +359,13 @@ def _other_shapes(searched: ShapeSearch) -> OtherShapes:
 
 
 def joint_names(mesh: GridMesh) -> list[str]:
-    """Ids of the joints, the two rods' ids with a slash, in the order of the grid's crossings.
-
-    Parameters
-    ----------
-    mesh : of the flat grid.
-    """
+    """Ids of the joints, the two rods' ids with a slash, in the order of the grid's crossings."""
     names = [rod.name for rod in mesh.grid.rods]
     return ["/".join(names[k] for k in sorted(pair)) for pair in mesh.grid.crossings.rods.tolist()]
 
 
 def support_names(mesh: GridMesh) -> list[str]:
-    """Names of the rod ends, as "U03.1": start (0) and end (1) of each rod in turn.
-
-    Parameters
-    ----------
-    mesh : of the flat grid.
-    """
+    """Names of the rod ends, as "U03.1": start (0) and end (1) of each rod in turn."""
     return [f"{rod.name}.{end}" for rod in mesh.grid.rods for end in (0, 1)]
 
 

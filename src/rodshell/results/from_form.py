@@ -190,8 +190,6 @@ def with_seam_forces(results: Results, form: PatchedForm, checks: Checks) -> Res
 
     Parameters
     ----------
-    results : of the form.
-    form : in patches.
     checks : with the reactions of all patches, rod by rod.
     """
     row = {rod.name: k for k, rod in enumerate(form.footprint.rods)}
@@ -210,7 +208,6 @@ def with_refinement(results: Results, found: "Refined") -> Results:
     Parameters
     ----------
     results : of the form after it.
-    found : the refinement.
     """
     gates: tuple[Gate, ...] = get_args(Gate)
     before, after = (

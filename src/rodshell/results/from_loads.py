@@ -19,9 +19,7 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
 
     Parameters
     ----------
-    results : of the form.
     mesh : of the flat grid, its rods in the order of the results.
-    checks : under loads.
     """
     found = results.changed(
         loads={
@@ -51,10 +49,6 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
 def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
     """What states.npz holds of them: node positions (n, 3) [m] and stress (k,) [Pa], the mode at the limit and the
     lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter".
-
-    Parameters
-    ----------
-    checks : of the form.
     """
     states: dict[str, NDArray[Any]] = {}
     for name, by_ends in checks.shells.items():

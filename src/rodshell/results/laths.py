@@ -6,12 +6,7 @@ from rodshell.results.results import Results
 
 
 def laths_on(rod: Rod) -> tuple[tuple[float, float], ...]:
-    """The cut ends of each lath beyond the first, from the rod's start [m].
-
-    Parameters
-    ----------
-    rod : of a result.
-    """
+    """The cut ends of each lath beyond the first, from the rod's start [m]."""
     along = rod.stiffness
     if along is None or along.varies != "laths":
         return ()

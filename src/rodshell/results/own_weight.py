@@ -52,7 +52,6 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], boo
     Parameters
     ----------
     results : with the checks of the self-weight.
-    ends : whose shells are meant.
     """
     found, said = _carried(results, ends), list[Said]()
     parts = _below(found, 1.0)
@@ -173,7 +172,6 @@ def light(results: Results, ends: list[Ends]) -> dict[Ends, float]:
     Parameters
     ----------
     results : with the checks of the self-weight.
-    ends : whose shells are meant.
     """
     return _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
 

@@ -365,7 +365,6 @@ class Results(Record, metaclass=_Refusing):
         Parameters
         ----------
         content : dictionaries, lists, numbers and texts; NumPy's arrays and numbers are converted.
-        source : what messages call it.
 
         Raises
         ------
@@ -379,13 +378,7 @@ class Results(Record, metaclass=_Refusing):
 
     @classmethod
     def from_text(cls, text: str, *, source: str) -> Self:
-        """Results from the text of a result.json of the present version; as `of`.
-
-        Parameters
-        ----------
-        text : of a result.json.
-        source : what messages call it.
-        """
+        """Results from the text of a result.json of the present version; as `of`."""
         try:
             found = cls.model_validate_json(text)
         except ValidationError as error:
@@ -420,7 +413,6 @@ def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
     Parameters
     ----------
     content : of a result.json of any version.
-    source : what messages call it.
 
     Raises
     ------

@@ -6,23 +6,13 @@ from rodshell.rods.section import TRADE_SIZES, Section, size_text
 
 
 def sizes_sold(rod: RodType) -> tuple[Section, ...]:
-    """Sections in which the rod's material is sold, the thinnest first; none where it is not a preset.
-
-    Parameters
-    ----------
-    rod : of a result.
-    """
+    """Sections in which the rod's material is sold, the thinnest first; none where it is not a preset."""
     preset = rod.preset.name if rod.preset else None
     return next((sizes for name, sizes in TRADE_SIZES.items() if name == preset), ())
 
 
 def thinner_than_sold(rod: RodType) -> str:
-    """That a chosen section is thinner than every size in which its material is sold, or "".
-
-    Parameters
-    ----------
-    rod : of a result.
-    """
+    """That a chosen section is thinner than every size in which its material is sold, or ""."""
     sold, sides = sizes_sold(rod), half_sides(rod.section) if rod.section else ()
     if "section" not in (rod.chosen or {}) or not sold or not sides or 2 * max(sides) >= sold[0].depth:
         return ""

@@ -23,7 +23,6 @@ def strength_name(results: Results, shape: str) -> str:
 
     Parameters
     ----------
-    results : with a strength.
     shape : "pinned", "clamped", or one of the deployment.
     """
     preset = results.bending.strength_of if results.bending else None
@@ -44,7 +43,6 @@ def holds_while_erected(results: Results, used: float) -> bool:
 
     Parameters
     ----------
-    results : with a strength.
     used : of the design strength for erection [-].
     """
     characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None

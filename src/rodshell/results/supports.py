@@ -49,12 +49,7 @@ def _forces(results: Results) -> Iterator[Sequence[Point]]:
 
 
 def air_findings(results: Results) -> Iterator[Said]:
-    """What has to hold rod ends that do not stand on the ground.
-
-    Parameters
-    ----------
-    results : judged or not.
-    """
+    """What has to hold rod ends that do not stand on the ground."""
     found = results.ends_in_the_air or in_the_air(results)
     if found is None or not found.count:
         return

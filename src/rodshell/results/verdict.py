@@ -126,8 +126,8 @@ def facts(results: Results) -> list[str]:
 def _verdict(level: Level, said: Iterable[Said]) -> Verdict:
     """Each reason once, with what it says in figures."""
     once = dict[str, Finding]()
-    for one in said:
-        once.setdefault(one.text, one.finding())
+    for each in said:
+        once.setdefault(each.text, each.finding())
     return Verdict(level=level, reasons=tuple(once), findings=tuple(once.values()))
 
 
@@ -288,7 +288,7 @@ def _erection(results: Results) -> Iterator[Said]:
             "; this is on one way, all ends moved evenly: erect it in another way that is checked, such as rod by rod "
             f"over a scaffold, lifted at its middle, or one family's ends first{', or use thinner rods' * thinner}"
         )
-    yield from (replace(one, code=f"erection_{one.code}") for one in said)
+    yield from (replace(each, code=f"erection_{each.code}") for each in said)
 
 
 def _ends(shape: str) -> Ends | None:
@@ -361,12 +361,7 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[Said]:
 
 
 def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
-    """How far shells are known under loads where they could not be followed, and where imperfect ones fall.
-
-    Parameters
-    ----------
-    ends : whose shells are meant.
-    """
+    """How far shells are known under loads where they could not be followed, and where imperfect ones fall."""
     for name, by_ends in results.loads.items():
         for end in ends:
             if end not in by_ends:

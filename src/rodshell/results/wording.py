@@ -99,12 +99,7 @@ NAMES = {
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits; a large one in full, never as 1.42e+03.
-
-    Parameters
-    ----------
-    digits : significant ones.
-    """
+    """A number with so many significant digits; a large one in full, never as 1.42e+03."""
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if abs(float(text)) >= 10**digits else text
 
@@ -126,8 +121,6 @@ def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXAC
 
     Parameters
     ----------
-    metres : None: not known.
-    digits : significant ones, about.
     rounding : the finest that is shown.
     """
     if metres is None or not isfinite(metres):

@@ -26,11 +26,9 @@ class DesignFactors:
     Parameters
     ----------
     factors : for each service class, by duration in the order of `DURATIONS`; a single row: it does not matter.
-    partial : gamma_M.
     axial : axial strength over bending strength, of tension and compression the lower.
     cracked : share of the section that carries shear forces in spite of cracks.
     creep : for each service class, how much larger a deflection under permanent loads becomes, k_def; empty: unknown.
-    source : of these figures.
     """
 
     factors: tuple[tuple[float, ...], ...]
@@ -88,7 +86,6 @@ def permanent_strength(material: Material, service_class: int | None = None) -> 
     Parameters
     ----------
     material : a preset; of other materials nothing is known.
-    service_class : of timber; None: covered.
     """
     if material.name is None or material.bending_strength is None:
         return None

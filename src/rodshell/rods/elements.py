@@ -86,7 +86,6 @@ def with_frames(element: Elements, like: Elements) -> Elements:
 
     Parameters
     ----------
-    element : whose frames are replaced.
     like : an energy of the same kind, on the same blocks.
     """
     assert is_dataclass(element)
@@ -103,7 +102,6 @@ def turned(element: Elements, turn: Floats) -> Elements:
 
     Parameters
     ----------
-    element : whose frames are turned.
     turn : (2, 2), of rows x, y.
     """
     assert is_dataclass(element)
@@ -139,7 +137,6 @@ def each_curvature(elements: Elements, state: Floats, motion: Floats) -> Floats:
 
     Parameters
     ----------
-    elements : m of them.
     state : (N, 3) node positions [m] and twist angles [rad].
     motion : (N, 3) displacements v [m, rad].
     """
@@ -155,7 +152,6 @@ def add_product(elements: Elements, state: Floats, motion: Floats, result: Float
 
     Parameters
     ----------
-    elements : the energy.
     state : (N, 3) node positions [m] and twist angles [rad].
     motion : (N, 3) displacements [m, rad].
     result : (N, 3), to which the product is added.
@@ -202,7 +198,6 @@ def evaluate_all(sets: Sequence[Elements], state: Floats, gradient: Floats, hess
 
     Parameters
     ----------
-    sets : of elements.
     state, gradient : (N, 3), see `Elements.evaluate`.
     hessians : of each set, (m, 3k, 3k) or empty.
     """

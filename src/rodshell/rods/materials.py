@@ -25,7 +25,6 @@ class Preset:
     bending_strength, shear_strength : characteristic and short-term [Pa]; None: the source has none.
     grade : to which the figures apply.
     strength_note : what the strengths mean, and for what they must be reduced.
-    source : of the figures.
     """
 
     youngs_modulus: float
@@ -217,7 +216,6 @@ def preset_values(name: str, changed: dict[str, Any]) -> dict[str, Any]:
 
     Parameters
     ----------
-    name : of the preset.
     changed : values that replace the preset's, by their names.
 
     Raises

@@ -372,7 +372,6 @@ def scaled(section: Section, factor: float) -> Section:
 
     Parameters
     ----------
-    section : the shape.
     factor : of all its lengths [-].
     """
     return type(section)(**{key: factor * value for key, value in vars(section).items()})

@@ -31,7 +31,6 @@ class Varied:
     ----------
     bend1, bend2, twist : on EI1, EI2 and GJ.
     stretch : on EA and on the mass per length.
-    rotary : on the rotary inertia.
     fibre1, fibre2 : on the distances of the outermost fibres along m1 and m2.
     depth1, depth2 : on the extents of the outline along m1 and m2: of laths on each other those of all.
     shear : on the largest shear stress of torsion over the twist per length.
@@ -93,7 +92,6 @@ def require_varies(rod: Rod, varies: str) -> None:
 
     Parameters
     ----------
-    rod : section and material.
     varies : what is changed, see the module.
 
     Raises

@@ -73,7 +73,6 @@ class ArcLength:
     Parameters
     ----------
     unloaded : the equilibrium at t = 0, its edges elastic.
-    load : what grows.
     """
 
     def __init__(self, unloaded: Equilibrium, load: Load) -> None:
@@ -127,7 +126,6 @@ class ArcLength:
 
         Parameters
         ----------
-        here : the last point.
         other : a point that shows the curvature of the path, or None.
         step : arc [m].
         near : of the length: how far it may stray in any case. The tangent foresees no jump of the stiffness.
@@ -153,7 +151,6 @@ class ArcLength:
 
         Parameters
         ----------
-        here : the last point.
         step : arc [m], so short that its end is as good as the equilibrium.
         """
         state, forces = here.state + step * here.motion, here.forces + step * here.change
@@ -176,7 +173,6 @@ class ArcLength:
 
         Parameters
         ----------
-        factor : t.
         here, there : points on either side of it.
         """
         span = there.arc - here.arc
@@ -275,12 +271,7 @@ class ArcLength:
         return None
 
     def equilibrium(self, point: Point) -> Equilibrium:
-        """A point as an equilibrium of the structure under its factor.
-
-        Parameters
-        ----------
-        point : on this path.
-        """
+        """A point as an equilibrium of the structure under its factor."""
         problem, load, structure = self._loaded.problem, self._loaded.load, self._unloaded.problem
         dead = problem.load
         if load.forces is not None:
@@ -299,10 +290,6 @@ class ArcLength:
     def losing_mode(self, point: Point) -> Floats:
         """(n, 3) the mode of the negative stiffness that is nearest to zero at an unstable point, its largest
         displacement of a node being 1.
-
-        Parameters
-        ----------
-        point : with negative modes.
         """
         state, tangent = self._unstable
         if state is not point.state:

@@ -63,7 +63,6 @@ class SolveReport:
 
     Parameters
     ----------
-    dofs : reduced unknowns.
     force_residual : largest component of the gradient in the free directions [N].
     max_strain : largest axial strain, or constraint strain where rods are inextensible [-].
     negative_modes : of the exact Hessian in the free directions at the final state; 0 says stable.
@@ -130,7 +129,6 @@ class Equilibrium:
     state : (n, 3) [m, at twist angles rad].
     forces : (e,) axial forces [N].
     gradient : (n, 3) of energy and load, without constraint forces [N].
-    report : figures of the solve.
     mode : (n, 3) where the state is not stable, the direction of the most negative curvature, its largest motion being
         1 (`Problem.unit`); else None.
     """
@@ -256,7 +254,6 @@ def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
 
     Parameters
     ----------
-    saddle : the unstable equilibrium.
     mode : (n, 3) v, its largest motion 1.
 
     Returns

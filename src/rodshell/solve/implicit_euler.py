@@ -73,7 +73,6 @@ class Motion:
     elements : every energy, stretch included; their source frames are those of the state to start from.
     mass : (N, 3) lumped mass of each component [kg]; of a twist angle the rotary inertia [kg m2].
     constraint : supports or a surface; or what they are at a time [s], for a motion that is prescribed.
-    forces : external forces.
     explicit : energies whose forces are frozen at the start of a step (`ExplicitPenalty`); not among the elements.
     """
 
@@ -115,7 +114,6 @@ class Motion:
         ----------
         body : its source frames being at the state to start from.
         constraint : as of `Motion`; one that never moves may be given as a `Freedom`.
-        forces : external forces.
         """
         if not all(hasattr(body, name) for name in ("elements", "explicit", "stretch", "mass", "freedom")):
             raise InputError(f"body must be a rodshell ElasticRod or Shell, not {described(body)}")
@@ -142,12 +140,7 @@ class Motion:
         return type(self)(elements, self.mass, self.constraint, self.forces, explicit)
 
     def in_parts(self, most: int = PART) -> Self:
-        """The same motion with its element sets divided, so that their Hessians stay in the cache.
-
-        Parameters
-        ----------
-        most : elements of a set.
-        """
+        """The same motion with its element sets divided, so that their Hessians stay in the cache."""
         return replace(self, elements=tuple(part for element in self.elements for part in in_parts(element, most)))
 
 

@@ -58,7 +58,6 @@ class ExplicitTies:
         ----------
         motion : its source frames being at the state.
         state : (N, 3) [m, at twist angles rad].
-        free : the free directions there.
         stopped : (k,) blocks that lose all their velocity at each step.
         """
         implicit, explicit = (_hessians(elements, state) for elements in (motion.elements, motion.explicit))
@@ -185,7 +184,6 @@ def tangent_stiffness(elements: tuple[Elements, ...], state: Floats, free: Freed
     ----------
     elements : with their source frames at, or near, the state.
     state : (N, 3) [m, at twist angles rad].
-    free : the free directions.
     """
     blocks = [element.blocks for element in elements]
     assembly = Assembly.of(blocks, free)

@@ -58,7 +58,6 @@ class Load:
         ----------
         elements : of the structure alone, or of both as this function returned them.
         state : (N, 3) node positions [m] and twist angles [rad].
-        factor : t.
         """
         structure = [element.refreshed(state) for element in elements if not isinstance(element, _Proportional)]
         before = [element.potential for element in elements if isinstance(element, _Proportional)] or self.potentials
@@ -70,7 +69,6 @@ class Load:
         Parameters
         ----------
         stretch : at the factor 0.
-        factor : t.
         """
         if self.strains is None:
             return stretch
@@ -81,7 +79,6 @@ class Load:
 
         Parameters
         ----------
-        problem : the structure.
         state : (N, 3) any state of it.
         """
         for name, given, shape in (
@@ -128,7 +125,6 @@ class LoadedAssembly:
     Parameters
     ----------
     problem : the structure; a load that it has stays as it is.
-    load : what grows.
     state : (N, 3) any state, for the pattern.
     """
 
@@ -145,7 +141,6 @@ class LoadedAssembly:
         Parameters
         ----------
         state : (N, 3) node positions [m] and twist angles [rad].
-        factor : t.
         """
         return self.load.stretch(self.problem.stretch, factor).strains(state)
 
@@ -156,7 +151,6 @@ class LoadedAssembly:
         ----------
         elements : of structure and load at the factor, with their source frames at, or near, the state.
         state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
-        factor : t.
         """
         result = self._assembly.gradient(elements, state, forces) - self._constant
         return result if self.load.forces is None else result - factor * self.load.forces
@@ -168,7 +162,6 @@ class LoadedAssembly:
         ----------
         elements : of structure and load at the factor, with their source frames at, or near, the state.
         state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
-        factor : t.
         """
         return self._assembly.values(elements, state, forces, self.load.stretch(self.problem.stretch, factor))[1]
 
@@ -181,7 +174,6 @@ class LoadedAssembly:
         ----------
         elements : of structure and load at the factor, with their source frames at, or near, the state.
         state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
-        factor : t.
 
         Raises
         ------
@@ -224,8 +216,6 @@ class LoadedAssembly:
         ----------
         state : (N, 3) node positions [m] and twist angles [rad].
         rate : (N, 3) of the state [m, rad].
-        factor : t.
-        per : rate of t.
         """
         stretch = self.load.stretch(self.problem.stretch, factor)
         result = stretch.stiffness * stretch.elongation(state, rate)

@@ -49,7 +49,6 @@ class PathPoint:
 
     Parameters
     ----------
-    factor : t.
     arc : root mean square displacement of the nodes along the path so far [m].
     negative_modes : of the stiffness; 0 says stable.
     equilibrium : the structure there, under the factor; what its problem carries as load is the whole load.
@@ -89,7 +88,6 @@ class LoadPath:
         limit point or a bifurcation.
     place : block of the node that the mode moves farthest, or None.
     turns : the points where t has an extremum: limit points, found to `FLAT`, where the path was followed past them.
-    factorizations : what it took.
     """
 
     factor: float

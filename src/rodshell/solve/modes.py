@@ -104,7 +104,6 @@ def frequencies(
 
     Parameters
     ----------
-    equilibrium : a stable one.
     mass : (N, 3) lumped mass of each component [kg, of a twist angle kg m2], some of which may be 0.
     count : so many of the lowest, or as many as there are.
     edge_mass : (e,) the part of the mass that is spread along each edge [kg]: it moves as the edge's points do between

@@ -39,7 +39,6 @@ class SummedMatrix(Protocol):
         number : of the set, among those that the matrix was made for.
         hessians : (m, 3k, 3k) of each element.
         blocks : (m, k) of each element.
-        free : the free directions.
         """
         ...
 
@@ -50,7 +49,6 @@ class SummedMatrix(Protocol):
         ----------
         diagonal : (N, 3) diagonal of each block.
         full : (N, 3, 3) a matrix for each block, or empty.
-        free : the free directions.
         """
         ...
 
@@ -64,7 +62,6 @@ class SummedMatrix(Protocol):
         Parameters
         ----------
         field : (N, 3) right-hand side, of which the part in the free directions is used.
-        free : the free directions.
         """
         ...
 
@@ -115,7 +112,6 @@ class Banded:
         number : of the set of elements; unused.
         hessians : (m, 3k, 3k) of each element.
         blocks : (m, k) of each element.
-        free : the free directions.
         """
         self._look_at(free)
         _add(hessians, blocks, self._first, self._count, self._axes, self._plain, self.values)
@@ -159,7 +155,6 @@ class SparseSum:
     Parameters
     ----------
     element_blocks : (m, k) blocks of each element, for each set of elements.
-    free : the free directions.
     coordinates : (N, d) where the blocks lie [m], by which they are ordered, if that is known.
     """
 
@@ -183,7 +178,6 @@ class SparseSum:
         number : of the set, among those that the matrix was made for.
         hessians : (m, 3k, 3k) of each element.
         blocks : (m, k) of each element.
-        free : the free directions.
         """
         self._assembly.add(number, hessians, blocks, free, self._data)
 
@@ -207,7 +201,6 @@ def narrow_or_sparse(element_blocks: Sequence[Ints], free: Freedom) -> SummedMat
     Parameters
     ----------
     element_blocks : (m, k) blocks of each element, for each set of elements.
-    free : the free directions.
     """
     banded = Banded(element_blocks, free, widest=WIDEST)
     return banded if banded.half_bandwidth <= WIDEST else SparseSum(element_blocks, free)

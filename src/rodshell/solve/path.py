@@ -240,12 +240,7 @@ def surplus(here: Equilibrium, there: Equilibrium) -> float:
 
 
 def farthest(here: Equilibrium, there: Equilibrium) -> float:
-    """Largest distance of a node between two equilibria of one structure [m].
-
-    Parameters
-    ----------
-    here, there : equilibria of one structure.
-    """
+    """Largest distance of a node between two equilibria of one structure [m]."""
     nodes = np.unique(here.problem.stretch.blocks)
     return float(np.linalg.norm(there.state[nodes] - here.state[nodes], axis=1).max())
 
@@ -290,7 +285,6 @@ def relax(
 
     Parameters
     ----------
-    problem : with elastic edges.
     state : (N, 3) to begin with [m, at twist angles rad].
     most_factorizations : no step down is taken after so many; None: as many as `MOST_STEPS` take.
     progress : called with the number and the length of each step; an OutOfTimeError that it raises ends the descent.

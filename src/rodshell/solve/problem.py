@@ -81,7 +81,6 @@ class Supports:
 
     Parameters
     ----------
-    free : what remains free.
     moved : (k,) blocks that are prescribed, all their directions being fixed; goals : (k, 3) where they go [m].
     """
 
@@ -151,8 +150,6 @@ class Problem:
     Parameters
     ----------
     elements : every energy but the stretch.
-    stretch : the edges.
-    constraint : supports or a surface.
     length : characteristic length of the shape [m], by which motions are measured, see `unit`.
     inextensible : the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
     load : (n, 3) dead forces [N], or None.
@@ -245,7 +242,6 @@ def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | 
 
     Parameters
     ----------
-    assembly : of the matrices.
     free : the free directions of the blocks.
     flat_coordinates : (n, 2) of the blocks [m]; None: ordered by minimum degree.
     """
@@ -310,7 +306,6 @@ class GravityForce:
 
         Parameters
         ----------
-        time, state, velocity : unused.
         mass : (N, 3) lumped mass of each component [kg, kg m2].
         """
         force = np.zeros_like(mass)
@@ -345,7 +340,6 @@ class PointLoads:
 
         Parameters
         ----------
-        time, state, velocity : unused.
         mass : (N, 3) lumped mass of each component, for its shape.
         """
         force = np.zeros_like(mass)

@@ -103,7 +103,6 @@ class RodLoads:
 
         Parameters
         ----------
-        rod : that carries the loads.
         spinning : clamped ends that are free to spin.
 
         Raises
@@ -146,7 +145,6 @@ class SupportPath:
 
         Parameters
         ----------
-        rod : that is held.
         state : (N, 3) node positions [m] and twist angles [rad] at the start.
         wanted : the supports at the end.
         """

@@ -82,12 +82,7 @@ class Sensitivity:
         return self.edges.gradient_slopes(self.here.state)
 
     def unbalanced(self, parameters: Parameters) -> Floats:
-        """(p, N, 3) derivative of the gradient by each parameter, the free nodes held still [N, N m].
-
-        Parameters
-        ----------
-        parameters : what is changed.
-        """
+        """(p, N, 3) derivative of the gradient by each parameter, the free nodes held still [N, N m]."""
         slopes = np.asarray((self.gradient_slopes @ parameters.by_properties).todense()).T
         result = slopes.reshape(-1, *self.here.state.shape)
         if parameters.moved is not None:
@@ -97,12 +92,7 @@ class Sensitivity:
         return result
 
     def response(self, parameters: Parameters) -> Response:
-        """State and axial forces by each parameter: one solve for each, by the factors at hand.
-
-        Parameters
-        ----------
-        parameters : what is changed.
-        """
+        """State and axial forces by each parameter: one solve for each, by the factors at hand."""
         motions = self.tangent.solve(-self.unbalanced(parameters))
         if parameters.moved is not None:
             motions += parameters.moved
@@ -114,7 +104,6 @@ class Sensitivity:
         Parameters
         ----------
         motions : (p, N, 3) change of the state [m, rad].
-        parameters : what is changed.
         """
         stretch, state = self._stretch, self.here.state
         axial = stretch.stiffness * stretch.strains(state)
@@ -131,7 +120,6 @@ class Sensitivity:
         Parameters
         ----------
         by_state : (k, N, 3) derivatives of the functions by the state.
-        parameters : what is changed.
         """
         adjoint = self.tangent.solve(by_state).reshape(len(by_state), -1)
         result = -np.asarray((parameters.by_properties.T @ (self.gradient_slopes.T @ adjoint.T)).T)
@@ -146,7 +134,6 @@ class Sensitivity:
 
         Parameters
         ----------
-        count : how many.
         mass : (N, 3) lumped mass of each component [kg, kg m2]; None: the modes of K itself.
         """
         return self.tangent.lowest_modes(count, mass=mass)
@@ -157,7 +144,6 @@ class Sensitivity:
         Parameters
         ----------
         modes : k modes of the tangent.
-        parameters : what is changed.
         """
         state = self.here.state
         direct = np.array([self.edges.curvature_slopes(state, shape) for shape in modes.shapes])

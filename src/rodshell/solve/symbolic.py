@@ -104,7 +104,6 @@ def plan_of(indptr: Longs, blocks: Blocks, order: Longs) -> Plan:
     Parameters
     ----------
     indptr : where columns begin in the pattern of the upper triangle.
-    blocks : its graph.
     order : (b,) blocks in the order of elimination.
     """
     order, tree, weight, count, *earlier = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))

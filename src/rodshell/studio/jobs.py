@@ -35,7 +35,6 @@ class Jobs:
     ----------
     folder : in which each job has a folder with status.json and, when it is done, result/.
     time_limit : of a job [s].
-    room : of the server's folder.
     """
 
     def __init__(self, folder: Path, time_limit: float, room: Room) -> None:

@@ -238,7 +238,6 @@ class Sessions:
     ----------
     folder : in which each session has a folder.
     first : the case with which a new session begins, and files that it names, by name.
-    room : of the server's folder.
     """
 
     def __init__(

@@ -15,12 +15,7 @@ if TYPE_CHECKING:
 
 
 def checked(form: "Form", job: "Job") -> tuple[dict[str, Any], bytes]:
-    """Facts and scene of a form with its checks and verdict.
-
-    Parameters
-    ----------
-    job : that found it.
-    """
+    """Facts and scene of a form with its checks and verdict."""
     archive = form.archive()
     scene, verdict = scene_of(archive), archive.verdict
     facts = {

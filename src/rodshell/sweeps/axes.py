@@ -50,7 +50,6 @@ class Span:
 
     Parameters
     ----------
-    key : of the case.
     low, high : its ends in SI: numbers, or as many numbers in a tuple.
     whole : whether its values are whole numbers, both ends included.
     scale : "linear", or "log" with equal ratios.
@@ -142,7 +141,6 @@ def read_span(key: str, given: Mapping[str, Any], base: Job, known: Sequence[str
 
     Parameters
     ----------
-    key : of the case.
     given : { from, to, scale }; known : the names that it may have.
     base : a job by whose case quantities are read.
 

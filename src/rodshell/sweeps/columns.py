@@ -122,7 +122,6 @@ def row_of(results: Results, *, verdict: str, seconds: float) -> dict[str, Any]:
 
     Parameters
     ----------
-    results : of the form.
     verdict : its level; "" where it was not checked.
     seconds : processor time [s].
     """

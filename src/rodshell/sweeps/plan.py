@@ -62,7 +62,6 @@ class Origin:
     name : of the file, for titles and the default folder.
     text : the file as it was given; "" for a mapping.
     folder : in which its files lie.
-    tables : its content.
     bases : its jobs by the name that the column "base" shows, at least one.
     """
 
@@ -98,7 +97,6 @@ class Plan:
     origin : what it was read from.
     keys : by whose values a design is known: of the case, or "base", or "generation".
     columns : in addition to those of every table.
-    settings : how jobs are run.
     """
 
     origin: Origin

@@ -38,7 +38,6 @@ class Optimised:
 
     Parameters
     ----------
-    folder : of the search.
     designs : their number; computed : jobs that were computed now.
     feasible : number of designs that converged and keep all constraints.
     front : of those, the ones that no other is better than in all objectives, the smallest first objective first: by

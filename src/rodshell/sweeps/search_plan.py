@@ -34,7 +34,6 @@ class Constraint:
 
     Parameters
     ----------
-    column : of the table.
     low, high : bounds of a number; None: there is none.
     words : that it may be, in place of bounds.
     """
@@ -68,7 +67,6 @@ class SearchPlan(Plan):
     ----------
     variables : intervals, or lists of values.
     objectives, constraints : on columns of the table.
-    population, generations, seed : of the algorithm.
     """
 
     variables: tuple[Span | Axis, ...]

@@ -65,7 +65,6 @@ class Store:
 
     Parameters
     ----------
-    folder : of the sweep.
     writing : whether jobs are recorded; then the folder is made, and no other sweep can use it.
 
     Raises

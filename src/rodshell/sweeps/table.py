@@ -70,12 +70,7 @@ def _cell(design: Finished, column: Column) -> Any:
 
 
 class Table:
-    """table.csv of a sweep, which is replaced in one step.
-
-    Parameters
-    ----------
-    store : whose designs it shows.
-    """
+    """table.csv of a sweep, which is replaced in one step."""
 
     def __init__(self, store: Store) -> None:
         self._store, self._next = store, monotonic() + PAUSE
@@ -140,7 +135,6 @@ def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pya
 
     Parameters
     ----------
-    folder : of the sweep.
     columns : further keys of result.json; nothing is computed again for them.
 
     Returns
@@ -193,10 +187,6 @@ def _alike(values: list[Any]) -> list[Any]:
 
 def write_parquet(store: Store) -> None:
     """Write table.parquet, if pyarrow is installed.
-
-    Parameters
-    ----------
-    store : of the sweep.
 
     Raises
     ------

@@ -38,9 +38,7 @@ def read_apart(reader: Path, path: Path, data: bytes, format: str, **request: ob
 
     Parameters
     ----------
-    reader : the program.
     path : of the file, for messages.
-    data : its content.
     format : as it is called in messages.
     request : further values for the reader.
 

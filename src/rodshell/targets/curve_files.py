@@ -24,7 +24,6 @@ def read_curves(path: Path, unit: float) -> list[Floats]:
 
     Parameters
     ----------
-    path : of the file.
     unit : length of the file's unit [m]; a 3dm file that states its own is read in that.
 
     Returns
@@ -46,7 +45,6 @@ def read_lines(path: Path, unit: float) -> list[Floats]:
 
     Parameters
     ----------
-    path : of the file.
     unit : length of the file's unit [m]; a 3dm file that states its own is read in that.
 
     Returns

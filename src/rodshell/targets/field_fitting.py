@@ -45,7 +45,6 @@ class Fit:
 
     Parameters
     ----------
-    field : the smooth implicit function.
     cubics : those of it that are on the surface (or fill an opening), which come first.
     off : (n,) distance of each vertex of the mesh [m]; infinite where the field points elsewhere, or another sheet
         crosses.
@@ -65,7 +64,6 @@ def fit_mesh(mesh: TriangleMesh, *, size: float) -> Fit:
 
     Parameters
     ----------
-    mesh : the surface.
     size : half of its largest extent [m].
     """
     area, count = float(mesh.areas.sum()), len(mesh.vertices)
@@ -111,7 +109,6 @@ def fit_field(samples: Samples, spacing: float, *, past: float, reach: float) ->
 
     Parameters
     ----------
-    samples : of the surface.
     spacing : distance between cubics [m], see `cubic_spacing`.
     past : how far the field is continued past an open rim [m].
     reach : distance from the cubics up to which the field is defined [m].

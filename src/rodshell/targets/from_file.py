@@ -100,7 +100,6 @@ def read_table(path: Path, size: tuple[float, float]) -> tuple[Floats, Floats, F
 
     Parameters
     ----------
-    path : a text file.
     size : width and depth [m]. Rows of heights are at equal steps within it, the largest y first; points keep their
         proportions and are scaled to it.
 
@@ -247,7 +246,6 @@ def smoothed(grey: Floats, step: float) -> Floats:
     Parameters
     ----------
     grey : (n, m) heights, in multiples of `step`.
-    step : between two grey levels.
     """
     low, high = -3.0, 8.0  # powers of ten; at the largest a bend of a hundred pixels is still followed
     best = grey
@@ -284,7 +282,6 @@ class Placement:
     ----------
     up : axis of the file that points upwards, which becomes z before anything else; None: y of glTF, as its standard
         says, and z of other files.
-    scale : factor, about the origin.
     turn : angles about x, y and z, applied in that order [rad].
     move : along x, y and z, applied last [m].
 
@@ -343,7 +340,6 @@ def surface_from(
 
     Parameters
     ----------
-    file : path.
     unit : length of the file's unit [m]; None where the file states its unit.
     name : object name, if the file has several (3dm: object or layer name; STEP: name of a face, shell or solid, or
         the number of a face).
@@ -393,7 +389,6 @@ def heights_from(
 
     Parameters
     ----------
-    file : path.
     size : width along x and depth along y [m], centred on the origin; the first row is at the largest y.
     height : of a CSV the length of its unit [m], default 1; of an image the height of white [m], default 1.
     base, boundary, placement : as in `surface_from`, with the boundary in metres.

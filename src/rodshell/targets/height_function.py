@@ -136,7 +136,6 @@ def sample(heights: Heights, domain: Region) -> Floats:
 
     Parameters
     ----------
-    heights : the function.
     domain : rows of the lattice of a disc are circles, from the centre to the edge.
 
     Returns
@@ -157,8 +156,6 @@ def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str)
 
     Parameters
     ----------
-    heights : the function.
-    domain : of the target.
     samples : as `sample` returns them.
     name : of the target, for the message.
 
@@ -194,8 +191,6 @@ def trusted_region(heights: Heights, domain: Region, samples: Floats, name: str)
 
     Parameters
     ----------
-    heights : the function.
-    domain : of the target.
     samples : as `sample` returns them.
     name : of the target, for the message.
 

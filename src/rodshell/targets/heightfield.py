@@ -269,7 +269,6 @@ class HeightField(WalledTarget):
         derivatives are exact (`Jet`). Any other is differentiated by central differences of fourth order, is called up
         to 1.61 times the domain and must be smooth there: creases in it are not detected.
     domain : a disc or a rectangle, centred on the origin.
-    name : of the target.
 
     Raises
     ------

@@ -353,7 +353,6 @@ def differences(function: Callable[[Any, Any], Any], x: Floats, y: Floats, step:
     ----------
     function : z(x, y) of arrays; it is called once with all 17 points of the stencil.
     x, y : (n,) points.
-    step : of the differences.
     """
     near, far = np.array([[1], [-1]]), np.array([[2], [-2]])
     zero = np.zeros((2, 1))

@@ -122,7 +122,6 @@ def require_size(path: Path, extent: Floats, unit: float, *, instead: str = "giv
     path : of the file, for the message.
     extent : (k,) widths along x, y and perhaps z in the file's unit.
     unit : length of the file's unit [m].
-    instead : what can be done.
 
     Raises
     ------
@@ -240,7 +239,6 @@ def read_with(path: Path, format: str, reader: Callable[[], Content]) -> Content
     ----------
     path : of the file, for messages.
     format : as it is called in messages.
-    reader : of the file's content.
 
     Raises
     ------

@@ -88,7 +88,6 @@ def splines(knots: Floats, degree: int, t: Floats) -> Floats:
     Parameters
     ----------
     knots : (m + degree + 1,), ascending.
-    degree : of the polynomials.
     t : (k,) parameters.
 
     Returns
@@ -119,7 +118,6 @@ def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Fl
 
     Parameters
     ----------
-    path : of the file.
     name : object or layer name, if the file has several surfaces.
 
     Returns
@@ -147,7 +145,6 @@ def rhino_content(path: Path, data: bytes, **request: object) -> dict[str, Any]:
     Parameters
     ----------
     path : of the file, for messages.
-    data : its content.
     request : the `name` of a surface; or the `most` curves that are read.
 
     Raises
@@ -179,7 +176,6 @@ def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[F
 
     Parameters
     ----------
-    path : of the file.
     name : of the face or of its shell or solid, or the face's number from 1 on, if the file has several.
 
     Returns

@@ -54,7 +54,6 @@ def points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
 
     Parameters
     ----------
-    surface : an adaptor of OpenCASCADE.
     grid : intervals each way, at least.
     per_span : intervals for each span of the surface.
     finest : intervals each way, at most.

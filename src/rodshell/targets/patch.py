@@ -142,10 +142,8 @@ class Patch(Target):
 
     Parameters
     ----------
-    whole : the target.
     surface : the target that has the patch's surface, and continues it past a seam: the whole; or where that is creased
         along a seam, the smooth piece of it on this side.
-    seams : that bound the patch.
     sides : for each seam 1 if the patch is on its left, -1 if it is on its right.
     middle : x, y of a point well inside [m], the default of the anchor.
     """

@@ -51,7 +51,6 @@ class ObjContent(NamedTuple):
 
     Parameters
     ----------
-    polygons : the faces.
     lines : polylines, each the indices of its points.
     named : for each name of an object or a group the runs of its faces, each by its first face and the one after it.
     """

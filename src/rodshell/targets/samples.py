@@ -54,7 +54,6 @@ def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
 
     Parameters
     ----------
-    mesh : the surface.
     spacing : distance between the cubics that will be fitted [m].
     """
     faces, corners = mesh.faces, mesh.vertices[mesh.faces]
@@ -119,8 +118,6 @@ def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Sampl
 
     Parameters
     ----------
-    mesh : the surface.
-    samples : of the mesh.
     spacing : distance between the cubics that will be fitted [m].
     """
     points, normals = [samples.points], [samples.normals]

@@ -68,7 +68,6 @@ class CellList:
         Parameters
         ----------
         x : (n, 3) points whose neighbours are wanted [m].
-        count : of neighbours of each.
         limit : neighbours further away need not be found; their distance is then infinite [m].
 
         Returns

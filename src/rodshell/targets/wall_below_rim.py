@@ -175,8 +175,6 @@ class WalledSurface(WalledTarget):
 
     Parameters
     ----------
-    surface : the target.
-    field : its smooth field.
     rim_plan : the region of the plan within its rim.
     level_edge : z of the rim where it is level [m], or None.
     """
@@ -235,9 +233,7 @@ def walled_surface(
 
     Parameters
     ----------
-    surface : the target.
     mesh : the mesh to which its field was fitted.
-    field : its smooth field.
     rims : the open boundary and the boundary curves, if there are any.
     section : the rim that a plane at a height z [m] cuts out of the surface.
 

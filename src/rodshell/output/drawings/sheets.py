@@ -142,7 +142,6 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
 
     Parameters
     ----------
-    drawing : without a frame.
     block : entries and notes of the title block.
     """
     (left, bottom), (right, _) = drawing.box()
@@ -255,7 +254,6 @@ class Layout:
     whole : as its one sheet shows it; scale : of that sheet.
     detail : with smaller texts where the sheet has no room for all, else the same; for files at 1:1.
     parts : what the parts on several sheets are cut from; None: there are none.
-    scale_of_parts : of these sheets.
     """
 
     whole: Drawing
@@ -411,7 +409,6 @@ def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: tuple[float, float]
 
     Parameters
     ----------
-    sheets : in their order.
     paper : width and height of a sheet [mm].
     """
     return [

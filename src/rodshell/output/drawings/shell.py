@@ -171,7 +171,6 @@ def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
 
     Parameters
     ----------
-    pencil : draws them.
     archive : a result with a final shape.
     text : size of the drawing's texts [mm], by which the line width is chosen.
     """

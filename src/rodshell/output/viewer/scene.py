@@ -67,7 +67,6 @@ class Drawn:
 
     Parameters
     ----------
-    name : of the result.
     rods : id and family of each rod.
     nodes : (k,) nodes of all rods, one rod after the other; counts : (m,) how many each rod has.
     joints : ids; meeting : (c, 2) entry in `nodes` of each joint on either rod.
