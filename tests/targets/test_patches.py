@@ -75,10 +75,11 @@ def test_far_from_every_patch_there_is_no_field():
 def test_fit_to_a_sphere_converges(kind, order):
     """Cubics miss a sphere by the fourth power of their size, its normals by the third, its curvature by the second.
 
-    An even surface gains an order in places; half an order less is allowed for, as patches never lie alike.
+    An even surface gains an order in places; half an order less is allowed for, as patches never lie alike. Coarser
+    meshes, whose vertices would be more than 1e-4 of the size off, get more patches for their vertices.
     """
     error = []
-    for rows in (20, 40, 80):
+    for rows in (40, 80):
         x, faces = capped_sphere(rows, np.radians(100))
         patches = Freeform.of(x, faces).field
         z = np.random.default_rng(1).uniform(0.2, 1, 400)
@@ -93,8 +94,7 @@ def test_fit_to_a_sphere_converges(kind, order):
             "curvature": tangent @ (hessian / steep[:, None, None]) @ tangent - tangent,
         }
         error.append(np.sqrt(np.mean(np.square(miss[kind]))))
-    rate = np.log2(error[0] / error[2]) / 2
-    assert rate > order - 0.5, error
+    assert np.log2(error[0] / error[1]) > order - 0.5, error
 
 
 @pytest.mark.parametrize("name", ["saddle", "bowl"])
