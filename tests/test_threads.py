@@ -54,7 +54,7 @@ def test_while_modes_are_looked_for_the_blas_has_one_thread(monkeypatch):
         asked.append(blas_threads())
         return lanczos(*given, **options)
 
-    monkeypatch.setattr(linalg, "eigsh", listen)
+    monkeypatch.setattr("rodshell.solve.modes.eigsh", listen)
     with threadpool_limits(2, user_api="blas"):
         before = blas_threads()
         linear_buckling(column.unloaded, column.load)
