@@ -153,7 +153,7 @@ def test_millimetres_and_metres_give_the_same_drawings_to_the_byte(tmp_path: Pat
     made = []
     for k, values in enumerate((METRES, MILLIMETRES)):
         (tmp_path / f"case{k}.toml").write_text(CASE.format(**values))
-        assert main(["form", str(tmp_path / f"case{k}.toml"), "--out", str(tmp_path / f"out{k}"), "--quiet"]) == 0
+        assert main(["form", str(tmp_path / f"case{k}.toml"), "--out", str(tmp_path / f"out{k}"), "--quiet"]) == 4
         files = contents(tmp_path / f"out{k}")
         made.append({name: data for name, data in files.items() if name.startswith(("drawings", "schedule", "model"))})
     assert len(made[0]) > 25
