@@ -32,7 +32,7 @@ COMPARED = {  # what the paper shows in this place
     "alone would end, which measures the effect of the finite spacing. Below, panel (4) in numbers: the zero line is "
     "the exact net; on the hemisphere the analytical solution [12] agrees with it within a micrometre (`make accept`). "
     "Falls and gravity lie short of it by as much as their rods stretch, and alike; on the ellipsoid the grid rests on "
-    "a saddle without friction, and gravity statics loses it. The genetic algorithm seeks the best popped-up shape, "
+    "a saddle without friction, as gravity statics says. The genetic algorithm seeks the best popped-up shape, "
     "not the net.",
     "fig7": 'The paper: the flat grids "match well with the analytical solution in both of these two cases".',
     "fig8": "The paper, on one thread of an i7-6600U at some 8000 unknowns: 50 s (hemisphere), 30 s (paraboloid), 20 s "
