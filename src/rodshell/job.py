@@ -38,6 +38,7 @@ from rodshell.validation import (
     choice,
     choices_of,
     file_path,
+    function_of,
     instance,
     is_auto,
     listed,
@@ -267,6 +268,8 @@ class Job:
         choice("until", until, ("drape", "pop-up", "fabrication"))
         if time_limit is not None:
             time_limit = positive("time_limit", time_limit, "s", infinite=True)
+        if announce is not None:
+            function_of("announce", announce, "a function of a sentence, such as print", "")
         run = Run(
             self._case,
             self._target,

@@ -11,7 +11,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod, refuse_too_many
 from rodshell.units import NUMBER
-from rodshell.validation import instance, is_auto, number, numbers, positive, short, texts
+from rodshell.validation import flag, instance, is_auto, number, numbers, positive, short, texts, whole
 
 Auto = Literal["auto"]
 
@@ -65,6 +65,7 @@ class GridLayout:
             "rotate": number("layout rotate", self.rotate, "rad"),
             "lines": _offsets(self.lines),
             "crossing": number("layout crossing", self.crossing, "rad"),
+            "auto_edge": flag("layout auto_edge", self.auto_edge),
         }
         if not is_auto(self.length):
             values["length"] = positive("layout length", self.length, "m")
@@ -137,7 +138,8 @@ class GridLayout:
 
     def with_edges(self, a_span: int) -> "GridLayout":
         """The layout with so many edges to the smaller spacing, unless its edge was given."""
-        return replace(self, edge=min(self.spacing) / a_span) if self.auto_edge else self
+        edge = min(self.spacing) / whole("edges a span", a_span, 1)
+        return replace(self, edge=edge) if self.auto_edge else self
 
     def phase(self, family: Family) -> float:
         """Offset of one line of the lattice of a family [m]; the others are whole spacings away."""
