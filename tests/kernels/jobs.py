@@ -61,7 +61,7 @@ def _falls() -> Iterator[object]:
             step = 1e-4 if isinstance(coupling, rs.ExplicitPenalty) else 5e-3
             fall = rs.Fall(coupling=coupling, duration=8 * step, time_step=step)
             yield rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method=fall, joint=joint)
-    rubbing = rs.Fall(friction=0.3, duration=0.2, time_step=1e-2, height=1e-3)
+    rubbing = rs.Fall(friction=0.3, drag=0.0, duration=0.2, time_step=1e-2, height=1e-3)
     yield rs.drape(_few(), _rod(), rs.Ellipsoid(a=0.2, b=0.15, c=0.12), method=rubbing)
 
 
