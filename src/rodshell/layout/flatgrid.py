@@ -196,7 +196,7 @@ class FlatGrid:
         refuse_too_many(len(rods))
         for rod in rods:
             instance("each of the rods", rod, FlatRod)
-        number("margin", margin, "m")
+        margin = number("margin", margin, "m")
         lines = finite(
             "origin x and y, direction x and y, start and end of the rods",
             [(*rod.origin, *rod.direction, rod.start, rod.end) for rod in rods] or np.empty((0, 6)),
