@@ -8,6 +8,8 @@ import pytest
 import rodshell as rs
 from rodshell.contact.static import UnilateralContact
 from rodshell.errors import InputError
+from rodshell.paper.drapes import ROD as PAPERS_ROD
+from rodshell.paper.figure import CASES
 from rodshell.solve.equilibrium import Status
 from tests.formfinding.elastic_twins import ElasticTwin
 from tests.nets.sphere_net import sphere_net_end
@@ -247,3 +249,11 @@ def test_contact_energy_is_the_augmented_lagrangian_of_the_gap():
     expected = [100 * 2e-3**2 / 2, 100 * 1e-3**2 / 2 - 0.3 * 1e-3, 0.0, -(0.7**2) / 100]
     assert contact.evaluate(state, gradient) == pytest.approx(sum(expected), rel=1e-12)
     np.testing.assert_allclose(gradient, np.column_stack([0 * forces, 0 * forces, -forces]), rtol=0, atol=1e-13)
+
+
+def test_the_ellipsoid_of_the_paper_rests_on_a_saddle_that_is_named() -> None:
+    """Without friction the grid would slide off; the drape does not descend, which would lose it."""
+    case = CASES[2]
+    draped = rs.drape(case.layout, PAPERS_ROD, case.target, method=rs.Gravity())
+    assert draped.report.converged
+    assert any("saddle" in warning for warning in draped.warnings)

@@ -115,7 +115,7 @@ def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
         return 0
     if not kernels_are_kept():
         if not quiet:
-            say(f"kernels are compiled again in this run, about a minute: {UNKEPT}")
+            say(f"kernels are compiled again in this run, a minute or two: {UNKEPT}")
         return 0
     from rodshell.kernels.ahead import compile_kernels
 
@@ -123,7 +123,7 @@ def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
 
     def tell(done: int, count: int) -> None:
         bar = "#" * (BAR * done // count)
-        progress("compiling kernels, once, about a minute", f"[{bar:{BAR}}] {done} of {count}", 0.0)
+        progress("compiling kernels, once, a minute or two", f"[{bar:{BAR}}] {done} of {count}", 0.0)
 
     with progress:
         return compile_kernels(tell, every=every)

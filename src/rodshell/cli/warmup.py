@@ -16,8 +16,8 @@ from rodshell.kernels.cache import kernels_are_kept
 def command(quiet: bool) -> int:
     """Compile all kernels now, once, instead of before the first job.
 
-    It is of use where rodshell was installed without compiled kernels, and takes about a minute; later there is nothing
-    to compile. It is optional: without it, the first job compiles what most jobs need, and later ones the rest.
+    It is of use where rodshell was installed without compiled kernels, and takes a minute or two; later there is
+    nothing to compile. It is optional: without it, the first job compiles what most jobs need, and later ones the rest.
     """
     if COMPILED is None and not kernels_are_kept():
         raise InputError(f"kernels compiled now would be lost: {UNKEPT}")

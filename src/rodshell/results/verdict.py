@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from rodshell.results.findings import Said
 from rodshell.results.loaded import LoadedShell
-from rodshell.results.own_weight import falling, is_braced, light, reserve, weight_findings
+from rodshell.results.own_weight import falling, is_braced, reserve, weight_findings
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Finding, Level, Results, Verdict, WorstBent
 from rodshell.results.sizes_sold import thinner_than_sold
@@ -275,7 +275,9 @@ def _on_the_way(results: Results) -> bool:
 
 def _erection(results: Results) -> Iterator[Said]:
     """What the rods do not withstand on the way that was computed, and other ways, which may spare them."""
-    bent, thinner = bent_of(results, "deployment"), not light(results, list(results.self_weight))
+    bent, asked = bent_of(results, "deployment"), reserve(results)
+    borne = [each.load_factor for each in results.self_weight.values() if each.load_factor is not None]
+    thinner = min(borne, default=asked) >= asked  # else its own weight asks for thicker ones
     used = bent.utilisation
     said = [*_fibre_faults(results, "deployment")]
     if used is not None and used > 1 and holds_while_erected(results, used):
