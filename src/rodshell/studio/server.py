@@ -246,7 +246,8 @@ async def _live(socket: WebSocket) -> None:
         await socket.close(4429, str(reason))
         return
     with hearing, ExitStack() as stack, suppress(WebSocketDisconnect):  # the page has gone in the middle of a message
-        await _send(socket, {"kind": "session", "after": "connect", **vars(session.state)})
+        page = next(session.pages)
+        await _send(socket, {"kind": "session", "after": "connect", "page": page, **vars(session.state)})
         stack.callback(asyncio.create_task(_send_news(socket, news)).cancel)
         while (received := await socket.receive())["type"] == "websocket.receive":
             message: dict[str, Any] = {}

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -92,6 +93,7 @@ class Session:
             if not (0 <= self.state.at < len(self.state.cases) or self.state == State()):
                 raise InputError(f"{folder / 'session.json'} is damaged: it has no case {self.state.at}")
         self.listeners: set[Heard] = set()
+        self.pages = count(1)  # numbers of the pages that come to it
         self._leaving: asyncio.TimerHandle | None = None
         self.worker = WorkerProcess(self._hear)
         self._newest: tuple[int, dict[str, Any]] = (0, {})  # serial of the newest order, and its case for the pages

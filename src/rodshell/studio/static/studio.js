@@ -27,14 +27,14 @@ const SLIDERS = [  // key, name, and how its range follows from its value
 ];
 const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["rod.material.preset", "Material"], ["drape.method", "Drape"]];
 const TIMEOUT = 1500;  // ms after which a lost connection is tried again
-const TABS = 1000, tab = Math.floor(TABS * Math.random());  // serials modulo TABS tell which tab sent a case
+const TABS = 1000;  // serials modulo TABS tell which tab sent a case: the server numbers its pages
 const mine = number => number % TABS === tab;
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 const isTable = value => typeof value === "object" && value !== null && !Array.isArray(value);
 const NO_CASE = "The link in the address holds no case, or is damaged or cut off, or holds more than the studio reads: copy it again. What is shown is another case.";
 
 let start, session, socket, viewer, gui, drawn, ready = false;  // ready: the server has said what it holds
-let base = {}, resolved = null, serial = TABS * Date.now(), taken = 0, waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
+let tab = 0, base = {}, resolved = null, serial = TABS * Date.now(), taken = 0, waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
 
 // The case, and what is sent
 
@@ -266,6 +266,7 @@ let pending = true;  // a new target: the view begins anew
 
 function restore(state) {
   history = state;
+  tab = (state.page ?? tab) % TABS;
   const from = state.cases[state.at], { known } = restore, edited = known && taken !== serial;  // while the server was away
   showHistory({ at: state.at, count: state.cases.length });
   showVariants();
