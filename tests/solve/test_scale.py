@@ -89,6 +89,19 @@ def test_a_boundary_may_be_turned_by_any_angle_against_its_footprint(start, turn
     np.testing.assert_allclose(there.positions, Placed(turned=turned)(shell.positions), rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("joint", ["spring", "two layers"])
+def test_the_mode_along_which_a_saddle_is_left_turns_with_the_structure(joint):
+    """A draped lath whose ends are released is a saddle with several nearly equal modes."""
+    here = form(LATH, joint, HERE)
+    shell = here.popped["pinned"]
+    assert shell.report.factorizations > 10
+    for turned in (np.pi / 2, 2.0, np.pi):
+        boundary = boundary_placed(shell.boundary, turned, 0.0)
+        there = rs.pop_up(shell.footprint, boundary, here.rod, ends="pinned", joint=HERE.joint(joint))
+        assert there.report.factorizations == shell.report.factorizations
+        np.testing.assert_allclose(there.positions, Placed(turned=turned)(shell.positions), rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize(("kind", "joint"), CASES)
 def test_three_kilometres_away_a_shell_is_the_same(kind, joint):
     """Positions have 4.5e-13 m there; 2e-12 of the energy measured."""

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import dot
 from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all
+from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all, twist_angles
 from rodshell.solve.problem import NO_CURVATURE, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 from rodshell.solve.tangent import generic, subspace_iteration
@@ -332,11 +332,26 @@ class NewtonStep:
 
     def _inverse_iteration(self, sweeps: int) -> tuple[Floats, float]:
         """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue [J]."""
-        start = generic(self._free.size, 1)
+        start = self._free.reduce(generic_motion(self._factored[0], twist_angles(self.elements, len(self._unit))))[None]
         values, (row, *_), _ = subspace_iteration(
             lambda x: self._solve(x / self._units) / self._units, start, settled=1, tolerance=0.0, most_sweeps=sweeps
         )
         return row * self._units, 1.0 / float(values[0])
+
+
+def generic_motion(state: Floats, twists: Bools) -> Floats:
+    """(n, 3) a motion to begin an iteration with, of which all modes are a part, in axes that turn with the structure:
+    which of several equal modes is found, and how nearly, is the same at every heading.
+
+    Parameters
+    ----------
+    state : (n, 3) nodes [m] and twist angles [rad]; twists : (n,) which of its blocks are angles.
+    """
+    numbers, nodes = generic(state.size, 1).reshape(-1, 3), state[~twists]
+    x, y, _ = generic(len(nodes), 1)[0] @ (nodes - nodes.mean(axis=0))
+    x, y = (x, y) if np.hypot(x, y) > SIDEWAYS * np.ptp(nodes[:, 2]) else (1.0, 0.0)  # upright: any
+    axes = np.array([(x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, np.hypot(x, y))]) / np.hypot(x, y)
+    return np.where(twists[:, None], numbers, numbers @ axes)
 
 
 def upwards(mode: Floats) -> Floats:
