@@ -4,15 +4,17 @@ import json
 import os
 import shutil
 import subprocess
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rodshell.errors import InputError, OutputError
+from rodshell.errors import InputError, OutputError, OutputWarning
 from rodshell.output import export, save
 from rodshell.output.files import KINDS, NAMES, Content
+from rodshell.progress import TimeLimit, silent
 from rodshell.results import Archive, folder, read
 from rodshell.results.archive import ARCHIVE
 from rodshell.results.folder import ForeignFileError, open_folder
@@ -332,3 +334,26 @@ def test_an_empty_folder_is_not_the_current_one(folder: str, tmp_path: Path, mon
         with pytest.raises(InputError, match=r"^folder must be the path of a folder, not None$"):
             write(sample_archive(), None)  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
+
+
+def test_files_that_a_time_limit_leaves_no_time_for_are_named_and_written_by_export(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, made, dome = [0.0], table_archive(), tmp_path / "dome"
+
+    def slow(content: object) -> Iterator[tuple[str, str]]:
+        now.append(200.0)
+        yield "schedule/joints.csv", "slow"
+
+    monkeypatch.setattr("rodshell.progress.monotonic", lambda: now[-1])
+    save(made, dome, "obj, report")
+    assert (dome / "report.html").exists()
+    monkeypatch.setitem(KINDS, "csv", slow)
+    said = r"out of time before the files of obj, report: rodshell export .*dome writes"
+    with pytest.warns(OutputWarning, match=said):
+        save(made, dome, "csv, obj, report", progress=TimeLimit(silent, 100.0))
+    assert (dome / "schedule" / "joints.csv").exists()
+    assert not (dome / "report.html").exists()  # that of the earlier result
+    assert read(dome).results.plain() == made.results.plain()
+    export(read(dome), dome, "report")
+    assert (dome / "report.html").exists()

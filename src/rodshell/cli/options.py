@@ -149,7 +149,7 @@ ADDRESS = click.option(
 )
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
-TIME_LIMIT = 'Time limit, such as "60 s", for everything but the files; what was found by then is written.'
+TIME_LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kinds of files that are not are named.'
 
 
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -165,7 +165,7 @@ class Kept:
     def result(self) -> dict[str, Any]:
         return self.archive.results.plain()
 
-    def save(self, folder: "ResultFolder", progress: Progress) -> Path:
+    def save(self, folder: "ResultFolder", progress: Callable[[str, str, float], None]) -> Path:
         from rodshell.output.files import save
 
         return save(self.archive, folder, self.kinds, more=self.more, progress=progress)
@@ -207,7 +207,14 @@ def run_and_deliver(
             click.echo(form.search.table())
         offer = "" if output.quiet or output.as_json else _offer(form, progress, in_time)
         kept = Kept(archive, output.kinds, pictures(form), offer, refused)
-        return deliver(kept, kept.save, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+        return deliver(
+            kept,
+            lambda where, _: kept.save(where, in_time),
+            place,
+            progress=progress,
+            as_json=output.as_json,
+            quiet=output.quiet,
+        )
 
 
 def _offer(form: "Form", progress: Progress, in_time: Callable[[str, str, float], None]) -> str:

@@ -91,7 +91,7 @@ def bound_drape(
             progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
         )  # fmt: skip
         tried.append(found.report)
-        if found.report.converged:
+        if found.report.converged or found.report.reason:  # or out of time
             break
     touching = np.zeros(mesh.node_count, dtype=bool)
     _mark(spans, mesh.rod_nodes, touching)

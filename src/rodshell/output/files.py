@@ -2,13 +2,15 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
+from warnings import warn
 
-from rodshell.errors import InputError
+from rodshell.errors import InputError, OutOfTimeError, OutputWarning
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results.archive import Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
@@ -37,7 +39,8 @@ def save(
     ----------
     kinds : of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: all but 3dm.
     force : also replace files that rodshell did not write, or that were changed since, where it has to write.
-    progress : called for each file; a time limit does not apply, since what was found is to be kept.
+    progress : called for each kind of files; where it raises OutOfTimeError the archive is written and the kinds that
+        are left are not, with a warning that names them.
 
     Raises
     ------
@@ -55,9 +58,18 @@ def save(
     names = [*archive_names(archive), *reserved(wanted), *more]
     with open_folder(folder, reserved=names, force=force) as place:
         put_archive(archive, place)
-        for number, (name, content) in enumerate(chain(files_of(archive, wanted), more.items()), start=1):
-            progress("files", f"{number} written, {name}", 0.0)
-            place.put(name, content)
+        for name, text in more.items():
+            place.put(name, text)
+        content, left = Content(archive), list(DEFAULT if wanted is None else wanted)
+        with suppress(OutOfTimeError):
+            while left:
+                progress("files", left[0], 0.0)
+                for name, made in KINDS[left[0]](content):
+                    place.put(name, made)
+                del left[0]
+        if left:
+            again = f"rodshell export {quote(str(place.path))}"
+            warn(f"out of time before the files of {', '.join(left)}: {again} writes them", OutputWarning, 2)
         place.commit()
         return place.path
 
