@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.dynamic_pop_up import DynamicPopUp, DynamicPopUpSettings, dynamic_pop_up
     from rodshell.formfinding.patches import PatchLayout
     from rodshell.formfinding.search import search
+    from rodshell.formfinding.settle import settle
     from rodshell.job import Job, find_form, pop_up_table, refine
     from rodshell.joints import (
         Ball,
@@ -71,6 +72,7 @@ if TYPE_CHECKING:
     from rodshell.output.options import DrawingStyle, OutputOptions
     from rodshell.progress import bar
     from rodshell.results import Archive, Results, Verdict, read
+    from rodshell.rods.local_energy import LocalEnergy
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
@@ -110,6 +112,7 @@ _HOMES = {
     "rodshell.formfinding.patches": ("PatchLayout",),
     "rodshell.progress": ("bar",),
     "rodshell.formfinding.search": ("search",),
+    "rodshell.formfinding.settle": ("settle",),
     "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
@@ -125,6 +128,7 @@ _HOMES = {
     "rodshell.output": ("export", "save"),
     "rodshell.output.options": ("DrawingStyle", "OutputOptions"),
     "rodshell.results": ("Archive", "Results", "Verdict", "read"),
+    "rodshell.rods.local_energy": ("LocalEnergy",),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.solve.problem": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
@@ -146,14 +150,15 @@ __all__ = [
     "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form",
     "Freeform", "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere",
     "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Laths", "LineLoad", "Linker", "Loads",
-    "LockedJoints", "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions",
-    "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle",
-    "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample",
-    "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Strength",
-    "Target", "Temperature", "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "__version__", "agreement", "bar",
-    "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export", "fabricate", "find_form",
-    "heights_from", "map_back", "mesh_grid", "optimise", "pop_up", "pop_up_table", "read", "read_sweep", "refine",
-    "save", "search", "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
+    "LocalEnergy", "LockedJoints", "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError",
+    "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile",
+    "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports",
+    "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability",
+    "StabilityError", "Strength", "Target", "Temperature", "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind",
+    "__version__", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export",
+    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise", "pop_up", "pop_up_table", "read",
+    "read_sweep", "refine", "save", "search", "settle", "simulate", "solve_rod", "straight_rods", "surface_from",
+    "sweep", "trim",
 ]  # fmt: skip
 
 
