@@ -9,9 +9,9 @@ import rodshell as rs
 from rodshell.checks import Bending, Checks, bending
 from rodshell.checks.deployment import Deployment
 from rodshell.fabrication import Fabrication, fabricate
+from rodshell.figures.form import PopUp, Rod
 from rodshell.results import Results
 from rodshell.results.from_checks import checked_results
-from rodshell.results.records import PopUp, Rod
 from rodshell.results.verdict import verdict
 from tests.checks.test_bending import on_circle, rods_of_length
 

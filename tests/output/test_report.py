@@ -12,6 +12,8 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks import Deployment
+from rodshell.figures.checks import Bending, WorstBent
+from rodshell.figures.form import Layout, Material, Target
 from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.report import checks_table, key_figures
@@ -19,8 +21,6 @@ from rodshell.output.viewer import Scene, scene_of
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
 from rodshell.results.from_form import rod_type
-from rodshell.results.records import Layout, Material, Target
-from rodshell.results.results import Bending, WorstBent
 from rodshell.results.verdict import facts
 from rodshell.results.wording import Rounding
 from rodshell.solve.path import Snap

@@ -9,9 +9,9 @@ import pytest
 
 import rodshell as rs
 from rodshell.errors import InputError
+from rodshell.figures.checks import EndsInTheAir
 from rodshell.results import Results, Verdict
 from rodshell.results.findings import CODES
-from rodshell.results.results import EndsInTheAir
 from rodshell.results.summary import summary_text
 from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import facts, verdict, verdict_of

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from rodshell.figures.loads import LoadedShell
+from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
 from rodshell.output.schedules import loaded_shells
 from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
-from rodshell.results.loaded import LoadedShell
-from rodshell.results.records import Ends
 from rodshell.results.wording import millimetres, percent, rounded, rounded_down, rounding_of, shown_factor, stress
 from rodshell.units import percent_text
 

@@ -14,12 +14,13 @@ from math import ceil, isnan, log, pi
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.figures.form import Meeting, Stiffness
+from rodshell.figures.loads import LoadedShell
+from rodshell.figures.records import Ends, printable
 from rodshell.geometry.frames import unit
 from rodshell.output.grid import GridRod, joints_of, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
-from rodshell.results.loaded import LoadedShell
-from rodshell.results.records import Ends, Meeting, Stiffness, printable
 from rodshell.results.strength_used import ENDS
 from rodshell.results.wording import FINEST, Rounding, rounding_of
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Self
 
-from rodshell.results.records import Ends
+from rodshell.figures.records import Ends
 from rodshell.results.results import Finding
 
 CODES = {

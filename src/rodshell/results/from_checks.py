@@ -14,32 +14,28 @@ from rodshell.checks import OtherShape as FoundShape
 from rodshell.checks import OtherShapes as ShapeSearch
 from rodshell.checks import Reactions as SupportReactions
 from rodshell.fabrication import Fabricated
-from rodshell.layout import GridMesh
-from rodshell.loads.strength import Limits
-from rodshell.results.laths import lath_name
-from rodshell.results.loaded import DesignStrength
-from rodshell.results.records import Bent, Ends, Rod
-from rodshell.results.results import (
-    Bar,
+from rodshell.figures.checks import (
     Bending,
-    Brace,
     ClampedDeployment,
     Clearance,
     Contact,
     Deployment,
-    Drawings,
-    Fabrication,
     JointLoad,
     OtherShape,
     OtherShapes,
-    Piece,
     Reactions,
-    Results,
     SelfWeight,
     Stage,
-    Stock,
     WorstBent,
 )
+from rodshell.figures.fabrication import Bar, Brace, Fabrication, Piece, Stock
+from rodshell.figures.form import Bent, Rod
+from rodshell.figures.loads import DesignStrength
+from rodshell.figures.records import Ends
+from rodshell.layout import GridMesh
+from rodshell.loads.strength import Limits
+from rodshell.results.laths import lath_name
+from rodshell.results.results import Drawings, Results
 from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import verdict
 

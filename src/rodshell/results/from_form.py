@@ -14,19 +14,7 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.checks import Checks
-from rodshell.formfinding import Agreement as FoundAgreement
-from rodshell.formfinding import Footprint, PatchForm, Trimmed
-from rodshell.formfinding.bound_drape import shape_of_net
-from rodshell.formfinding.finite_sections import is_flat
-from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.seams import End
-from rodshell.formfinding.trim import ends_past_net
-from rodshell.joints import joint_parameters
-from rodshell.joints.joint import Joint as JointModel
-from rodshell.kernels import description
-from rodshell.layout import FlatGrid, Profile
-from rodshell.nets import ChebyshevNet
-from rodshell.results.records import (
+from rodshell.figures.form import (
     Agreement,
     Drape,
     Dropped,
@@ -50,8 +38,20 @@ from rodshell.results.records import (
     Stiffness,
     StrongBending,
     Target,
-    plain,
 )
+from rodshell.figures.records import plain
+from rodshell.formfinding import Agreement as FoundAgreement
+from rodshell.formfinding import Footprint, PatchForm, Trimmed
+from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.finite_sections import is_flat
+from rodshell.formfinding.patches import PatchedForm
+from rodshell.formfinding.seams import End
+from rodshell.formfinding.trim import ends_past_net
+from rodshell.joints import joint_parameters
+from rodshell.joints.joint import Joint as JointModel
+from rodshell.kernels import description
+from rodshell.layout import FlatGrid, Profile
+from rodshell.nets import ChebyshevNet
 from rodshell.results.results import Results
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod as RodModel

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
+from rodshell.figures.loads import Governs, LoadedShell, Utilisations
 from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
 from rodshell.loads.check import LoadedShell as CheckedShell
 from rodshell.results.from_checks import joint_names, support_names
-from rodshell.results.loaded import Governs, LoadedShell, Utilisations
 from rodshell.results.results import Results
 
 

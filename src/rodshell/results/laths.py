@@ -1,7 +1,7 @@
 """Laths that lie on the rods of a result over part of their length: where, what they are called, how long all are."""
 
+from rodshell.figures.form import Rod
 from rodshell.layout import Profile
-from rodshell.results.records import Rod
 from rodshell.results.results import Results
 
 

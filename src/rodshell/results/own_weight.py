@@ -8,10 +8,12 @@ That holds where joints have no stiffness of their own: within 4 % on the exampl
 from collections.abc import Mapping, Sequence
 from math import inf, sqrt
 
+from rodshell.figures.checks import SelfWeight
+from rodshell.figures.form import RodType
+from rodshell.figures.form import Section as RodSection
+from rodshell.figures.records import Ends
 from rodshell.results.findings import Said
-from rodshell.results.records import Ends, RodType
-from rodshell.results.records import Section as RodSection
-from rodshell.results.results import Results, SelfWeight
+from rodshell.results.results import Results
 from rodshell.results.sizes_sold import half_sides, sizes_sold
 from rodshell.results.strength_used import THIN, bent_of, holds_while_erected, strength_name
 from rodshell.results.wording import FORM_AGAIN, part_of_weight, percent, rounded, rounded_down, shown_factor

@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 from math import hypot
 
+from rodshell.figures.checks import EndsInTheAir
+from rodshell.figures.records import Point
 from rodshell.results.findings import Said
-from rodshell.results.records import Point
-from rodshell.results.results import EndsInTheAir, Results
+from rodshell.results.results import Results
 from rodshell.results.wording import newtons, shown_length
 
 ABOVE = 0.02  # of the size: higher ends are not on the level of the lowest

@@ -8,11 +8,13 @@ not checked, and then the result is not good.
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
+from rodshell.figures.checks import Clearance, Deployment, WorstBent
+from rodshell.figures.form import Agreement, PopUp
+from rodshell.figures.loads import LoadedShell
+from rodshell.figures.records import Ends
 from rodshell.results.findings import Said
-from rodshell.results.loaded import LoadedShell
 from rodshell.results.own_weight import falling, is_braced, reserve, weight_findings
-from rodshell.results.records import Agreement, Ends, PopUp
-from rodshell.results.results import Clearance, Deployment, Finding, Level, Results, Verdict, WorstBent
+from rodshell.results.results import Finding, Level, Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import (
     ENDS,

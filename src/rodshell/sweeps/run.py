@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
+from rodshell.figures.records import printable
 from rodshell.progress import Progress, silent
-from rodshell.results.records import printable
 from rodshell.sweeps.columns import CONVERGED, is_usable
 from rodshell.sweeps.computing import Computation, Wanted, opened_computation
 from rodshell.sweeps.identity import job_identity

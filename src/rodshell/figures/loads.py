@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from rodshell.results.records import ByEnds, Number, Point, Real, Record, Rows, Text, key, rows
+from rodshell.figures.records import ByEnds, Number, Point, Real, Record, Rows, Text, key, rows
 
 
 class Governs(Record):
