@@ -268,7 +268,7 @@ def test_cables_to_the_supports_are_anchored_there(pattern: str) -> None:
     lengths = np.linalg.norm(np.diff(places[braced.braced], axis=1)[:, 0], axis=1)
     assert braced.bracing_mass.sum() == pytest.approx(lengths.sum() * ROPE.mass_per_length)
     pulls = braced.support_forces(braced.equilibrium)
-    assert np.abs(pulls.sum_of_forces).max() < 1e-9 * np.abs(pulls.forces).max()
+    assert np.abs(pulls.force_sum).max() < 1e-9 * np.abs(pulls.forces).max()
 
 
 def test_bracing_of_a_symmetric_shell_is_stressed_symmetrically() -> None:

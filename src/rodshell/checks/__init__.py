@@ -6,7 +6,8 @@ from rodshell.checks.contact import Contact, contact_of
 from rodshell.checks.deployment import Deployment, Elsewhere, deploy
 from rodshell.checks.other_shapes import OtherShape, OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import SelfWeightCheck, self_weight
+from rodshell.checks.self_weight import self_weight
+from rodshell.figures.checks import SelfWeight
 
 __all__ = [
     "Bending",
@@ -18,7 +19,7 @@ __all__ = [
     "OtherShape",
     "OtherShapes",
     "Reactions",
-    "SelfWeightCheck",
+    "SelfWeight",
     "bending",
     "bending_of",
     "check",

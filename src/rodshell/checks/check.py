@@ -13,8 +13,9 @@ from rodshell.checks.contact import Contact, contact, contact_of, worst_contact
 from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import SelfWeightCheck, self_weight, weakest
+from rodshell.checks.self_weight import self_weight, weakest
 from rodshell.errors import OutOfTimeError
+from rodshell.figures.checks import SelfWeight
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.model.shell import UP
@@ -42,7 +43,7 @@ class ShellChecks:
     reactions: Reactions
     joints: JointLoads
     contact: Contact
-    self_weight: SelfWeightCheck | None
+    self_weight: SelfWeight | None
     other_shapes: OtherShapes | None
 
     __repr__ = brief
@@ -69,7 +70,7 @@ class Checks:
     joints: dict[Ends, JointLoads]
     deployment: Deployment | None = None
     deployment_bending: tuple[Bending, ...] = ()
-    self_weight: dict[Ends, SelfWeightCheck] = field(default_factory=dict)
+    self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
     contact: dict[Ends, Contact] = field(default_factory=dict)
     deployment_contact: tuple[Contact, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
@@ -232,7 +233,7 @@ def _long_checks(
     """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
     follow = "pinned" in done and stages > 0
     deployment, turned, stopped = None, None, ""
-    weighed, others = dict[Ends, SelfWeightCheck](), dict[Ends, OtherShapes]()
+    weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
     missing = [f"self-weight with {ends} ends" for ends in done]
     missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
     try:
@@ -246,7 +247,7 @@ def _long_checks(
                 progress("deployment", "turning the ends into their clamps", 0.0)
                 turned = reached_by_turning(popped["pinned"], popped["clamped"])
             missing.pop(0)
-        weighing = sum(weight.factorizations for weight in weighed.values())
+        weighing = sum(weight.factorizations or 0 for weight in weighed.values())
         for ends, search in _other_shapes(popped, done, deployment, weighing, progress):
             others[ends] = search
         missing.pop(0)
@@ -350,7 +351,7 @@ def merged_checks(patches: Mapping[str, Checks], contacts: Mapping[Ends, Contact
     deployed = all(part.deployment is not None for part in parts)
     return MergedChecks(
         bending=stacked("bending"),
-        reactions=stacked("reactions"),
+        reactions={end: Reactions.merged([part.reactions[end] for part in parts]) for end in ends},
         joints=stacked("joints"),
         self_weight={end: weakest([part.self_weight[end] for part in parts]) for end in known("self_weight")},
         contact={end: contacts[end] for end in ends},

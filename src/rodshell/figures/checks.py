@@ -1,9 +1,11 @@
 """What was checked of a shell without loads, and under its own weight."""
 
+from math import inf
+
 from pydantic import Field
 
 from rodshell.figures.form import Bent
-from rodshell.figures.records import Flag, Number, Point, Real, Record, Rows, Text, Whole, key, rows
+from rodshell.figures.records import Flag, Number, Point, Points, Real, Record, Rows, Text, Whole, key, points, rows
 
 
 class WorstBent(Bent):
@@ -63,8 +65,8 @@ class Reactions(Record):
     moment_imbalance: Number = key("sum of all moments over the largest")
     largest_force: Number = key("largest support force", "N")
     largest_moment: Number = key("largest support moment", "N m")
-    forces: Rows[Point] = rows("force at each rod end", "N")
-    moments: Rows[Point] = rows("moment at each rod end", "N m")
+    forces: Points = points("force at each rod end", "N")
+    moments: Points = points("moment at each rod end, about its own point; 0 where it is pinned", "N m")
 
 
 class JointLoad(Record):
@@ -79,13 +81,25 @@ class JointLoad(Record):
 
 
 class SelfWeight(Record):
-    """How much of its own weight the shell carries."""
+    """How much of its own weight the shell carries: up to at most 0.2 % below where stability is lost.
+
+    limit point: the load cannot grow, the shell snaps through. bifurcation: it gives way sideways. none: it is stable
+    up to 100 times its weight. not followed: it is stable up to the factor, and nothing is known above.
+    """
 
     load_factor: Number = key("factor on the weight at which stability is lost; null: above 100, or no mass given")
     deflection: Number = key("largest displacement under the whole weight; null: it does not carry it", "m")
     limit: Text | None = key("limit point, bifurcation, unstable unloaded, none, not followed, or no mass")
     braced_factor: Number = key("the load_factor of the shell with its bracing and locked joints")
     braced_limit: Text | None = key("as limit, of the braced shell; absent without bracing")
+    factorizations: Whole | None = key("factorisations of the tangent")
+
+    @property
+    def at_least(self) -> float:
+        """The factor as a number: infinite above 100, 0 where nothing is known."""
+        if self.load_factor is not None:
+            return self.load_factor
+        return inf if self.limit == "none" else 0.0
 
 
 class EndsInTheAir(Record):

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from rodshell.figures.records import ByEnds, Number, Point, Real, Record, Rows, Text, key, rows
+from rodshell.figures.records import ByEnds, Number, Point, Points, Real, Record, Rows, Text, key, points, rows
 
 
 class Governs(Record):
@@ -59,9 +59,9 @@ class LoadedShell(Record):
     max_stress: Number = key("largest stress of bending, axial force and torsion", "Pa")
     governs: Governs | None = key("where strength is used most")
     uplift: Number = key("largest force by which the shell pulls at a support upwards; 0: at none", "N")
-    reactions: Rows[Point] = rows("force of each support, in the order of boundary, without the unloaded shell's", "N")
-    support_forces: Rows[Point] = rows("force of each support, with the unloaded shell's", "N")
-    support_moments: Rows[Point] = rows("moment of each support, with the unloaded shell's", "N m")
+    reactions: Points = points("force of each support, in the order of boundary, without the unloaded shell's", "N")
+    support_forces: Points = points("force of each support, with the unloaded shell's", "N")
+    support_moments: Points = points("moment of each support, with the unloaded shell's", "N m")
     bracing: Rows[Number] = rows(
         "axial force of each brace in the order of fabrication.bracing, tension positive, 0: slack; null: left out", "N"
     )

@@ -6,7 +6,7 @@ of a number, a number that is not finite or a point with two coordinates is refu
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from math import isfinite
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
+
+from rodshell.arrays import Floats
 
 Ends = Literal["pinned", "clamped"]
 LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
@@ -81,11 +83,42 @@ T = TypeVar("T")
 Rows = Annotated[tuple[T, ...], FailFast(), BeforeValidator(_no_rows_for_null)]
 ByEnds = Annotated[dict[Ends, T], BeforeValidator(_no_keys_for_null)]
 Flat = Annotated[tuple[Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 2))]
-Point = Annotated[tuple[Number, Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 3))]
+_POINT = core_schema.tuple_schema([_NUMBER] * 3)
+Point = Annotated[tuple[Number, Number, Number], _Checked(_POINT)]
+
+
+def _array(*shape: int) -> Callable[[object], Floats]:
+    """What makes an array of rows of this shape; a number that is not known is NaN."""
+
+    def made(rows: Any) -> Floats:
+        values = np.array(() if rows is None else rows, dtype=float).reshape(-1, *shape)
+        return np.where(np.abs(values) <= LARGEST, values, np.nan)
+
+    return made
+
+
+def _table(row: CoreSchema, *shape: int) -> _Checked:
+    """A list of numbers or points that is an array in Python."""
+    listed = core_schema.nullable_schema(core_schema.list_schema(row, fail_fast=True))
+    schema = core_schema.json_or_python_schema(
+        json_schema=core_schema.no_info_after_validator_function(_array(*shape), listed),
+        python_schema=core_schema.no_info_plain_validator_function(_array(*shape)),
+        serialization=core_schema.plain_serializer_function_ser_schema(lambda values: plain(values)),
+    )
+    return _Checked(schema)
+
+
+Points = Annotated[Floats, _table(_POINT, 3)]
+Numbers = Annotated[Floats, _table(_NUMBER)]
+Found = Annotated[T, _Checked(core_schema.any_schema())]  # what a check found and its record leaves out
 
 
 class Record(BaseModel):
-    """A part of result.json: frozen, with the keys that the file has."""
+    """A part of result.json: frozen, with the keys that the file has.
+
+    A check returns a record of its figures, or a class derived from it with what else it found: only the keys of the
+    record are written.
+    """
 
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, populate_by_name=True, defer_build=True)
     __pydantic_extra__: dict[str, _Other] = Field(init=False)
@@ -97,6 +130,15 @@ class Record(BaseModel):
     def changed(self, **values: Any) -> Self:
         """The same record with other values of some fields, by their names here; they are not checked."""
         return self.model_copy(update=values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Record) and self.plain() == other.plain()
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """Arrays by their shape, and without what is not set."""
+        for name, value in super().__repr_args__():
+            if name is None or name in self.model_fields_set:
+                yield name, value.shape if isinstance(value, np.ndarray) else value
 
 
 def key(meaning: str, unit: str = "") -> Any:
@@ -130,6 +172,16 @@ def rows(meaning: str, unit: str = "") -> Any:
     unit : of their values; "" without.
     """
     return Field(default=(), description=f"{meaning} [{unit}]" if unit else meaning)
+
+
+def points(meaning: str, unit: str = "") -> Any:
+    """An array of points that may be absent; `meaning` and `unit` as of `rows`."""
+    return Field(default_factory=lambda: np.empty((0, 3)), description=f"{meaning} [{unit}]" if unit else meaning)
+
+
+def numbers(meaning: str, unit: str = "") -> Any:
+    """An array of numbers that may be absent; `meaning` and `unit` as of `rows`."""
+    return Field(default_factory=lambda: np.empty(0), description=f"{meaning} [{unit}]" if unit else meaning)
 
 
 def by_ends(meaning: str) -> Any:

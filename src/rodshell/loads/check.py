@@ -17,8 +17,9 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.checks.bending import require_known_stress, rod_frames
 from rodshell.checks.reactions import Reactions
-from rodshell.checks.self_weight import SelfWeightCheck, self_weight
+from rodshell.checks.self_weight import self_weight
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
+from rodshell.figures.checks import SelfWeight
 from rodshell.formfinding import PatchForm, PopUp, pop_up
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
@@ -120,7 +121,7 @@ class LoadedShell:
     @property
     def reaction_sum(self) -> Floats:
         """(3,) [N]"""
-        return self.reactions.sum_of_forces
+        return np.array(self.reactions.force_sum)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +147,7 @@ class LoadChecks:
     missing: tuple[str, ...] = ()
     refused: str = ""
     frequencies: Mapping[Ends, Floats] = field(default_factory=dict)
-    self_weight: Mapping[Ends, SelfWeightCheck] = field(default_factory=dict)
+    self_weight: Mapping[Ends, SelfWeight] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         late = f", {self.stopped or self.refused}" if self.stopped or self.refused else ""
@@ -210,7 +211,7 @@ def check_shells(
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
     stopped, braced, vibrations = "", np.empty((0, 2), dtype=np.intp), dict[Ends, Floats]()
-    weighed = dict[Ends, SelfWeightCheck]()
+    weighed = dict[Ends, SelfWeight]()
     try:
         for ends, popped in done.items():
             if limits.bending:

@@ -169,7 +169,7 @@ def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Ite
 
 def _foundation(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     """Load and reactions, and the largest forces that the foundations carry."""
-    forces = np.array(shell.support_forces, dtype=float).reshape(-1, 3)
+    forces = shell.support_forces
     load, held = shell.load_sum or (0.0, 0.0, 0.0), shell.reaction_sum or (0.0, 0.0, 0.0)
     across = np.linalg.norm(forces[:, :2], axis=1)
     down = int(np.argmax(forces[:, 2]))

@@ -310,7 +310,7 @@ def foundations_table(archive: Archive) -> Table:
     rows = [[name, *map(mm, place)] for name, place in zip(names, results.boundary, strict=True)]
     for name, ends, shell in loaded_shells(results):
         held = {"force": ("N", shell.support_forces)}
-        if any(value for moment in shell.support_moments for value in moment):
+        if np.nan_to_num(shell.support_moments).any():
             held["moment"] = ("Nm", shell.support_moments)
         columns += [f"{what}_{axis}_{unit}_{ends}_{name}" for what, (unit, _) in held.items() for axis in "xyz"]
         rows = [[*row, *(_six(value) for _, each in held.values() for value in each[k])] for k, row in enumerate(rows)]
@@ -425,7 +425,7 @@ def _number(value: float | None, digits: int) -> str:
 
 def _six(value: float | None) -> str:
     """Forces and moments, to six figures."""
-    return "" if value is None else f"{value:.6g}"
+    return "" if value is None or isnan(value) else f"{value:.6g}"
 
 
 def _utilisation(rod: GridRod) -> float | None:

@@ -12,7 +12,6 @@ from rodshell.checks import Checks, Elsewhere, JointLoads
 from rodshell.checks import Contact as ContactCheck
 from rodshell.checks import OtherShape as FoundShape
 from rodshell.checks import OtherShapes as ShapeSearch
-from rodshell.checks import Reactions as SupportReactions
 from rodshell.fabrication import Fabricated
 from rodshell.figures.checks import (
     Bending,
@@ -23,8 +22,6 @@ from rodshell.figures.checks import (
     JointLoad,
     OtherShape,
     OtherShapes,
-    Reactions,
-    SelfWeight,
     Stage,
     WorstBent,
 )
@@ -87,12 +84,9 @@ def checked_results(
         rods=_rods(results.rods, mesh, checks, fabricated, withstood),
         bending=bending.changed(shear_strength=shear_strength, strength_of=None if withstood.given else strength_of),
         strength=_design_strength(limits, bending),
-        reactions={ends: _reactions(held) for ends, held in checks.reactions.items()},
+        reactions=dict(checks.reactions),
         joint_loads={ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
-        self_weight={
-            ends: SelfWeight(load_factor=found.load_factor, deflection=found.deflection, limit=found.limit)
-            for ends, found in checks.self_weight.items()
-        },
+        self_weight=dict(checks.self_weight),
         contact=_contact(checks),
         other_shapes={ends: _other_shapes(searched) for ends, searched in checks.other_shapes.items()},
         fabrication=_fabrication(results, mesh, fabricated),
@@ -275,19 +269,6 @@ def _contact(checks: Checks) -> Contact:
 
 def _clearance(found: ContactCheck) -> dict[str, Any]:
     return {"clearance": found.clearance, "pairs": found.pairs, "rods": found.rods, "where": found.where}
-
-
-def _reactions(held: SupportReactions) -> Reactions:
-    return Reactions(
-        force_sum=held.sum_of_forces.tolist(),
-        moment_sum=held.sum_of_moments.tolist(),
-        force_imbalance=held.force_imbalance,
-        moment_imbalance=held.moment_imbalance,
-        largest_force=float(np.linalg.norm(held.forces, axis=1).max(initial=0.0)),
-        largest_moment=float(np.linalg.norm(held.moments, axis=1).max(initial=0.0)),
-        forces=held.forces.tolist(),
-        moments=held.moments.tolist(),
-    )
 
 
 def _joint_loads(mesh: GridMesh, loads: JointLoads) -> tuple[JointLoad, ...]:

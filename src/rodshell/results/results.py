@@ -5,7 +5,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -309,7 +309,7 @@ def contradictions(results: Results) -> Iterator[str]:
             if len(forces.each) != len(seam.meetings):
                 where = f"seams[{k}].forces.{support}.each"
                 yield f"{where} has {len(forces.each)} entries for {len(seam.meetings)} meetings"
-    counts = {"footprint": results.footprint, "boundary": results.boundary, "end_tangents": results.end_tangents}
+    counts: dict[str, Sized] = {name: getattr(results, name) for name in ("footprint", "boundary", "end_tangents")}
     for support, held in results.reactions.items():
         counts |= {f"reactions.{support}.forces": held.forces, f"reactions.{support}.moments": held.moments}
     for name, supported in results.loads.items():

@@ -1,10 +1,11 @@
 """Rod ends that something other than the ground may have to hold: along open arches, free edges and openings."""
 
-from collections.abc import Iterator, Sequence
-from math import hypot
+from collections.abc import Iterator
 
+import numpy as np
+
+from rodshell.arrays import Floats
 from rodshell.figures.checks import EndsInTheAir
-from rodshell.figures.records import Point
 from rodshell.results.findings import Said
 from rodshell.results.results import Results
 from rodshell.results.wording import newtons, shown_length
@@ -29,7 +30,7 @@ def in_the_air(results: Results) -> EndsInTheAir | None:
     held = {k for k, name in enumerate(names) if name in seams}
     ground = min(known)
     above = [k for k, z in enumerate(heights) if z is not None and z - ground > ABOVE * size and k not in held]
-    forces = [hypot(*(part or 0.0 for part in row[k])) for row in _forces(results) for k in above]
+    forces = [float(np.linalg.norm(np.nan_to_num(row[k]))) for row in _forces(results) for k in above]
     highest = max((heights[k] or 0.0) - ground for k in above) if above else 0.0
     return EndsInTheAir(count=len(above), highest=highest, largest_force=max(forces, default=None))
 
@@ -41,7 +42,7 @@ def width(results: Results) -> float:
     return max((max(column) - min(column) for column in known if column), default=0.0)
 
 
-def _forces(results: Results) -> Iterator[Sequence[Point]]:
+def _forces(results: Results) -> Iterator[Floats]:
     """(2m, 3) forces of the supports, without loads and under each combination, with every end condition."""
     loaded = [shell.support_forces for supported in results.loads.values() for shell in supported.values()]
     for forces in (*(held.forces for held in results.reactions.values()), *loaded):
