@@ -146,6 +146,7 @@ class Deployment(Record):
     elsewhere: OtherShape | None = key("the shape in which it ends instead")
     guided: tuple[Real, Real] | None = key("shares between which the shell has to be guided")
     clamped: ClampedDeployment | None = key("deployment to the clamped shape")
+    factorizations: Whole | None = key("factorisations of the tangent")
 
 
 class OtherShapes(Record):
@@ -156,3 +157,4 @@ class OtherShapes(Record):
     popped_through: Flag | None = key("whether popping through was among the starts")
     largest_kick: Number = key("largest kick over half the shell's width")
     found: Rows[OtherShape] = rows("shapes that were found")
+    factorizations: Whole | None = key("factorisations of the tangent")

@@ -8,21 +8,13 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.checks import Bending as BendingCheck
-from rodshell.checks import Checks, Elsewhere, JointLoads
-from rodshell.checks import Contact as ContactCheck
-from rodshell.checks import OtherShape as FoundShape
-from rodshell.checks import OtherShapes as ShapeSearch
+from rodshell.checks import Checks, JointLoads
+from rodshell.checks.bending import worst
 from rodshell.fabrication import Fabricated
 from rodshell.figures.checks import (
     Bending,
-    ClampedDeployment,
-    Clearance,
     Contact,
-    Deployment,
     JointLoad,
-    OtherShape,
-    OtherShapes,
-    Stage,
     WorstBent,
 )
 from rodshell.figures.fabrication import Bar, Brace, Fabrication, Piece, Stock
@@ -87,12 +79,12 @@ def checked_results(
         reactions=dict(checks.reactions),
         joint_loads={ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
         self_weight=dict(checks.self_weight),
-        contact=_contact(checks),
-        other_shapes={ends: _other_shapes(searched) for ends, searched in checks.other_shapes.items()},
+        contact=Contact(**checks.contact, **({"deployment": stage} if (stage := checks.closest_stage) else {})),
+        other_shapes=dict(checks.other_shapes),
         fabrication=_fabrication(results, mesh, fabricated),
     )
     if checks.deployment is not None:
-        found = found.changed(deployment=_deployment(checks))
+        found = found.changed(deployment=checks.deployment)
     if checks.out_of_time and found.status == "converged":
         found = found.changed(status=checks.out_of_time)
     return found
@@ -142,15 +134,6 @@ def _stacked(rows: list[Any]) -> NDArray[np.float32]:
     return np.array(rows, dtype=np.float32)  # for colours: single precision is plenty
 
 
-_PARTS = {
-    "max_bending_strain": "bending_strain",
-    "normal_curvature": "normal_curvature",
-    "geodesic_curvature": "geodesic_curvature",
-    "twist_rate": "twist_rate",
-    "torsion_stress": "torsion_stress",
-}
-
-
 class _Withstood(NamedTuple):
     """By what the utilisation of the final shapes and that of the deployment are counted [Pa], and by which factors
     (k,) their stresses."""
@@ -179,7 +162,7 @@ class _Withstood(NamedTuple):
 
     def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
         """Worst figures over a part of the rods' nodes, in any of the shapes."""
-        figures = _worst([*final, *stages], where)
+        figures: dict[str, Any] = worst([*final, *stages], where)
         judged = ((final, self.standing), (stages, self.erection))
         shares = [
             float((self.net * shape.stress)[where].max()) / strength
@@ -202,20 +185,6 @@ def _design_strength(limits: Limits, bending: Bending) -> DesignStrength:
         erection_utilisation=stages.utilisation if stages and limits.erection is not None else None,
         source=limits.source,
     )
-
-
-def _worst(bent: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
-    """Worst figures over a part of the rods' nodes, in any of the shapes."""
-    sharp = max(float(shape.curvature[where].max()) for shape in bent)
-    figures: dict[str, Any] = {"min_radius": 1 / sharp if sharp > 0 else None}
-    strains = [float(shape.strain[where].max()) for shape in bent if shape.strain is not None]
-    stresses = [float(shape.stress[where].max()) for shape in bent if shape.stress is not None]
-    figures["max_strain"] = max(strains, default=None)
-    figures["max_stress"] = max(stresses, default=None)
-    for key, name in _PARTS.items():
-        parts = [float(np.abs(part[where]).max()) for shape in bent if (part := getattr(shape, name)) is not None]
-        figures[key] = max(parts, default=None)
-    return figures
 
 
 def _rods(
@@ -259,18 +228,6 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
     return Bending(strength=withstood.standing, erection_strength=withstood.erection, **shapes)
 
 
-def _contact(checks: Checks) -> Contact:
-    shapes: dict[str, Any] = {ends: Clearance(**_clearance(found)) for ends, found in checks.contact.items()}
-    if checks.closest_stage is None:
-        return Contact(**shapes)
-    share, found = checks.closest_stage
-    return Contact(**shapes, deployment=Clearance(**_clearance(found), share=share))
-
-
-def _clearance(found: ContactCheck) -> dict[str, Any]:
-    return {"clearance": found.clearance, "pairs": found.pairs, "rods": found.rods, "where": found.where}
-
-
 def _joint_loads(mesh: GridMesh, loads: JointLoads) -> tuple[JointLoad, ...]:
     """Of each joint, on its second rod."""
     names = [rod.name for rod in mesh.grid.rods]
@@ -293,45 +250,6 @@ def _joint_loads(mesh: GridMesh, loads: JointLoads) -> tuple[JointLoad, ...]:
             scissor_deg=scissor,
         )
         for (a, b), force, normal, shear, out_of_plane, scissor in rows
-    )
-
-
-def _deployment(checks: Checks) -> Deployment:
-    found = checks.deployment
-    assert found is not None
-    stages = tuple(
-        Stage(share=float(share), height=float(np.ptp(positions[:, 2])), **_worst([bent], slice(None)))
-        for share, positions, bent in zip(found.share, found.positions, checks.deployment_bending, strict=True)
-    )
-    return Deployment(
-        ends="pinned",
-        stages=stages,
-        snaps=tuple((snap.start, snap.stop) for snap in found.snaps),
-        snapped_by=tuple(snap.moved for snap in found.snaps),
-        lost_at=found.lost_at,
-        reached_from_flat=found.reached_from_flat,
-        elsewhere=None if found.elsewhere is None else _shape(found.elsewhere),
-        guided=found.guided,
-        clamped=ClampedDeployment(reached_from_flat=checks.clamped_from_flat),
-    )
-
-
-def _shape(shape: Elsewhere | FoundShape) -> OtherShape:
-    """All that is known of a shape but its positions."""
-    if isinstance(shape, Elsewhere):
-        return OtherShape(distance=shape.distance, energy=shape.energy)
-    return OtherShape(
-        distance=shape.distance, energy=shape.energy, from_flat=shape.from_flat, mirror=bool(shape.mirror)
-    )
-
-
-def _other_shapes(searched: ShapeSearch) -> OtherShapes:
-    return OtherShapes(
-        tried=searched.tried,
-        searched=searched.searched,
-        popped_through=searched.popped_through,
-        largest_kick=searched.largest_kick,
-        found=tuple(_shape(shape) for shape in searched.found),
     )
 
 
