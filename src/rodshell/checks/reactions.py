@@ -41,8 +41,8 @@ class Reactions(figures.Reactions):
         about_middle = np.cross(points - points.mean(axis=0), forces) + moments
         return cls(
             points=points,
-            force_sum=forces.sum(axis=0).tolist(),
-            moment_sum=about_middle.sum(axis=0).tolist(),
+            force_sum=forces.sum(axis=0),
+            moment_sum=about_middle.sum(axis=0),
             force_imbalance=_imbalance(forces),
             moment_imbalance=_imbalance(about_middle),
             largest_force=_largest(forces),

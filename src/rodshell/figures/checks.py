@@ -5,7 +5,21 @@ from math import inf
 from pydantic import Field
 
 from rodshell.figures.form import Bent
-from rodshell.figures.records import Flag, Number, Point, Points, Real, Record, Rows, Text, Whole, key, points, rows
+from rodshell.figures.records import (
+    Flag,
+    Number,
+    Point,
+    Points,
+    Real,
+    Record,
+    Rows,
+    Text,
+    Vector,
+    Whole,
+    key,
+    points,
+    rows,
+)
 
 
 class WorstBent(Bent):
@@ -59,8 +73,8 @@ class Contact(Record):
 class Reactions(Record):
     """What the supports exert on the unloaded shell, in the order of `boundary`."""
 
-    force_sum: Point | None = key("sum of all forces", "N")
-    moment_sum: Point | None = key("sum of all moments", "N m")
+    force_sum: Vector | None = key("sum of all forces", "N")
+    moment_sum: Vector | None = key("sum of all moments", "N m")
     force_imbalance: Number = key("sum of all forces over the largest")
     moment_imbalance: Number = key("sum of all moments over the largest")
     largest_force: Number = key("largest support force", "N")

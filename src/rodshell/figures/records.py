@@ -6,7 +6,7 @@ of a number, a number that is not finite or a point with two coordinates is refu
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -87,29 +87,28 @@ _POINT = core_schema.tuple_schema([_NUMBER] * 3)
 Point = Annotated[tuple[Number, Number, Number], _Checked(_POINT)]
 
 
-def _array(*shape: int) -> Callable[[object], Floats]:
-    """What makes an array of rows of this shape; a number that is not known is NaN."""
+def _array(schema: CoreSchema, *shape: int) -> _Checked:
+    """A list of numbers or points, or a point, which in Python is an array of this shape; what is not known is NaN."""
 
-    def made(rows: Any) -> Floats:
-        values = np.array(() if rows is None else rows, dtype=float).reshape(-1, *shape)
+    def made(given: Any) -> Floats:
+        values = np.array(() if given is None else given, dtype=float).reshape(shape)
         return np.where(np.abs(values) <= LARGEST, values, np.nan)
 
-    return made
-
-
-def _table(row: CoreSchema, *shape: int) -> _Checked:
-    """A list of numbers or points that is an array in Python."""
-    listed = core_schema.nullable_schema(core_schema.list_schema(row, fail_fast=True))
-    schema = core_schema.json_or_python_schema(
-        json_schema=core_schema.no_info_after_validator_function(_array(*shape), listed),
-        python_schema=core_schema.no_info_plain_validator_function(_array(*shape)),
+    checked = core_schema.json_or_python_schema(
+        json_schema=core_schema.no_info_after_validator_function(made, schema),
+        python_schema=core_schema.no_info_plain_validator_function(made),
         serialization=core_schema.plain_serializer_function_ser_schema(lambda values: plain(values)),
     )
-    return _Checked(schema)
+    return _Checked(checked)
 
 
-Points = Annotated[Floats, _table(_POINT, 3)]
-Numbers = Annotated[Floats, _table(_NUMBER)]
+def _list(row: CoreSchema) -> CoreSchema:
+    return core_schema.nullable_schema(core_schema.list_schema(row, fail_fast=True))
+
+
+Vector = Annotated[Floats, _array(_POINT, 3)]
+Points = Annotated[Floats, _array(_list(_POINT), -1, 3)]
+Numbers = Annotated[Floats, _array(_list(_NUMBER), -1)]
 Found = Annotated[T, _Checked(core_schema.any_schema())]  # what a check found and its record leaves out
 
 

@@ -19,7 +19,6 @@ from rodshell.figures.checks import (
 )
 from rodshell.figures.fabrication import Bar, Brace, Fabrication, Piece, Stock
 from rodshell.figures.form import Bent, Rod
-from rodshell.figures.loads import DesignStrength
 from rodshell.figures.records import Ends
 from rodshell.layout import GridMesh
 from rodshell.loads.strength import Limits
@@ -49,7 +48,7 @@ def checked_results(
     fabricated: Fabricated,
     *,
     strength: float | None,
-    limits: Limits = Limits(bending={}),
+    limits: Limits = Limits(),
     net: Floats | None = None,
     shear_strength: float | None = None,
     strength_of: str | None = None,
@@ -71,11 +70,13 @@ def checked_results(
     torsion = checks.shear_unknown(strength) if anisotropic and shear_strength is None else ()
     withstood = _Withstood.of(limits, strength, np.ones(len(mesh.rod_nodes)) if net is None else net)
     bending = _bending(checks, mesh, withstood)
+    way, known = bending.deployment, limits.erection is not None
+    erected = way.utilisation if way and known else None
     found = results.changed(
         warnings=(*checks.warnings, *torsion, *results.warnings, *fabricated.warnings),
         rods=_rods(results.rods, mesh, checks, fabricated, withstood),
         bending=bending.changed(shear_strength=shear_strength, strength_of=None if withstood.given else strength_of),
-        strength=_design_strength(limits, bending),
+        strength=limits.changed(erection_utilisation=erected),
         reactions=dict(checks.reactions),
         joint_loads={ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
         self_weight=dict(checks.self_weight),
@@ -157,8 +158,7 @@ class _Withstood(NamedTuple):
     def worst_place(self, bent: BendingCheck, mesh: GridMesh) -> dict[str, Any]:
         """The most stressed place: the rod, and how far along it [m]."""
         at = int(np.argmax(self.stressed(bent)))
-        rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
-        return {"rod": rod.name, "at": float(mesh.stations[at]) - rod.start}
+        return dict(zip(("rod", "at"), mesh.place(at), strict=True))
 
     def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
         """Worst figures over a part of the rods' nodes, in any of the shapes."""
@@ -171,20 +171,6 @@ class _Withstood(NamedTuple):
             if strength is not None and shape.stress is not None
         ]
         return figures | ({"utilisation": max(shares)} if shares else {})
-
-
-def _design_strength(limits: Limits, bending: Bending) -> DesignStrength:
-    """What was judged by, and the deployment judged by it."""
-    stages = bending.deployment
-    return DesignStrength(
-        **limits.bending,
-        erection=limits.erection,
-        axial=limits.axial,
-        shear=1.0 / limits.shear_weight,
-        creep=limits.creep,
-        erection_utilisation=stages.utilisation if stages and limits.erection is not None else None,
-        source=limits.source,
-    )
 
 
 def _rods(
@@ -253,20 +239,9 @@ def _joint_loads(mesh: GridMesh, loads: JointLoads) -> tuple[JointLoad, ...]:
     )
 
 
-def joint_names(mesh: GridMesh) -> list[str]:
-    """Ids of the joints, the two rods' ids with a slash, in the order of the grid's crossings."""
-    names = [rod.name for rod in mesh.grid.rods]
-    return ["/".join(names[k] for k in sorted(pair)) for pair in mesh.grid.crossings.rods.tolist()]
-
-
-def support_names(mesh: GridMesh) -> list[str]:
-    """Names of the rod ends, as "U03.1": start (0) and end (1) of each rod in turn."""
-    return [f"{rod.name}.{end}" for rod in mesh.grid.rods for end in (0, 1)]
-
-
 def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fabrication:
-    names, joints = [rod.name for rod in mesh.grid.rods], joint_names(mesh)
-    points = [*joints, *support_names(mesh)]
+    names, joints = [rod.name for rod in mesh.grid.rods], mesh.grid.joint_names
+    points = [*joints, *mesh.grid.support_names]
     joint_mass = (results.joint.mass if results.joint else None) or 0.0
     stock = dict[str, Any]()
     if fabricated.nesting is not None:
