@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from rodshell.figures.records import Number, Record, Rows, Text, Whole, key, required, rows
+from rodshell.figures.records import Number, Real, Record, Rows, Text, Whole, key, required, rows
 
 
 class Brace(Record):
@@ -21,7 +21,7 @@ class Piece(Record):
     piece: Text = Field(
         description="the rod's id, a dot and its number along the rod; of the second lath on a rod with -2 after the id"
     )
-    length: Number = key("length", "m")
+    length: Real = Field(description="length [m]")
 
 
 class Bar(Record):
@@ -35,7 +35,7 @@ class Stock(Record):
     """The cutting plan."""
 
     waste: Number = key("share of the stock that is in no piece")
-    fewest: Whole | None = key("bars that the pieces' total length takes at least")
+    fewest: Whole | None = key("bars that the pieces' total length takes at least, whether or not they can be cut so")
     bars: Rows[Bar] = rows("the bars")
 
 

@@ -17,12 +17,10 @@ from rodshell.figures.checks import (
     JointLoad,
     WorstBent,
 )
-from rodshell.figures.fabrication import Bar, Brace, Fabrication, Piece, Stock
 from rodshell.figures.form import Bent, Rod
 from rodshell.figures.records import Ends
 from rodshell.layout import GridMesh
 from rodshell.loads.strength import Limits
-from rodshell.results.laths import lath_name
 from rodshell.results.results import Drawings, Results
 from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import verdict
@@ -70,6 +68,7 @@ def checked_results(
     torsion = checks.shear_unknown(strength) if anisotropic and shear_strength is None else ()
     withstood = _Withstood.of(limits, strength, np.ones(len(mesh.rod_nodes)) if net is None else net)
     bending = _bending(checks, mesh, withstood)
+    joint = (results.joint.mass if results.joint else None) or 0.0
     way, known = bending.deployment, limits.erection is not None
     erected = way.utilisation if way and known else None
     found = results.changed(
@@ -82,7 +81,7 @@ def checked_results(
         self_weight=dict(checks.self_weight),
         contact=Contact(**checks.contact, **({"deployment": stage} if (stage := checks.closest_stage) else {})),
         other_shapes=dict(checks.other_shapes),
-        fabrication=_fabrication(results, mesh, fabricated),
+        fabrication=fabricated.changed(total_mass=(fabricated.total_mass or 0.0) + len(mesh.grid.crossings) * joint),
     )
     if checks.deployment is not None:
         found = found.changed(deployment=checks.deployment)
@@ -236,35 +235,4 @@ def _joint_loads(mesh: GridMesh, loads: JointLoads) -> tuple[JointLoad, ...]:
             scissor_deg=scissor,
         )
         for (a, b), force, normal, shear, out_of_plane, scissor in rows
-    )
-
-
-def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fabrication:
-    names, joints = [rod.name for rod in mesh.grid.rods], mesh.grid.joint_names
-    points = [*joints, *mesh.grid.support_names]
-    joint_mass = (results.joint.mass if results.joint else None) or 0.0
-    stock = dict[str, Any]()
-    if fabricated.nesting is not None:
-        pieces = [
-            Piece(piece=f"{lath_name(names[rod], lath)}.{number}", length=length)
-            for rod, lath, number, length in fabricated.pieces
-        ]
-        bars = tuple(Bar(pieces=tuple(pieces[k] for k in bar.pieces), left=bar.left) for bar in fabricated.nesting.bars)
-        stock["stock"] = Stock(waste=fabricated.nesting.waste, fewest=fabricated.nesting.fewest, bars=bars)
-    return Fabrication(
-        end_allowance=fabricated.options.end_allowance,
-        stock_length=fabricated.options.stock_length,
-        kerf=fabricated.options.kerf,
-        total_mass=float(fabricated.mass.sum()) + len(joints) * joint_mass,
-        bracing=tuple(
-            Brace(
-                start=points[brace.joints[0]],
-                end=points[brace.joints[1]],
-                flat=brace.flat,
-                final=brace.final,
-                **({} if brace.cut is None else {"cut": brace.cut}),
-            )
-            for brace in fabricated.bracing
-        ),
-        **stock,
     )

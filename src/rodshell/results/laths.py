@@ -15,16 +15,6 @@ def laths_on(rod: Rod) -> tuple[tuple[float, float], ...]:
     return profile.laths(length, 0.5 * (_cut(rod) - length))
 
 
-def lath_name(rod: str, number: int) -> str:
-    """What a lath is called: the first as its rod, the second "U07-2".
-
-    Parameters
-    ----------
-    rod : its id; number : of the lath.
-    """
-    return rod if number == 1 else f"{rod}-{number}"
-
-
 def lengths_text(results: Results) -> str:
     """All that is cut: "286.2 m, and 186.2 m of second laths"."""
     text, laths = f"{sum(map(_cut, results.rods)):.1f} m", laths_text(results)
