@@ -122,6 +122,12 @@ class Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, populate_by_name=True, defer_build=True)
     __pydantic_extra__: dict[str, _Other] = Field(init=False)
 
+    @classmethod
+    def taken_from(cls, found: object, **more: Any) -> Self:
+        """The record of what a computation found: those of its attributes that are keys, and `more`."""
+        known = {name: getattr(found, name) for name in cls.model_fields if hasattr(found, name)}
+        return cls(**(known | more))
+
     def plain(self) -> dict[str, Any]:
         """The record as it stands in result.json: plain dictionaries, lists and numbers, without absent keys."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
