@@ -1,5 +1,6 @@
 """The verdict as a function of the figures: what makes a result good, what has to be checked, what cannot be built."""
 
+import pickle
 import re
 from copy import deepcopy
 from pathlib import Path
@@ -10,8 +11,8 @@ import pytest
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.figures.checks import EndsInTheAir
+from rodshell.figures.findings import CODES, Said
 from rodshell.results import Results, Verdict
-from rodshell.results.findings import CODES
 from rodshell.results.summary import summary_text
 from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import facts, verdict, verdict_of
@@ -657,11 +658,19 @@ def test_each_sentence_of_a_verdict_is_a_finding_with_its_figures() -> None:
     assert (short.support, short.figure, short.limit) == ("pinned", 1.2, 1.5)
 
 
+def test_what_checks_warn_of_is_a_finding_with_its_code() -> None:
+    snaps = Said("it snaps", "snaps", "pinned", 0.03, unit="m")
+    found = verdict(changed().changed(warnings=(snaps, "a sentence of an earlier version")))
+    assert [one.code for one in found.findings if one.code != "no_loads"] == ["snaps", "warning"]
+    assert found.findings[0] == snaps.finding
+    assert found.reasons[:2] == ("it snaps", "a sentence of an earlier version")
+    assert pickle.loads(pickle.dumps(snaps)).finding == snaps.finding
+
+
 def test_the_codes_of_findings_are_those_that_are_documented() -> None:
     text = Path(__file__).parents[2].joinpath("docs", "files.md").read_text(encoding="utf-8")
     table = text.partition("### Codes of findings")[2].partition("\n## ")[0]
     assert re.findall(r"^\| `(\w+)` \| (.*) \|$", table, re.M) == [*CODES.items()]
-    source = "".join(
-        path.read_text(encoding="utf-8") for path in Path(rs.__file__).parent.joinpath("results").glob("*.py")
-    )
+    files = [path for path in Path(rs.__file__).parent.rglob("*.py") if path.name != "findings.py"]
+    source = "".join(path.read_text(encoding="utf-8") for path in files)
     assert {code for code in CODES if f'"{code.removeprefix("erection_")}"' not in source} == set()

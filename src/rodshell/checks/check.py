@@ -16,6 +16,7 @@ from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reacti
 from rodshell.checks.self_weight import self_weight, weakest
 from rodshell.errors import OutOfTimeError
 from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, Stage
+from rodshell.figures.findings import Said
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.model.shell import UP
@@ -113,14 +114,18 @@ class Checks:
         return f"{self.stopped}; not checked: {', '.join(self.missing)}" if self.stopped else ""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
-        late = (self.out_of_time,) if self.out_of_time else ()
-        turned: tuple[str, ...] = ()
+        turned: tuple[Said, ...] = ()
         if self.clamped_from_flat is False:
-            turned = ("turned into their clamps after deployment, the ends lead to another than the clamped shape",)
-        return (*late, *way, *turned, *self.tight)
+            words = "turned into their clamps after deployment, the ends lead to another than the clamped shape"
+            turned = (Said(words, "turned", "clamped"),)
+        return (*self._late, *way, *turned, *self.tight)
+
+    @property
+    def _late(self) -> tuple[Said, ...]:
+        return (Said(self.out_of_time, "not_checked"),) if self.out_of_time else ()
 
     @property
     def stages_below_final(self) -> tuple[tuple[float, Bending], ...]:
@@ -138,7 +143,7 @@ class Checks:
         return min(found, key=lambda stage: inf if stage.clearance is None else stage.clearance)
 
     @property
-    def tight(self) -> tuple[str, ...]:
+    def tight(self) -> tuple[Said, ...]:
         """A sentence where rods that do not touch come so near to each other that there is no room for joints."""
         shapes = [(found, f"with {ends} ends") for ends, found in self.contact.items()]
         if (nearest := self.closest_stage) is not None:
@@ -154,22 +159,24 @@ class Checks:
         assert worst.rods is not None
         assert worst.where is not None
         who = f"rods {worst.rods[0]} and {worst.rods[1]}" if worst.rods[0] != worst.rods[1] else f"rod {worst.rods[0]}"
-        return (
+        words = (
             f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near "
             f"({worst.where[0]:.4g}, {worst.where[1]:.4g}, {worst.where[2]:.4g}) m: that leaves hardly any room for "
-            "joints; use thinner rods (rod.section) or a larger spacing",
+            "joints; use thinner rods (rod.section) or a larger spacing"
         )
+        return (Said(words, "no_room", None, worst.clearance, unit="m", place=worst.rods[0]),)
 
-    def shear_unknown(self, strength: float | None) -> tuple[str, ...]:
+    def shear_unknown(self, strength: float | None) -> tuple[Said, ...]:
         """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
         parts = [bent.torsion_stress for bent in (*self.bending.values(), *self.deployment_bending)]
         sheared = max((float(part.max()) for part in parts if part is not None), default=0.0)
         if strength is None or sheared <= WORTH * strength:
             return ()
-        return (
+        words = (
             f"torsion shears the rods by up to {stress_text(sheared)}, counted by von Mises as in isotropic "
-            "materials; timber and fibre composites withstand less shear along the fibres: give checks.shear_strength",
+            "materials; timber and fibre composites withstand less shear along the fibres: give checks.shear_strength"
         )
+        return (Said(words, "no_shear_strength", None, sheared, unit="Pa"),)
 
 
 def check(
@@ -332,15 +339,14 @@ class MergedChecks(Checks):
     patches: Mapping[str, Checks] = field(kw_only=True)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Said, ...]:
         words = [
-            f"patch {name}: {word}"
+            Said.of(f"patch {name}: {word}", word.finding)
             for name, checks in self.patches.items()
             for word in checks.warnings
             if word not in (checks.out_of_time, *checks.tight)
         ]
-        late = (self.out_of_time,) if self.out_of_time else ()
-        return (*late, *words, *self.tight)
+        return (*self._late, *words, *self.tight)
 
 
 def merged_checks(patches: Mapping[str, Checks], contacts: Mapping[Ends, Clearance]) -> MergedChecks:

@@ -20,6 +20,7 @@ from pydantic import Field
 
 from rodshell.arrays import Floats
 from rodshell.figures import checks as figures
+from rodshell.figures.findings import Said
 from rodshell.figures.records import Found, key
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import end_directions, laid_below, turned
@@ -95,30 +96,30 @@ class Deployment(figures.Deployment):
     elsewhere: OtherShape | None = key("the shape in which it ends instead")
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
-        words = list[str]()
+        said = list[Said]()
         if self.snaps:
             where = places_text([start for start, _ in self.snaps])
-            by = length_text(max(moved or 0.0 for moved in self.snapped_by))
+            by = max(moved or 0.0 for moved in self.snapped_by)
             continues = ", and continues to its final shape" if self.reached_from_flat else ""
             other = "; a small difference can make it snap elsewhere" if len(self.snaps) > FEW else ""
-            words.append(
-                f"{where} of the deployment from flat the shell snaps forward by itself, by up to {by}"
-                f"{continues}{other}"
-            )
+            words = f"{where} of the deployment from flat the shell snaps forward by itself, by up to {length_text(by)}"
+            said.append(Said(f"{words}{continues}{other}", "snaps", "pinned", by, unit="m"))
         if self.reached_from_flat is False:
             where = "" if self.elsewhere is None else f", {self.elsewhere.words}"
-            words.append(
+            words = (
                 f"lifted from flat and driven by its ends alone, the shell comes to rest in another shape{where}: "
                 "it has to be guided into its final shape"
             )
+            said.append(Said(words, "guided", "pinned"))
         if self.gap is not None:
-            words.append(
+            words = (
                 f"the deployment could not be followed all the way: {self.gap.words}; stages are missing, and whether "
                 "the shell reaches its final shape from flat is not known"
             )
-        return tuple(words)
+            said.append(Said(words, "lost", "pinned", self.lost_at, 0))
+        return tuple(said)
 
 
 def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress = lambda share: None) -> Deployment:

@@ -13,6 +13,7 @@ from rodshell.errors import InputError
 from rodshell.fabrication.cutting import nest, splices
 from rodshell.figures import fabrication as figures
 from rodshell.figures.fabrication import Brace, Piece
+from rodshell.figures.findings import Said
 from rodshell.figures.records import Found
 from rodshell.layout import GridMesh, Profile
 from rodshell.layout.cells import Pattern, diagonals, rim_diagonals
@@ -101,7 +102,7 @@ class Fabricated(figures.Fabrication):
         description="of every rod, rod by rod; more than one of a rod over part of which laths lie on each other"
     )
     pieces: Found[tuple[Piece, ...]] = Field(description="all that is cut from stock, in the order of the laths")
-    warnings: Found[tuple[str, ...]] = Field(description="sentences on rods that cannot be spliced")
+    warnings: Found[tuple[Said, ...]] = Field(description="sentences on rods that cannot be spliced")
 
     @property
     def splices(self) -> tuple[tuple[float, ...], ...]:
@@ -207,7 +208,7 @@ def _stretch(rod: Rod, profile: Profile, factors: Floats) -> Floats:
 
 def _laths(
     mesh: GridMesh, options: Fabrication, curvature: Floats | None, *, short: float = 0.0
-) -> tuple[tuple[Lath, ...], tuple[str, ...]]:
+) -> tuple[tuple[Lath, ...], tuple[Said, ...]]:
     """All laths with their splices, and a sentence about those that cannot be spliced.
 
     short : pieces of so many joint distances are avoided.
@@ -239,9 +240,8 @@ def _laths(
     first = next(iter(hopeless.values()))
     named = f"rod {first}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {first})"
     assert stock is not None
-    return tuple(made), (
-        f"{named} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock",
-    )
+    words = f"{named} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock"
+    return tuple(made), (Said(words, "not_spliced", None, stock, unit="m", place=first),)
 
 
 def _pieces_of(laths: tuple[Lath, ...], names: Sequence[str]) -> tuple[Piece, ...]:

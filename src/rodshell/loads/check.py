@@ -21,6 +21,7 @@ from rodshell.checks.self_weight import self_weight, shown_limit
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.figures import loads as figures
 from rodshell.figures.checks import SelfWeight
+from rodshell.figures.findings import Said
 from rodshell.figures.loads import Governs, Utilisations
 from rodshell.figures.records import Found
 from rodshell.formfinding import PatchForm, PopUp, pop_up
@@ -97,36 +98,40 @@ class LoadChecks:
         return f"<LoadChecks of {', '.join(self.shells) or 'no combination'}{late}>"
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
         if self.refused:
-            return (f"the loads were not checked: {self.refused}",)
-        late = (f"{self.stopped}; not checked: {', '.join(self.missing)}",) if self.stopped else ()
+            return (Said(f"the loads were not checked: {self.refused}", "not_checked"),)
+        words = f"{self.stopped}; not checked: {', '.join(self.missing)}"
+        late = (Said(words, "not_checked"),) if self.stopped else ()
         return (*late, *self._unjudged, *self._unjudged_bracing)
 
     @property
-    def _unjudged(self) -> tuple[str, ...]:
+    def _unjudged(self) -> tuple[Said, ...]:
         """What strength was not judged by."""
         known, wanted = self.limits.bending, {self.asked.duration(name) for name in self.asked.combinations}
         if not known:
-            return (
+            words = (
                 "the design strength of the rods is not known, so that whether they break under the loads was not "
-                "judged: give strength.permanent and strength.short",
+                "judged: give strength.permanent and strength.short"
             )
+            return (Said(words, "no_strength"),)
         missing = [name for name in ("permanent", *sorted(wanted - {"permanent"})) if name not in known]
         if missing:
-            return (f"the design strength for {' and '.join(missing)} loads is not known and was not judged",)
+            words = f"the design strength for {' and '.join(missing)} loads is not known and was not judged"
+            return (Said(words, "no_strength"),)
         return ()
 
     @property
-    def _unjudged_bracing(self) -> tuple[str, ...]:
+    def _unjudged_bracing(self) -> tuple[Said, ...]:
         every = [shell for by_ends in self.shells.values() for shell in by_ends.values()]
         if all(shell.bracing_utilisation is not None or not len(shell.bracing_forces) for shell in every):
             return ()
-        return (
+        words = (
             "the design strength of the bracing is not known, so that whether it breaks under the loads was not "
-            "judged: compare its largest forces, which stand with the loads, with what it can carry",
+            "judged: compare its largest forces, which stand with the loads, with what it can carry"
         )
+        return (Said(words, "no_strength", place="bracing"),)
 
 
 def check_shells(

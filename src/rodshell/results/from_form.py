@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.checks import Checks
+from rodshell.figures.findings import Said
 from rodshell.figures.form import (
     Agreement,
     Drape,
@@ -160,9 +161,11 @@ def with_refinement(results: Results, found: "Refined") -> Results:
     results : of the form after it.
     """
     gates: tuple[Gate, ...] = get_args(Gate)
-    said = [] if found.changed else [f"the form is not refined: {found.refused}"]
+    said = [] if found.changed else [Said(f"the form is not refined: {found.refused}", "not_refined", found.ends)]
     if found.stopped:
-        said.append(f"{found.stopped}: the refinement was stopped at what it had found")
+        said.append(
+            Said(f"{found.stopped}: the refinement was stopped at what it had found", "not_refined", found.ends)
+        )
     return results.changed(
         warnings=(*results.warnings, *said),
         refinement=Refinement.taken_from(

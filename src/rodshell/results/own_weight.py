@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from math import inf, sqrt
 
 from rodshell.figures.checks import SelfWeight
+from rodshell.figures.findings import Said
 from rodshell.figures.form import RodType
 from rodshell.figures.form import Section as RodSection
 from rodshell.figures.records import Ends
-from rodshell.results.findings import Said
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import half_sides, sizes_sold
 from rodshell.results.strength_used import THIN, bent_of, holds_while_erected, strength_name

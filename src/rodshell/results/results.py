@@ -24,6 +24,7 @@ from rodshell.figures.checks import (
     SelfWeight,
 )
 from rodshell.figures.fabrication import Fabrication
+from rodshell.figures.findings import Finding
 from rodshell.figures.form import (
     Agreement,
     Drape,
@@ -101,18 +102,6 @@ else:
                 raise InputError(f"{cls.__name__}: {_first_fault(error)}") from None
             except RecursionError:
                 raise InputError(f"{cls.__name__}: a value contains itself: give plain ones") from None
-
-
-class Finding(Record):
-    """What one sentence of a verdict says, as data."""
-
-    code: Text = Field(description="what is judged, one of the codes in docs/files.md")
-    support: Text | None = key("the end condition; null: of all, or of none")
-    figure: Number = key("what was found, in `unit`")
-    limit: Number = key("what is compared with it, in the same unit")
-    unit: Text = Field(default="", description='"m", or "" for a number or a share')
-    place: Text | None = key("the rod, or the combination of loads")
-    offers: Rows[Text] = rows("commands that may mend it, to be run in the folder of the result")
 
 
 class Verdict(Record, metaclass=_Refusing):

@@ -6,7 +6,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.figures.checks import EndsInTheAir
-from rodshell.results.findings import Said
+from rodshell.figures.findings import Said
 from rodshell.results.results import Results
 from rodshell.results.wording import newtons, shown_length
 

@@ -6,15 +6,14 @@ not checked, and then the result is not good.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 
 from rodshell.figures.checks import Clearance, Deployment, WorstBent
+from rodshell.figures.findings import Finding, Said
 from rodshell.figures.form import Agreement, PopUp
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends
-from rodshell.results.findings import Said
 from rodshell.results.own_weight import falling, is_braced, reserve, weight_findings
-from rodshell.results.results import Finding, Level, Results, Verdict
+from rodshell.results.results import Level, Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import (
     ENDS,
@@ -94,7 +93,7 @@ def verdict(results: Results) -> Verdict:
     sinks = _sinks(results, usable)
     to_check = [
         *gravest, *weight, *sinks, *_loads(results, usable or there), *air_findings(results),
-        *_open_points(results, usable), *(Said(word, "warning") for word in results.warnings),
+        *_open_points(results, usable), *(word if isinstance(word, Said) else Said(word) for word in results.warnings),
     ]  # fmt: skip
     standing = set(usable) - falling(results)
     if lost and not standing and not deployment:
@@ -129,7 +128,7 @@ def _verdict(level: Level, said: Iterable[Said]) -> Verdict:
     """Each reason once, with what it says in figures."""
     once = dict[str, Finding]()
     for each in said:
-        once.setdefault(each.text, each.finding())
+        once.setdefault(str(each), each.finding)
     return Verdict(level=level, reasons=tuple(once), findings=tuple(once.values()))
 
 
@@ -197,9 +196,7 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
             if share > 1:
                 words = f"with {ends} ends {BY_WORDS[by].format(_too_much(share))}{where * (by == governs)}"
                 code = "slip" if by == "slip_unloaded" else "strength"
-                if len(words) > len(
-                    unloaded[by].text if by in unloaded else ""
-                ):  # the same under all, or with its place
+                if len(words) > len(unloaded.get(by, "")):  # the same under all, or with its place
                     unloaded[by] = Said(words, code, ends, share, 1, place=place.rod if place else None)
         worst = max(uses, key=lambda by: uses[by], default="")
         if uses.get(worst, 0.0) > 1:
@@ -288,11 +285,13 @@ def _erection(results: Results) -> Iterator[Said]:
     if _on_the_way(results):
         said += _contact_faults(results, "deployment")
     if said:
-        said[-1] = said[-1].and_so(
-            "; this is on one way, all ends moved evenly: erect it in another way that is checked, such as rod by rod "
-            f"over a scaffold, lifted at its middle, or one family's ends first{', or use thinner rods' * thinner}"
+        said[-1] = Said.of(
+            f"{said[-1]}; this is on one way, all ends moved evenly: erect it in another way that is checked, such as "
+            f"rod by rod over a scaffold, lifted at its middle, or one family's ends first"
+            f"{', or use thinner rods' * thinner}",
+            said[-1].finding,
         )
-    yield from (replace(each, code=f"erection_{each.code}") for each in said)
+    yield from (Said.of(each, each.finding.changed(code=f"erection_{each.finding.code}")) for each in said)
 
 
 def _ends(shape: str) -> Ends | None:

@@ -14,8 +14,8 @@ from typing import Any, Literal, get_args
 from rodshell.case import BUILT_IN
 from rodshell.case.load import flattened, toml_of
 from rodshell.errors import InputError
+from rodshell.figures.findings import CODES
 from rodshell.job import Job
-from rodshell.results.findings import CODES
 from rodshell.sweeps.axes import BASE, Axis, read_axes
 from rodshell.sweeps.columns import NUMBERS, Column, read_columns
 from rodshell.units import parse_quantity, shown

@@ -9,8 +9,8 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.figures.findings import CODES
 from rodshell.job import Job
-from rodshell.results.findings import CODES
 from rodshell.sweeps.axes import Axis, Span, flat_keys, read_listed, read_span
 from rodshell.sweeps.columns import FINDINGS, NUMBERS, STANDARD, number_of, read_column, read_columns
 from rodshell.sweeps.plan import GENERATION, Plan, Source, known, read_origin, read_settings, table
