@@ -16,7 +16,7 @@ from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reacti
 from rodshell.checks.self_weight import self_weight, weakest
 from rodshell.errors import OutOfTimeError
 from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, Stage
-from rodshell.figures.findings import Said
+from rodshell.figures.findings import Said, said
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.model.shell import UP
@@ -111,7 +111,7 @@ class Checks:
     @property
     def out_of_time(self) -> str:
         """A sentence on when that was and which checks are missing, or ""."""
-        return f"{self.stopped}; not checked: {', '.join(self.missing)}" if self.stopped else ""
+        return "".join(self._late)
 
     @property
     def warnings(self) -> tuple[Said, ...]:
@@ -119,13 +119,12 @@ class Checks:
         way = () if self.deployment is None else self.deployment.warnings
         turned: tuple[Said, ...] = ()
         if self.clamped_from_flat is False:
-            words = "turned into their clamps after deployment, the ends lead to another than the clamped shape"
-            turned = (Said(words, "turned", "clamped"),)
+            turned = (said("turned", "clamped"),)
         return (*self._late, *way, *turned, *self.tight)
 
     @property
     def _late(self) -> tuple[Said, ...]:
-        return (Said(self.out_of_time, "not_checked"),) if self.out_of_time else ()
+        return (said("not_checked: late", when=self.stopped, missing=", ".join(self.missing)),) if self.stopped else ()
 
     @property
     def stages_below_final(self) -> tuple[tuple[float, Bending], ...]:
@@ -159,12 +158,9 @@ class Checks:
         assert worst.rods is not None
         assert worst.where is not None
         who = f"rods {worst.rods[0]} and {worst.rods[1]}" if worst.rods[0] != worst.rods[1] else f"rod {worst.rods[0]}"
-        words = (
-            f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near "
-            f"({worst.where[0]:.4g}, {worst.where[1]:.4g}, {worst.where[2]:.4g}) m: that leaves hardly any room for "
-            "joints; use thinner rods (rod.section) or a larger spacing"
-        )
-        return (Said(words, "no_room", None, worst.clearance, unit="m", place=worst.rods[0]),)
+        room, near_to = length_text(worst.clearance), ", ".join(f"{x:.4g}" for x in worst.where)
+        where = f"{where}, near ({near_to}) m"
+        return (said("no_room", None, worst.clearance, unit="m", place=worst.rods[0], who=who, room=room, where=where),)
 
     def shear_unknown(self, strength: float | None) -> tuple[Said, ...]:
         """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
@@ -172,11 +168,7 @@ class Checks:
         sheared = max((float(part.max()) for part in parts if part is not None), default=0.0)
         if strength is None or sheared <= WORTH * strength:
             return ()
-        words = (
-            f"torsion shears the rods by up to {stress_text(sheared)}, counted by von Mises as in isotropic "
-            "materials; timber and fibre composites withstand less shear along the fibres: give checks.shear_strength"
-        )
-        return (Said(words, "no_shear_strength", None, sheared, unit="Pa"),)
+        return (said("no_shear_strength", None, sheared, unit="Pa", stress=stress_text(sheared)),)
 
 
 def check(
@@ -341,7 +333,7 @@ class MergedChecks(Checks):
     @property
     def warnings(self) -> tuple[Said, ...]:
         words = [
-            Said.of(f"patch {name}: {word}", word.finding)
+            Said(f"patch {name}: {word}", word.finding)
             for name, checks in self.patches.items()
             for word in checks.warnings
             if word not in (checks.out_of_time, *checks.tight)

@@ -20,7 +20,7 @@ from pydantic import Field
 
 from rodshell.arrays import Floats
 from rodshell.figures import checks as figures
-from rodshell.figures.findings import Said
+from rodshell.figures.findings import Said, said
 from rodshell.figures.records import Found, key
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import end_directions, laid_below, turned
@@ -98,28 +98,24 @@ class Deployment(figures.Deployment):
     @property
     def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
-        said = list[Said]()
+        found = list[Said]()
         if self.snaps:
             where = places_text([start for start, _ in self.snaps])
-            by = max(moved or 0.0 for moved in self.snapped_by)
+            most = max(moved or 0.0 for moved in self.snapped_by)
             continues = ", and continues to its final shape" if self.reached_from_flat else ""
             other = "; a small difference can make it snap elsewhere" if len(self.snaps) > FEW else ""
-            words = f"{where} of the deployment from flat the shell snaps forward by itself, by up to {length_text(by)}"
-            said.append(Said(f"{words}{continues}{other}", "snaps", "pinned", by, unit="m"))
+            found.append(
+                said(
+                    "snaps", "pinned", most, unit="m",
+                    where=where, by=length_text(most), continues=continues, other=other,
+                )
+            )  # fmt: skip
         if self.reached_from_flat is False:
             where = "" if self.elsewhere is None else f", {self.elsewhere.words}"
-            words = (
-                f"lifted from flat and driven by its ends alone, the shell comes to rest in another shape{where}: "
-                "it has to be guided into its final shape"
-            )
-            said.append(Said(words, "guided", "pinned"))
+            found.append(said("guided", "pinned", where=where))
         if self.gap is not None:
-            words = (
-                f"the deployment could not be followed all the way: {self.gap.words}; stages are missing, and whether "
-                "the shell reaches its final shape from flat is not known"
-            )
-            said.append(Said(words, "lost", "pinned", self.lost_at, 0))
-        return tuple(said)
+            found.append(said("lost", "pinned", self.lost_at, 0, how=self.gap.words))
+        return tuple(found)
 
 
 def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress = lambda share: None) -> Deployment:

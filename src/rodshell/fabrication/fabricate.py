@@ -13,7 +13,7 @@ from rodshell.errors import InputError
 from rodshell.fabrication.cutting import nest, splices
 from rodshell.figures import fabrication as figures
 from rodshell.figures.fabrication import Brace, Piece
-from rodshell.figures.findings import Said
+from rodshell.figures.findings import Said, said
 from rodshell.figures.records import Found
 from rodshell.layout import GridMesh, Profile
 from rodshell.layout.cells import Pattern, diagonals, rim_diagonals
@@ -240,8 +240,7 @@ def _laths(
     first = next(iter(hopeless.values()))
     named = f"rod {first}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {first})"
     assert stock is not None
-    words = f"{named} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock"
-    return tuple(made), (Said(words, "not_spliced", None, stock, unit="m", place=first),)
+    return tuple(made), (said("not_spliced", None, stock, unit="m", place=first, rods=named, stock=length_text(stock)),)
 
 
 def _pieces_of(laths: tuple[Lath, ...], names: Sequence[str]) -> tuple[Piece, ...]:

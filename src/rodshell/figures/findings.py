@@ -5,6 +5,7 @@ from typing import Self
 from pydantic import Field
 
 from rodshell.figures.records import Ends, Number, Record, Rows, Text, key, rows
+from rodshell.figures.sentences import SENTENCES
 
 CODES = {
     "contact": "rods touch or cross",
@@ -65,28 +66,30 @@ class Finding(Record):
 
 
 class Said(str):
-    """A sentence that says a finding; wherever a sentence is read, this is one.
-
-    Parameters
-    ----------
-    text : the sentence; the others as of `Finding`.
-    """
+    """A sentence that says a finding; wherever a sentence is read, this is one."""
 
     finding: Finding
 
-    def __new__(
-        cls, text: str, code: str = "warning", support: Ends | None = None, figure: float | None = None,
-        limit: float | None = None, unit: str = "", place: str | None = None, offers: tuple[str, ...] = (),
-    ) -> Self:  # fmt: skip
-        assert code in CODES, code
-        finding = Finding(
-            code=code, support=support, figure=figure, limit=limit, unit=unit, place=place, offers=offers
-        )  # fmt: skip
-        return cls.of(text, finding)
+    def __new__(cls, text: str, finding: Finding = Finding(code="warning")) -> Self:
+        found = super().__new__(cls, text)
+        found.finding = finding
+        return found
 
-    @classmethod
-    def of(cls, text: str, finding: Finding) -> Self:
-        """A sentence that says this finding."""
-        said = super().__new__(cls, text)
-        said.finding = finding
-        return said
+
+def said(
+    sentence: str, support: Ends | None = None, figure: float | None = None, limit: float | None = None,
+    unit: str = "", *, place: str | None = None, offers: tuple[str, ...] = (), **words: object,
+) -> Said:  # fmt: skip
+    """A finding in the words of `SENTENCES`.
+
+    Parameters
+    ----------
+    sentence : its name there: the code, or the code and a variant.
+    support, figure, limit, unit, place, offers : see `Finding`.
+    words : that the sentence needs in addition.
+    """
+    finding = Finding(
+        code=sentence.partition(":")[0], support=support, figure=figure, limit=limit, unit=unit, place=place,
+        offers=offers,
+    )  # fmt: skip
+    return Said(SENTENCES[sentence].format(ends=support, place=place, **words), finding)

@@ -21,7 +21,7 @@ from rodshell.checks.self_weight import self_weight, shown_limit
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.figures import loads as figures
 from rodshell.figures.checks import SelfWeight
-from rodshell.figures.findings import Said
+from rodshell.figures.findings import Said, said
 from rodshell.figures.loads import Governs, Utilisations
 from rodshell.figures.records import Found
 from rodshell.formfinding import PatchForm, PopUp, pop_up
@@ -101,9 +101,9 @@ class LoadChecks:
     def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
         if self.refused:
-            return (Said(f"the loads were not checked: {self.refused}", "not_checked"),)
-        words = f"{self.stopped}; not checked: {', '.join(self.missing)}"
-        late = (Said(words, "not_checked"),) if self.stopped else ()
+            return (said("not_checked: refused", why=self.refused),)
+        missing = ", ".join(self.missing)
+        late = (said("not_checked: late", when=self.stopped, missing=missing),) if self.stopped else ()
         return (*late, *self._unjudged, *self._unjudged_bracing)
 
     @property
@@ -111,15 +111,10 @@ class LoadChecks:
         """What strength was not judged by."""
         known, wanted = self.limits.bending, {self.asked.duration(name) for name in self.asked.combinations}
         if not known:
-            words = (
-                "the design strength of the rods is not known, so that whether they break under the loads was not "
-                "judged: give strength.permanent and strength.short"
-            )
-            return (Said(words, "no_strength"),)
+            return (said("no_strength: rods"),)
         missing = [name for name in ("permanent", *sorted(wanted - {"permanent"})) if name not in known]
         if missing:
-            words = f"the design strength for {' and '.join(missing)} loads is not known and was not judged"
-            return (Said(words, "no_strength"),)
+            return (said("no_strength: durations", durations=" and ".join(missing)),)
         return ()
 
     @property
@@ -127,11 +122,7 @@ class LoadChecks:
         every = [shell for by_ends in self.shells.values() for shell in by_ends.values()]
         if all(shell.bracing_utilisation is not None or not len(shell.bracing_forces) for shell in every):
             return ()
-        words = (
-            "the design strength of the bracing is not known, so that whether it breaks under the loads was not "
-            "judged: compare its largest forces, which stand with the loads, with what it can carry"
-        )
-        return (Said(words, "no_strength", place="bracing"),)
+        return (said("no_strength: bracing", place="bracing"),)
 
 
 def check_shells(

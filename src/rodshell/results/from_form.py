@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.checks import Checks
-from rodshell.figures.findings import Said
+from rodshell.figures.findings import said
 from rodshell.figures.form import (
     Agreement,
     Drape,
@@ -161,13 +161,11 @@ def with_refinement(results: Results, found: "Refined") -> Results:
     results : of the form after it.
     """
     gates: tuple[Gate, ...] = get_args(Gate)
-    said = [] if found.changed else [Said(f"the form is not refined: {found.refused}", "not_refined", found.ends)]
+    refused = [] if found.changed else [said("not_refined", found.ends, why=found.refused)]
     if found.stopped:
-        said.append(
-            Said(f"{found.stopped}: the refinement was stopped at what it had found", "not_refined", found.ends)
-        )
+        refused.append(said("not_refined: late", found.ends, when=found.stopped))
     return results.changed(
-        warnings=(*results.warnings, *said),
+        warnings=(*results.warnings, *refused),
         refinement=Refinement.taken_from(
             found,
             before=GapBefore.taken_from(found.gap_before),

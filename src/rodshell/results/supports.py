@@ -6,7 +6,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.figures.checks import EndsInTheAir
-from rodshell.figures.findings import Said
+from rodshell.figures.findings import Said, said
 from rodshell.results.results import Results
 from rodshell.results.wording import newtons, shown_length
 
@@ -59,9 +59,7 @@ def air_findings(results: Results) -> Iterator[Said]:
     force = found.largest_force
     under = "those under the loads among them" if results.loads else "before own weight and loads act"
     against = "" if force is None else f" against forces of up to {newtons(force)} each, {under}"
-    yield Said(
-        f"{found.count} of {len(results.boundary)} rod ends lie up to {high} above the lowest: where they do not stand "
-        f"on the ground, an edge beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has "
-        "to be designed",
+    yield said(
         "ends_in_the_air", None, found.highest, 0, "m",
+        count=found.count, all=len(results.boundary), high=high, against=against,
     )  # fmt: skip
