@@ -22,6 +22,7 @@ from rodshell.figures.records import Found
 from rodshell.formfinding.finite_sections import joint_normals, joint_tangents
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.crossings import LinkerBend
+from rodshell.layout import FlatGrid
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium
@@ -126,6 +127,21 @@ class JointLoads:
     def out_of_plane_moments(self) -> Floats:
         """(c,) size of the moment about the axes in the joint's plane [N m]."""
         return np.asarray(np.linalg.norm(self.moments - self.shear_moments[:, None] * self.normals, axis=1))
+
+    def records(self, grid: FlatGrid) -> tuple[figures.JointLoad, ...]:
+        """What acts at each joint on its second rod."""
+        columns = {
+            "force": self.forces[:, 1],
+            "normal_force": self.normal_forces,
+            "shear_moment": self.shear_moments,
+            "out_of_plane_moment": self.out_of_plane_moments,
+            "scissor_deg": np.degrees(self.scissor),
+        }
+        rows = zip(grid.crossings.rods.tolist(), *(column.tolist() for column in columns.values()), strict=True)
+        return tuple(
+            figures.JointLoad(rods=(grid.rods[a].name, grid.rods[b].name), **dict(zip(columns, values, strict=True)))
+            for (a, b), *values in rows
+        )
 
 
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:

@@ -7,12 +7,12 @@ LOADS = "with {ends} ends {what} under {place}{at}{where}"
 UNLOADED = "with {ends} ends {what}{where}"
 
 SENTENCES = {
-    "contact": ("{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section) or a larger spacing"),
+    "contact": "{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section) or a larger spacing",
     "ends_in_the_air": (
         "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
         "beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has to be designed"
     ),
-    "falls": ("{alone}the shell does not stand under its own weight{bracing}: it carries only {parts}{others}{advice}"),
+    "falls": "{alone}the shell does not stand under its own weight{bracing}: it carries only {parts}{others}{advice}",
     "falls_under_loads": "with {ends} ends the shell falls under {place}: it {how} at {factor} times these loads",
     "flat": "the target is flat, nothing pops up",
     "guided": (
@@ -26,7 +26,7 @@ SENTENCES = {
     "imperfect: not followed": (
         "under {place} with {ends} ends and imperfections nothing is known above {factor} times the loads"
     ),
-    "imperfect: unloaded": ("with {ends} ends and imperfections the shell is unstable before the loads of {place} act"),
+    "imperfect: unloaded": "with {ends} ends and imperfections the shell is unstable before the loads of {place} act",
     "linear_buckling": (
         "under {place} with {ends} ends linear buckling is at {factor} times these loads: the shell carries them only "
         "in another shape, its nodes having moved by {moved}"
@@ -35,7 +35,7 @@ SENTENCES = {
         "the deployment could not be followed all the way: {how}; stages are missing, and whether the shell reaches "
         "its final shape from flat is not known"
     ),
-    "needs_bracing": ("{alone}the shell {carries} {weight} without its bracing: support it until that is in place"),
+    "needs_bracing": "{alone}the shell {carries} {weight} without its bracing: support it until that is in place",
     "no_imperfections": (
         "imperfections were not looked at, and the factors on the loads are those of the perfect shell: have them "
         "looked at ({offer})"

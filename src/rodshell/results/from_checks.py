@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.checks import Bending as BendingCheck
-from rodshell.checks import Checks, JointLoads
+from rodshell.checks import Checks
 from rodshell.checks.bending import worst
 from rodshell.fabrication import Fabricated
 from rodshell.figures.checks import (
     Bending,
     Contact,
-    JointLoad,
     WorstBent,
 )
 from rodshell.figures.form import Bent, Rod
@@ -77,7 +76,7 @@ def checked_results(
         bending=bending.changed(shear_strength=shear_strength, strength_of=None if withstood.given else strength_of),
         strength=limits.changed(erection_utilisation=erected),
         reactions=dict(checks.reactions),
-        joint_loads={ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
+        joint_loads={ends: loads.records(mesh.grid) for ends, loads in checks.joints.items()},
         self_weight=dict(checks.self_weight),
         contact=Contact(**checks.contact, **({"deployment": stage} if (stage := checks.closest_stage) else {})),
         other_shapes=dict(checks.other_shapes),
@@ -211,28 +210,3 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
         figures = withstood.worst((), [bent for _, bent in checks.stages_below_final], everywhere)
         shapes["deployment"] = WorstBent(**figures, share=share, **withstood.worst_place(worst, mesh))
     return Bending(strength=withstood.standing, erection_strength=withstood.erection, **shapes)
-
-
-def _joint_loads(mesh: GridMesh, loads: JointLoads) -> tuple[JointLoad, ...]:
-    """Of each joint, on its second rod."""
-    names = [rod.name for rod in mesh.grid.rods]
-    rows = zip(
-        mesh.grid.crossings.rods.tolist(),
-        loads.forces[:, 1].tolist(),
-        loads.normal_forces.tolist(),
-        loads.shear_moments.tolist(),
-        loads.out_of_plane_moments.tolist(),
-        np.degrees(loads.scissor).tolist(),
-        strict=True,
-    )
-    return tuple(
-        JointLoad(
-            rods=(names[a], names[b]),
-            force=force,
-            normal_force=normal,
-            shear_moment=shear,
-            out_of_plane_moment=out_of_plane,
-            scissor_deg=scissor,
-        )
-        for (a, b), force, normal, shear, out_of_plane, scissor in rows
-    )
