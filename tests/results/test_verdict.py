@@ -13,12 +13,13 @@ import pytest
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.figures.checks import EndsInTheAir
-from rodshell.figures.findings import CODES, said
+from rodshell.figures.findings import CODES, FAULTS, GOOD, RANKS, said
 from rodshell.figures.sentences import SENTENCES
 from rodshell.results import Results, Verdict
 from rodshell.results.summary import summary_text
 from rodshell.results.supports import in_the_air
-from rodshell.results.verdict import facts, verdict, verdict_of
+from rodshell.results.verdict import facts, verdict_of
+from rodshell.results.verdict import verdict as judged
 from rodshell.results.wording import rounded_down
 
 
@@ -54,6 +55,13 @@ def good() -> dict[str, Any]:
             "clamped": {"reached_from_flat": True},
         },
     }
+
+
+def verdict(results: Results) -> Verdict:
+    """The verdict, of which each test here sees that it is as grave as the gravest of its findings."""
+    found = judged(results)
+    assert found.level == max((finding.level for finding in found.findings), key=RANKS.index)
+    return found
 
 
 def changed(*changes: tuple[str, Any]) -> Results:
@@ -667,7 +675,7 @@ def test_what_checks_warn_of_is_a_finding_with_its_code() -> None:
     snaps = said("snaps", "pinned", 0.03, unit="m", where="once", by="30 mm", continues="", other="")
     found = verdict(changed().changed(warnings=(snaps, "a sentence of an earlier version")))
     assert [one.code for one in found.findings if one.code != "no_loads"] == ["snaps", "warning"]
-    assert found.findings[0] == snaps.finding
+    assert found.findings[0] == snaps.finding.changed(level="check")
     assert found.reasons[:2] == (
         "once of the deployment from flat the shell snaps forward by itself, by up to 30 mm",
         "a sentence of an earlier version",
@@ -679,6 +687,7 @@ def test_the_codes_of_findings_are_those_that_are_documented() -> None:
     text = Path(__file__).parents[2].joinpath("docs", "files.md").read_text(encoding="utf-8")
     table = text.partition("### Codes of findings")[2].partition("\n## ")[0]
     assert re.findall(r"^\| `(\w+)` \| (.*) \|$", table, re.M) == [*CODES.items()]
+    assert CODES.keys() >= GOOD | FAULTS
     said_of = {name.partition(":")[0] for name in SENTENCES}
     assert {code.removeprefix("erection_") for code in CODES} == said_of | {"warning"}
 

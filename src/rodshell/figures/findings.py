@@ -1,6 +1,6 @@
 """What is judged, as data: a code for each kind, so that scripts and sweeps need not read sentences."""
 
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field
 
@@ -53,10 +53,28 @@ CODES = {
 """What each code means."""
 
 
+Level = Literal["good", "check", "unbuildable", "unknown"]
+RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
+GOOD = frozenset({"stands", "stands_under_loads", "no_loads", "no_imperfections"})
+FAULTS = frozenset({
+    "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",
+    "too_thick", "unstable",
+})  # fmt: skip
+"""Of these a shell cannot be built; another on other supports may be."""
+
+
+def level_of(code: str) -> Level:
+    """How grave a finding is by itself."""
+    if code in GOOD:
+        return "good"
+    return "unbuildable" if code in FAULTS else "unknown" if code == "not_computed" else "check"
+
+
 class Finding(Record):
     """What one sentence of a verdict says, as data."""
 
     code: Text = Field(description="what is judged, one of the codes in docs/files.md")
+    level: Text | None = key("good, check, unbuildable or unknown: that of the verdict is the gravest of its findings'")
     support: Text | None = key("the end condition; null: of all, or of none")
     figure: Number = key("what was found, in `unit`")
     limit: Number = key("what is compared with it, in the same unit")

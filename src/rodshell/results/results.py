@@ -24,7 +24,7 @@ from rodshell.figures.checks import (
     SelfWeight,
 )
 from rodshell.figures.fabrication import Fabrication
-from rodshell.figures.findings import Finding
+from rodshell.figures.findings import Finding, Level
 from rodshell.figures.form import (
     Agreement,
     Drape,
@@ -67,8 +67,6 @@ FORMAT = "rodshell-result"
 VERSION = 2
 SIZE = 25e6  # bytes of result.json; its content takes up to a hundred times that
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
-
-Level = Literal["good", "check", "unbuildable", "unknown"]
 
 
 class Drawings(Record):

@@ -8,13 +8,13 @@ not checked, and then the result is not good.
 from collections.abc import Iterable, Iterator, Mapping
 
 from rodshell.figures.checks import Clearance, Deployment, WorstBent
-from rodshell.figures.findings import Finding, Said, said
+from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
 from rodshell.figures.form import Agreement, PopUp
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends
 from rodshell.figures.sentences import ANOTHER_WAY, SENTENCES
 from rodshell.results.own_weight import falling, is_braced, reserve, weight_findings
-from rodshell.results.results import Level, Results, Verdict
+from rodshell.results.results import Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import (
     ENDS,
@@ -125,10 +125,13 @@ def facts(results: Results) -> list[str]:
 
 
 def _verdict(level: Level, reasons: Iterable[Said]) -> Verdict:
-    """Each reason once, with what it says in figures."""
+    """Each reason once, with what it says in figures; what rules out one shell is less grave where another stands."""
     once = dict[str, Finding]()
     for each in reasons:
-        once.setdefault(str(each), each.finding)
+        finding = each.finding
+        far = finding.code == "off_target" and (finding.figure or 0.0) > FAR_OFF
+        alone = "unbuildable" if far else level_of(finding.code)
+        once.setdefault(str(each), finding.changed(level=min(alone, level, key=RANKS.index)))
     return Verdict(level=level, reasons=tuple(once), findings=tuple(once.values()))
 
 
