@@ -146,47 +146,29 @@ class Record(BaseModel):
                 yield name, value.shape if isinstance(value, np.ndarray) else value
 
 
-def key(meaning: str, unit: str = "") -> Any:
-    """A key that may be absent, with what it means and its unit.
-
-    Parameters
-    ----------
-    meaning : of the key, in words.
-    unit : of its value; "" without.
-    """
-    return Field(default=None, description=f"{meaning} [{unit}]" if unit else meaning)
+def key(meaning: str, unit: str = "", **default: Any) -> Any:
+    """A key that may be absent, with what it means and the unit of its value; null unless a `default` is given."""
+    return Field(**(default or {"default": None}), description=f"{meaning} [{unit}]" if unit else meaning)
 
 
 def required(meaning: str, *, alias: str) -> Any:
-    """A key that must be there, and that Python cannot have as a name.
-
-    Parameters
-    ----------
-    meaning : of the key, in words.
-    alias : name of the key in the file.
-    """
+    """A key that must be there, and that Python cannot have as a name, but has in the file (`alias`)."""
     return Field(alias=alias, description=meaning)
 
 
 def rows(meaning: str, unit: str = "") -> Any:
-    """A list that may be absent.
-
-    Parameters
-    ----------
-    meaning : of the list's entries, in words.
-    unit : of their values; "" without.
-    """
-    return Field(default=(), description=f"{meaning} [{unit}]" if unit else meaning)
+    """A list that may be absent."""
+    return key(meaning, unit, default=())
 
 
 def points(meaning: str, unit: str = "") -> Any:
-    """An array of points that may be absent; `meaning` and `unit` as of `rows`."""
-    return Field(default_factory=lambda: np.empty((0, 3)), description=f"{meaning} [{unit}]" if unit else meaning)
+    """An array of points that may be absent."""
+    return key(meaning, unit, default_factory=lambda: np.empty((0, 3)))
 
 
 def numbers(meaning: str, unit: str = "") -> Any:
-    """An array of numbers that may be absent; `meaning` and `unit` as of `rows`."""
-    return Field(default_factory=lambda: np.empty(0), description=f"{meaning} [{unit}]" if unit else meaning)
+    """An array of numbers that may be absent."""
+    return key(meaning, unit, default_factory=lambda: np.empty(0))
 
 
 def by_ends(meaning: str) -> Any:
