@@ -37,9 +37,16 @@ from rodshell.output.pictures import picture_svg
 from rodshell.output.viewer import frame_html, scene_of, widget_of
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results import Archive, Results, Verdict
-from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
+from rodshell.results.from_checks import (
+    checked_results,
+    checked_states,
+    final_ends,
+    judged,
+    loaded_results,
+    loaded_states,
+    sharpest,
+)
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
-from rodshell.results.from_loads import loaded_results, loaded_states
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance

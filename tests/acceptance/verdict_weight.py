@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import rodshell as rs
-from rodshell.checks import Reactions, SelfWeightCheck, reactions, self_weight
+from rodshell.checks import Reactions, SelfWeight, reactions, self_weight
 from tests.acceptance.cases import HEMISPHERE, ROD
 from tests.acceptance.rows import Row
 from tests.acceptance.targets_random import random_case
@@ -59,7 +59,7 @@ def _unloaded(case: str, twin: LoadedTwin, held: Reactions, negative_modes: int)
     yield Row(case, "negative modes apart", abs(twin.factored(twin.state)[1] - negative_modes), 0)
 
 
-def _loaded(case: str, twin: LoadedTwin, weighed: SelfWeightCheck) -> Iterator[Row]:
+def _loaded(case: str, twin: LoadedTwin, weighed: SelfWeight) -> Iterator[Row]:
     factor, at_one = twin.load_factor(accuracy=1e-3)
     note = f"{weighed.at_least:.5g} and {factor:.5g}, {weighed.limit}"
     yield Row(case, "load factors apart", abs(weighed.at_least / factor - 1), 0.01, note=note)

@@ -24,11 +24,11 @@ import numpy as np
 import pytest
 
 from rodshell.errors import OutputError, RodshellError
+from rodshell.figures.records import FARTHEST, LARGEST, MOST, SHORTEST
 from rodshell.output import save
 from rodshell.output.files import files_of
 from rodshell.results import read
 from rodshell.results.folder import RECORD, open_folder
-from rodshell.results.records import FARTHEST, LARGEST, MOST, SHORTEST
 from tests.output.sample_archive import with_everything
 
 pytestmark = pytest.mark.attack

@@ -159,16 +159,16 @@ def test_a_snap_of_little_energy_is_named_and_is_not_undone() -> None:
     _, target, layout, anchor = random_case(1)
     form = rs.find_form(target, layout, ROD, anchor=anchor, ends=("pinned",))
     way = deployed(form, 8)
-    (snap,) = way.snaps
-    stage = int(np.searchsorted(way.share, snap.start)) - 2
-    shares = np.arange(way.share[stage + 1] + 1e-3, snap.stop + 0.005, 1e-3).tolist()
+    ((start, stop),), (by,) = way.snaps, way.snapped_by
+    stage = int(np.searchsorted(way.share, start)) - 2
+    shares = np.arange(way.share[stage + 1] + 1e-3, stop + 0.005, 1e-3).tolist()
     shapes = driven(form, way, stage, [*shares, *shares[::-1]])
     ahead = moved(shapes[: len(shares) + 1])
     jump = int(np.argmax(ahead))
-    assert snap.start <= shares[jump] <= snap.stop + 1e-3
-    assert ahead[jump] == pytest.approx(snap.moved, rel=0.1)
+    assert start <= shares[jump] <= stop + 1e-3
+    assert ahead[jump] == pytest.approx(by, rel=0.1)
     assert ahead[jump] > 10 * np.sort(ahead)[-2]
-    assert np.linalg.norm(shapes[jump] - shapes[2 * len(shares) - jump + 1], axis=1).max() > 0.5 * snap.moved
+    assert np.linalg.norm(shapes[jump] - shapes[2 * len(shares) - jump + 1], axis=1).max() > 0.5 * by
 
 
 @pytest.mark.slow
@@ -179,7 +179,7 @@ def test_a_fork_next_to_flat_is_no_snap_and_is_undone() -> None:
     shapes = driven(form, way, 0, [*shares, *shares[::-1]])
     assert np.linalg.norm(shapes[30] - shapes[0], axis=1).max() > 4e-3
     np.testing.assert_allclose(shapes[-1], shapes[0], atol=1e-6)
-    assert all(snap.start > 0.1 for snap in way.snaps)
+    assert all(start > 0.1 for start, _ in way.snaps)
 
 
 @pytest.mark.slow
@@ -187,15 +187,15 @@ def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
     """From the stage before it, in steps of 1/200 down the steepest descent: it snaps there."""
     form, way = snapping()
     assert way.reached_from_flat
-    (snap,) = way.snaps
+    ((start, stop),), (by,) = way.snaps, way.snapped_by
     begin = float(way.share[-2])
     shares = [*np.linspace(begin, 0.98, 8).tolist()[1:], 0.985, 0.99, 0.995, 1.0]
     shapes = driven(form, way, len(way.shells) - 2, shares)
     jumps = list(zip(shares, moved(shapes), strict=True))
     np.testing.assert_allclose(shapes[-1], form.popped["pinned"].positions, atol=1e-6)
     share, moved_by = max(jumps[7:], key=lambda one: one[1])
-    assert snap.start <= share <= snap.stop
-    assert moved_by == pytest.approx(snap.moved, rel=0.3)  # the steps begin and end elsewhere
+    assert start <= share <= stop
+    assert moved_by == pytest.approx(by, rel=0.3)  # the steps begin and end elsewhere
     assert moved_by > 5 * jumps[7][1]
 
 

@@ -1,14 +1,14 @@
 """Contact: nearest rods against closed forms and a search over all pairs; what meets by design is no contact."""
 
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import Contact, check, contact_of
+from rodshell.checks import Clearance, check, contact_of
 from rodshell.checks.contact import (
+    APART,
     _crossing_lines,
     _Edges,
     _Outline,
@@ -82,7 +82,7 @@ def test_clearance_of_two_straight_rods_is_what_their_sections_leave(
 
 def test_rods_that_are_not_near_have_no_clearance() -> None:
     mesh, places, _ = side_by_side((0.05, 0.0))
-    assert contact(mesh, places, round_rod(5e-3)) == Contact()
+    assert contact(mesh, places, round_rod(5e-3)) == APART
 
 
 def test_ends_that_face_each_other_touch_only_when_they_meet() -> None:
@@ -264,16 +264,19 @@ def test_rods_that_leave_no_room_for_joints_are_warned_of() -> None:
 
 
 def test_rods_of_patches_are_named_with_their_patch() -> None:
-    near, far = Contact(0.01, 0, ("U1", "U2"), (0.0, 0.0, 0.0)), Contact(-0.01, 2, ("V3", "V4"), (1.0, 0.0, 0.0))
-    joined = worst_contact({"A": near, "B": far, "C": Contact()})
-    assert joined == replace(far, rods=("B-V3", "B-V4"))
-    assert worst_contact({"A": Contact()}) == Contact()
+    near, far = (
+        Clearance(clearance=0.01, pairs=0, rods=("U1", "U2"), where=(0.0, 0.0, 0.0)),
+        Clearance(clearance=-0.01, pairs=2, rods=("V3", "V4"), where=(1.0, 0.0, 0.0)),
+    )
+    joined = worst_contact({"A": near, "B": far, "C": APART})
+    assert joined == far.changed(rods=("B-V3", "B-V4"))
+    assert worst_contact({"A": APART}) == APART
 
 
 def test_a_section_without_an_outline_is_not_judged() -> None:
     mesh, places, _ = side_by_side((0.001, 0.0))
     given = {"EA": 1.0, "EI1": 1.0, "EI2": 1.0, "GJ": 1.0}
-    assert contact(mesh, places, rs.Rod(rs.GivenSection(**given))) == Contact()
+    assert contact(mesh, places, rs.Rod(rs.GivenSection(**given))) == APART
     boxed = rs.Rod(rs.GivenSection(**given, fibre_distances=(0.01, 0.02)))
     found = contact(mesh, places, boxed, directors=np.tile([0.0, 0.0, 1.0], (len(mesh.edges), 1)))
     assert found.clearance == pytest.approx(-0.02)  # the least way out is up
@@ -289,7 +292,7 @@ def test_rods_of_two_patches_that_meet_at_a_seam_are_no_contact_and_others_are()
     there = flat[1] + [0.0, 0.3, 0.0]
     there[:, 2] = 0.4 * flat[1][:, 1]  # a ridge at the seam
     met = contact_of_patches(joined, list(zip(shells, (flat[0], there), strict=True)), round_rod(5e-3))
-    assert met == Contact()
+    assert met == APART
     moved = there + [0.03, -0.05, 0.0]  # past the seam, between the others
     beside = contact_of_patches(joined, list(zip(shells, (flat[0], moved), strict=True)), round_rod(1.4e-2))
     assert beside.clearance == pytest.approx(0.03 - 0.028, abs=1e-3)
@@ -311,7 +314,7 @@ def test_rods_that_meet_at_both_their_ends_are_no_contact() -> None:
     arch[:, 1:] = height[:, None] * [-1.0, 1.0]
     other = arch * [1.0, -1.0, 1.0]
     joined = side_by_side_meshes(meshes, 0.2).mesh
-    assert contact_of_patches(joined, list(zip(shells, (arch, other), strict=True)), round_rod(5e-3)) == Contact()
+    assert contact_of_patches(joined, list(zip(shells, (arch, other), strict=True)), round_rod(5e-3)) == APART
 
 
 def test_rods_of_patches_that_cross_only_where_their_flat_grids_lie_are_a_contact() -> None:

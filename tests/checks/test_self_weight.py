@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import SelfWeightCheck, self_weight
+from rodshell.checks import SelfWeight, self_weight
 from rodshell.checks.self_weight import weakest
 from rodshell.model import Shell
 from tests.checks.shells import ROD, dome
 
 
-def found(form: rs.Form) -> SelfWeightCheck:
+def found(form: rs.Form) -> SelfWeight:
     popped = form.popped["pinned"]
     return self_weight(popped.shell, popped.equilibrium)
 
@@ -81,10 +81,11 @@ def test_heavy_joints_leave_less_to_bear():
 
 
 def test_what_is_sewn_bears_as_little_as_its_weakest_patch():
-    strong, weak = SelfWeightCheck(None, 1e-3, "none", 5), SelfWeightCheck(0.7, None, "limit point", 9)
-    assert weakest([strong, weak]) == SelfWeightCheck(0.7, None, "limit point", 14)
-    assert weakest([strong, strong]) == SelfWeightCheck(None, 1e-3, "none", 10)
-    assert weakest([strong, SelfWeightCheck(None, None, "no mass")]).limit == "no mass"
+    strong = SelfWeight(load_factor=None, deflection=1e-3, limit="none", factorizations=5)
+    weak = SelfWeight(load_factor=0.7, deflection=None, limit="limit point", factorizations=9)
+    assert weakest([strong, weak]) == weak.changed(factorizations=14)
+    assert weakest([strong, strong]) == strong.changed(factorizations=10)
+    assert weakest([strong, SelfWeight(load_factor=None, deflection=None, limit="no mass")]).limit == "no mass"
 
 
 def test_summary_and_result_say_both_kinds_of_ends():

@@ -367,7 +367,7 @@ def test_a_summary_claims_no_share_of_the_strength_that_is_not_so(tmp_path: Path
         summary_text(found.model_copy(update={"bending": bent}))
     )
     assert "thinner than any size" not in summary_text(found)
-    thin = found.rod.model_copy(update={"section": rs.results.records.Section(kind="circle", radius=0.4e-3)})
+    thin = found.rod.model_copy(update={"section": rs.figures.form.Section(kind="circle", radius=0.4e-3)})
     unsold = found.model_copy(update={"rod": thin})
     assert "; thinner than any size that is sold, the first of which is a rod of 1 mm\n" in summary_text(unsold)
     assert any(

@@ -7,11 +7,12 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks import Bending, Checks, bending
+from rodshell.checks.check import staged
 from rodshell.checks.deployment import Deployment
 from rodshell.fabrication import Fabrication, fabricate
+from rodshell.figures.form import PopUp, Rod
 from rodshell.results import Results
 from rodshell.results.from_checks import checked_results
-from rodshell.results.records import PopUp, Rod
 from rodshell.results.verdict import verdict
 from tests.checks.test_bending import on_circle, rods_of_length
 
@@ -31,8 +32,10 @@ def bent(radius: float) -> Bending:
 def checks(final: dict[str, float], way: list[float]) -> Checks:
     """Of shells whose rods lie on circles: in their final shapes, and at equal stages of the deployment."""
     share = np.linspace(0, 1, len(way))
-    deployment = Deployment(share, np.zeros((len(way), MESH.node_count, 3)), ()) if way else None
-    return Checks({ends: bent(radius) for ends, radius in final.items()}, {}, {}, deployment, tuple(map(bent, way)), {})  # type: ignore[misc]
+    stages = tuple(map(bent, way))
+    deployment = staged(Deployment(share=share, positions=np.zeros((len(way), MESH.node_count, 3))), stages)
+    shells = {ends: bent(radius) for ends, radius in final.items()}
+    return Checks(shells, {}, {}, deployment if way else None, stages, {})  # type: ignore[arg-type]
 
 
 def reasons(found: Checks, strength: float | None = STRENGTH) -> list[str]:

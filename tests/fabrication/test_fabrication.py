@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rodshell as rs
-from rodshell.fabrication import Fabrication, fabricate, nest, splices
+from rodshell.fabrication import Fabricated, Fabrication, fabricate, nest, splices
+from rodshell.figures.fabrication import Piece
 from rodshell.layout import FlatGrid, Profile, mesh_grid, straight_rods
 from rodshell.layout.flatgrid import layers
 from rodshell.layout.gridlayout import GridLayout
@@ -51,14 +52,24 @@ def fewest_bars(lengths: list[float], stock: float) -> int:
     return best
 
 
+def named(lengths: list[float]) -> list[Piece]:
+    """Pieces that are called by their number."""
+    return [Piece(piece=str(k), length=length) for k, length in enumerate(lengths)]
+
+
+def lengths_of(made: Fabricated, lath: str) -> list[float]:
+    """Of the pieces of a lath."""
+    return [piece.length for piece in made.pieces if piece.piece.partition(".")[0] == lath]
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.integers(1, 12), min_size=1, max_size=9), st.sampled_from([0.0, 0.25]))
 def test_every_piece_is_cut_once_and_no_bar_is_too_short(pieces: list[int], kerf: float) -> None:
     lengths, stock = [float(piece) for piece in pieces], 12.0
-    plan = nest(lengths, stock, kerf=kerf)
-    assert sorted(k for bar in plan.bars for k in bar.pieces) == list(range(len(lengths)))
+    plan = nest(named(lengths), stock, kerf=kerf)
+    assert sorted(int(piece.piece) for bar in plan.bars for piece in bar.pieces) == list(range(len(lengths)))
     for bar in plan.bars:
-        used = sum(lengths[k] for k in bar.pieces) + kerf * (len(bar.pieces) - 1)
+        used = sum(piece.length for piece in bar.pieces) + kerf * (len(bar.pieces) - 1)
         assert used <= stock + 1e-9
         assert bar.left == pytest.approx(max(stock - used - kerf, 0.0), abs=1e-9)
     assert plan.waste == pytest.approx(1 - sum(lengths) / (stock * len(plan.bars)))
@@ -68,8 +79,8 @@ def test_every_piece_is_cut_once_and_no_bar_is_too_short(pieces: list[int], kerf
 
 
 def test_pieces_that_fill_a_bar_to_the_last_leave_nothing() -> None:
-    plan = nest([0.1, 0.2, 0.3, 0.4], 0.5)
-    assert [bar.pieces for bar in plan.bars] == [(3, 0), (2, 1)]
+    plan = nest(named([0.1, 0.2, 0.3, 0.4]), 0.5)
+    assert [[piece.piece for piece in bar.pieces] for bar in plan.bars] == [["3", "0"], ["2", "1"]]
     assert plan.waste == pytest.approx(0.0, abs=1e-12)
     assert plan.fewest == 2
 
@@ -141,9 +152,9 @@ def test_short_pieces_are_avoided_where_that_takes_no_more_bars(rods: int, piece
         ]
     made = fabricate(mesh, ROD, Fabrication(stock_length=5.0), curvature=bend)
     for k in range(rods):
-        assert sorted(length for rod, _, _, length in made.pieces if rod == k) == pytest.approx(pieces)
-    assert made.nesting is not None
-    assert len(made.nesting.bars) == (3 if rods == 1 else 7)
+        assert sorted(lengths_of(made, mesh.grid.rods[k].name)) == pytest.approx(pieces)
+    assert made.stock is not None
+    assert len(made.stock.bars) == (3 if rods == 1 else 7)
 
 
 def test_a_rod_within_its_stock_is_not_spliced() -> None:
@@ -160,13 +171,13 @@ def test_lengths_of_the_workshop_add_up() -> None:
     np.testing.assert_allclose(made.cut_length, 0.64)
     np.testing.assert_allclose(made.mass, 0.64 * ROD.mass_per_length)
     for k, at in enumerate(made.splices):
-        pieces = [length for rod, _, _, length in made.pieces if rod == k]
+        pieces = lengths_of(made, mesh.grid.rods[k].name)
         assert len(pieces) == len(at) + 1 == 2
         assert sum(pieces) == pytest.approx(0.64)
         assert pieces[0] == pytest.approx(0.02 + at[0])  # splices are measured from the rod's start, not its cut end
         mine = mesh.grid.crossings.at[mesh.grid.crossings.rods == k] - mesh.grid.rods[k].start
         assert np.abs(mine - at[0]).min() == pytest.approx(0.05)
-    assert made.nesting is not None
+    assert made.stock is not None
     assert made.warnings == ()
 
 
@@ -174,17 +185,19 @@ def test_second_laths_are_cut_from_stock_too_and_spliced_elsewhere_than_the_firs
     mesh = mesh_grid(lattice(), 0.05).with_profiles(Profile.double(0.75))
     made = fabricate(mesh, ROD, Fabrication(end_allowance=0.02, stock_length=0.4, kerf=0.003))
     assert made.warnings == ()
-    assert made.mass.sum() == pytest.approx(ROD.mass_per_length * sum(length for *_, length in made.pieces))
+    assert made.mass.sum() == pytest.approx(ROD.mass_per_length * sum(piece.length for piece in made.pieces))
     for k, rod in enumerate(mesh.grid.rods):
         first, second = (lath for lath in made.laths if lath.rod == k)
         assert (second.start, second.stop) == pytest.approx((0.075, 0.525))
-        assert sum(length for r, lath, _, length in made.pieces if (r, lath) == (k, 2)) == pytest.approx(0.45)
+        assert sum(lengths_of(made, f"{rod.name}-2")) == pytest.approx(0.45)
         joints = mesh.grid.crossings.at[mesh.grid.crossings.rods == k] - rod.start
         (place,) = second.splices
         assert np.abs(joints - place).min() == pytest.approx(0.05)  # halfway between two joints
         assert abs(place - first.splices[0]) > 0.09
-    assert made.nesting is not None
-    assert sorted(k for bar in made.nesting.bars for k in bar.pieces) == list(range(len(made.pieces)))
+    assert made.stock is not None
+    assert sorted(piece.piece for bar in made.stock.bars for piece in bar.pieces) == sorted(
+        piece.piece for piece in made.pieces
+    )
 
 
 def test_laths_that_reach_the_rods_ends_have_their_allowances() -> None:
@@ -197,13 +210,13 @@ def test_a_second_lath_that_cannot_be_spliced_is_named() -> None:
         straight_rods([[[0.0, 0.0], [1.0, 0.0]], [[0.4, -0.1], [0.4, 0.1]], [[0.6, -0.1], [0.6, 0.1]]]), 0.05
     )
     made = fabricate(mesh.with_profiles((Profile.double(0.7), None, None)), ROD, Fabrication(stock_length=0.55))
-    assert made.nesting is None
+    assert made.stock is None
     assert "(lath 2) cannot be spliced between joints from stock of 550 mm" in made.warnings[0]
 
 
 def test_stock_that_is_too_short_is_said() -> None:
     made = fabricate(mesh_grid(lattice(), 0.05), ROD, Fabrication(stock_length=0.08))
-    assert made.nesting is None
+    assert made.stock is None
     assert made.warnings[0].startswith("9 rods (the first: U01) cannot be spliced between joints from stock of 80 mm")
 
 

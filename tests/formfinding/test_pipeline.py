@@ -12,11 +12,11 @@ import pytest
 
 import rodshell as rs
 from rodshell.errors import InputError
+from rodshell.figures.records import json_text
 from rodshell.formfinding import bound_drape, pipeline
 from rodshell.formfinding.finite_sections import section_rotation
 from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.results import read
-from rodshell.results.records import json_text
 from rodshell.results.verdict import verdict
 from rodshell.solve.equilibrium import Status
 from tests.formfinding.altered import with_report

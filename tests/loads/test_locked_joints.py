@@ -148,7 +148,7 @@ def test_the_stress_at_a_locked_joint_is_that_of_the_whole_moment_of_the_corner(
     end = load_path(locked.equilibrium, load, most=1.0).at(1.0)
     assert end is not None
     found = utilisation(
-        locked.shell_at(end), end.state, TUBE, forces=end.forces, limits=Limits(bending={"short": strength}),
+        locked.shell_at(end), end.state, TUBE, forces=end.forces, limits=Limits(short=strength),
         asked=rs.Strength(), duration="short", moments=locked.locked_moments(end), slip_moment=0.2,
     )  # fmt: skip
     moment = SIDE / 4  # of the unit force, at each of four corners

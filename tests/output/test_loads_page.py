@@ -6,9 +6,9 @@ from functools import cache
 import pytest
 
 import rodshell as rs
+from rodshell.figures.loads import LoadedShell
 from rodshell.output.loads_page import _stability, loads_page
 from rodshell.results import Archive
-from rodshell.results.loaded import LoadedShell
 from rodshell.results.summary import summary_text
 
 CASE = {

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from rodshell.errors import InputError
+from rodshell.figures.form import Section, Stiffness
 from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.grid import joints_of, rods_of
 from rodshell.output.models import section_outline, swept, widths_along
-from rodshell.results.records import Section, Stiffness
 from tests.output.forms import archive, wished
 
 RADIUS = 1e-3  # m, of the rods

@@ -12,6 +12,8 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks import Deployment
+from rodshell.figures.checks import Bending, WorstBent
+from rodshell.figures.form import Layout, Material, Target
 from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.report import checks_table, key_figures
@@ -19,11 +21,8 @@ from rodshell.output.viewer import Scene, scene_of
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
 from rodshell.results.from_form import rod_type
-from rodshell.results.records import Layout, Material, Target
-from rodshell.results.results import Bending, WorstBent
 from rodshell.results.verdict import facts
 from rodshell.results.wording import Rounding
-from rodshell.solve.path import Snap
 from tests.acceptance.cases import ROD
 from tests.output.browser import SCALE, coloured, needs_browser, open_report, wrong_legends
 from tests.output.forms import TARGETS, archive, breaking, wished
@@ -231,8 +230,8 @@ def test_the_verdict_comes_first_with_its_colour_and_all_reasons(level: str, tmp
 
 def test_warnings_are_reasons_and_stand_once(tmp_path: Path) -> None:
     made = archive("dome")
-    snaps = (Snap(0.14, 0.15, 0.03),)
-    way = Deployment(np.zeros(1), np.zeros((1, 1, 3)), (), snaps, reached_from_flat=True)
+    flat = {"share": np.zeros(1), "positions": np.zeros((1, 1, 3))}
+    way = Deployment(**flat, snaps=((0.14, 0.15),), snapped_by=(0.03,), reached_from_flat=True)
     (words,) = way.warnings
     result = {key: value for key, value in made.results.plain().items() if key != "verdict"} | {"warnings": [words]}
     page = page_of(replace(made, results=Results.of(result)), tmp_path).read_text()

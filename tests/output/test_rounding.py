@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rodshell.figures.form import Rod
 from rodshell.output.schedules import heading
 from rodshell.results import Results
-from rodshell.results.records import Rod
 from rodshell.results.results import Drawings
 from rodshell.results.wording import rounding_of
 

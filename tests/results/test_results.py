@@ -14,9 +14,9 @@ from pydantic import BaseModel
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import OutputError
+from rodshell.figures.records import Record
 from rodshell.output import save
 from rodshell.results import Archive, Results, read
-from rodshell.results.records import Record
 from rodshell.results.results import VERSION, json_schema
 from tests.output.forms import formed, wished
 from tests.output.sample_archive import sample_archive, table_archive, with_deployment

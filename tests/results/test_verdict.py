@@ -1,20 +1,25 @@
 """The verdict as a function of the figures: what makes a result good, what has to be checked, what cannot be built."""
 
+import ast
+import pickle
 import re
 from copy import deepcopy
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
 import pytest
 
 import rodshell as rs
 from rodshell.errors import InputError
+from rodshell.figures.checks import EndsInTheAir
+from rodshell.figures.findings import CODES, FAULTS, GOOD, RANKS, said
+from rodshell.figures.sentences import SENTENCES
 from rodshell.results import Results, Verdict
-from rodshell.results.findings import CODES
-from rodshell.results.results import EndsInTheAir
 from rodshell.results.summary import summary_text
 from rodshell.results.supports import in_the_air
-from rodshell.results.verdict import facts, verdict, verdict_of
+from rodshell.results.verdict import facts, verdict_of
+from rodshell.results.verdict import verdict as judged
 from rodshell.results.wording import rounded_down
 
 
@@ -50,6 +55,13 @@ def good() -> dict[str, Any]:
             "clamped": {"reached_from_flat": True},
         },
     }
+
+
+def verdict(results: Results) -> Verdict:
+    """The verdict, of which each test here sees that it is as grave as the gravest of its findings."""
+    found = judged(results)
+    assert found.level == max((finding.level for finding in found.findings), key=RANKS.index)
+    return found
 
 
 def changed(*changes: tuple[str, Any]) -> Results:
@@ -364,8 +376,8 @@ def test_a_weight_that_one_shell_carries_does_not_lead_before_what_both_suffer()
 
 
 def test_almost_its_own_weight_is_not_all_of_it() -> None:
-    for factor, said in ((0.994, "99 %"), (0.996, "99.6 %"), (0.99999, "99.9 %")):
-        assert f"carries only {said} of it" in verdict(changed(("self_weight.pinned.load_factor", factor))).headline
+    for factor, part in ((0.994, "99 %"), (0.996, "99.6 %"), (0.99999, "99.9 %")):
+        assert f"carries only {part} of it" in verdict(changed(("self_weight.pinned.load_factor", factor))).headline
 
 
 def test_what_is_too_much_before_loads_act_is_not_blamed_on_them() -> None:
@@ -401,11 +413,13 @@ def test_what_is_too_much_before_loads_act_is_not_blamed_on_them() -> None:
 
 
 def test_of_a_section_that_was_chosen_the_verdict_says_to_give_another() -> None:
-    for chosen, said in (({"section": True}, True), ({"material": True}, False)):
+    for chosen, is_said in (({"section": True}, True), ({"material": True}, False)):
         used = ("bending.pinned.utilisation", 1.27), ("bending.pinned.rod", "U03"), ("bending.pinned.at", 1.0)
         found = verdict(changed(*used, ("rod", {"chosen": chosen}), ("bending.deployment.utilisation", 0.9)))
         (reason,) = [reason for reason in found.reasons if "127 %" in reason]
-        assert reason.endswith(": the section that was chosen is too thick; give a thinner one (rod.section)") == said
+        assert (
+            reason.endswith(": the section that was chosen is too thick; give a thinner one (rod.section)") == is_said
+        )
 
 
 @pytest.mark.parametrize(("bracing", "by"), [([], "slip"), ([10.0], "bending")])
@@ -657,11 +671,38 @@ def test_each_sentence_of_a_verdict_is_a_finding_with_its_figures() -> None:
     assert (short.support, short.figure, short.limit) == ("pinned", 1.2, 1.5)
 
 
+def test_what_checks_warn_of_is_a_finding_with_its_code() -> None:
+    snaps = said("snaps", "pinned", 0.03, unit="m", where="once", by="30 mm", continues="", other="")
+    found = verdict(changed().changed(warnings=(snaps, "a sentence of an earlier version")))
+    assert [one.code for one in found.findings if one.code != "no_loads"] == ["snaps", "warning"]
+    assert found.findings[0] == snaps.finding.changed(level="check")
+    assert found.reasons[:2] == (
+        "once of the deployment from flat the shell snaps forward by itself, by up to 30 mm",
+        "a sentence of an earlier version",
+    )
+    assert pickle.loads(pickle.dumps(snaps)).finding == snaps.finding
+
+
 def test_the_codes_of_findings_are_those_that_are_documented() -> None:
     text = Path(__file__).parents[2].joinpath("docs", "files.md").read_text(encoding="utf-8")
     table = text.partition("### Codes of findings")[2].partition("\n## ")[0]
     assert re.findall(r"^\| `(\w+)` \| (.*) \|$", table, re.M) == [*CODES.items()]
-    source = "".join(
-        path.read_text(encoding="utf-8") for path in Path(rs.__file__).parent.joinpath("results").glob("*.py")
-    )
-    assert {code for code in CODES if f'"{code.removeprefix("erection_")}"' not in source} == set()
+    assert CODES.keys() >= GOOD | FAULTS
+    said_of = {name.partition(":")[0] for name in SENTENCES}
+    assert {code.removeprefix("erection_") for code in CODES} == said_of | {"warning"}
+
+
+def test_every_sentence_is_said_with_all_its_words() -> None:
+    """Where the sentence is chosen before, its words are those of all that may be chosen there."""
+    named = set[str]()
+    for path in Path(rs.__file__).parent.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for call in ast.walk(tree):
+            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "said":
+                inside = {node.value for node in ast.walk(call.args[0]) if isinstance(node, ast.Constant)}
+                words = {keyword.arg for keyword in call.keywords} | {"ends", "place"}
+                for name in inside & {*SENTENCES}:
+                    assert {field for _, field, _, _ in Formatter().parse(SENTENCES[name]) if field} <= words, name
+        if path.name not in ("findings.py", "sentences.py"):
+            named |= {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)} & {*SENTENCES}
+    assert named == {*SENTENCES}

@@ -12,7 +12,7 @@ import rodshell as rs
 from rodshell.cli import main
 from rodshell.sweeps.asktell import AskTell
 from rodshell.sweeps.axes import drawn_shares
-from rodshell.sweeps.search_plan import read_search
+from rodshell.sweeps.search_plan import FAR, read_search
 from tests.sweeps.test_sweep import BASE
 
 BOUNDS = np.zeros(2), np.ones(2)
@@ -112,6 +112,14 @@ def test_no_design_may_keep_the_constraints(tmp_path: Path, capsys: pytest.Captu
     assert "NO DESIGN keeps all constraints" in capsys.readouterr().out
 
 
+def test_a_constraint_on_findings_counts_those_that_are_there():
+    constraints = {"findings": {"without": ["strength", "contact"]}, "verdict": ["good", "check"]}
+    of_findings, of_verdict = read_search(plan(constraints=constraints)).constraints
+    cells = ("", "stands no_loads", "strength stands", "contact strength", "strength_under_loads", None)
+    assert [of_findings.violation(cell) for cell in cells] == [0, 0, 1, 2, 0, FAR]
+    assert of_verdict.violation("check") == 0
+
+
 def test_the_example_is_valid():
     plan = read_search(Path(__file__).parents[2] / "examples" / "optimise.toml")
     assert plan.keys == ("generation", "layout.spacing", "layout.rods")
@@ -131,6 +139,9 @@ def test_the_example_is_valid():
         ({"constraints": {"min_angle_deg": 30}}, "{ min = 30 }"),
         ({"constraints": {"min_angle_deg": {"least": 30}}}, "unknown key"),
         ({"constraints": {"min_angle_deg": {"min": "30 deg"}}}, "number in SI"),
+        ({"constraints": {"findings": ["strength"]}}, r"give { without = \["),
+        ({"constraints": {"findings": {"without": ["strengths"]}}}, 'did you mean "strength"'),
+        ({"run": {"without": ["strength"]}}, "a search has constraints"),
         ({"search": {"population": 2}}, "at least 4"),
         ({"search": {"seeds": 2}}, "did you mean seed"),
         ({"run": {"best": "rms_pinned"}}, "leave it out"),

@@ -13,10 +13,19 @@ import pytest
 import rodshell as rs
 from rodshell.sweeps.columns import read_column
 from rodshell.sweeps.identity import job_identity
+from rodshell.sweeps.plan import Settings
+from rodshell.sweeps.run import best_jobs
 from rodshell.sweeps.store import FOUND, STORE, Store
 from rodshell.sweeps.table import CSV, Table, header_notes
 
-ROW = {"verdict": "good", "status": "converged", "rms_pinned": 0.0125, "seconds": 0.1, "results": {"rods": 26}}
+ROW = {
+    "verdict": "good",
+    "status": "converged",
+    "findings": "stands no_loads",
+    "rms_pinned": 0.0125,
+    "seconds": 0.1,
+    "results": {"rods": 26},
+}
 
 
 def identity(job: rs.Job, until: str = "fabrication") -> str:
@@ -149,7 +158,16 @@ def test_the_table_has_a_row_for_each_finished_design_in_order(tmp_path: Path):
         Table(store).write()
     with (tmp_path / CSV).open() as stream:
         head, *rows = csv.reader(stream)
-    standard = ["verdict", "status", "rms_pinned", "rms_clamped", "min_angle_deg", "total_length", "seconds"]
+    standard = [
+        "verdict",
+        "status",
+        "findings",
+        "rms_pinned",
+        "rms_clamped",
+        "min_angle_deg",
+        "total_length",
+        "seconds",
+    ]
     assert head == ["layout.spacing", "joint.kind", *standard, "rods", "job"]
     assert [row[:4] for row in rows] == [
         ["0.03", "ball", "good", "converged"],
@@ -186,3 +204,16 @@ def test_a_folder_without_a_sweep_or_with_a_broken_one_is_refused(tmp_path: Path
     (tmp_path / "a file").write_text("")
     with pytest.raises(rs.OutputError, match="cannot write"):
         Store(tmp_path / "a file" / "out", writing=True).__enter__()
+
+
+def test_the_best_design_has_none_of_the_findings_that_are_not_wanted(tmp_path: Path):
+    found = {"near": (0.01, "strength too_thick"), "far": (0.03, "off_target"), "between": (0.02, "contact strength")}
+    with Store(tmp_path, writing=True) as store:
+        store.plan([([k], job) for k, job in enumerate([*found, "old"])], notes=header_notes(["layout.rotate"], []))
+        for job, (rms, codes) in found.items():
+            store.record(job, FOUND, ROW | {"verdict": "check", "rms_pinned": rms, "findings": codes})
+        store.record("old", FOUND, ROW | {"rms_pinned": 0.0, "findings": None})  # nothing was judged
+        assert best_jobs(store, Settings()) == ["old", "near", "between", "far"]
+        assert best_jobs(store, Settings(without=("strength",))) == ["far"]
+        assert best_jobs(store, Settings(without=("too_thick", "contact"))) == ["far"]
+        assert best_jobs(store, Settings(without=("too_thick",))) == ["between", "far"]

@@ -17,6 +17,7 @@ import pytest
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.sweeps import watched
+from rodshell.sweeps.plan import read_plan
 from rodshell.sweeps.store import Store
 from rodshell.sweeps.table import CSV
 
@@ -76,6 +77,19 @@ def test_a_changed_sweep_computes_only_what_is_new(whole: Path):
 
 
 @pytest.mark.slow
+def test_the_table_says_in_codes_what_the_verdict_of_a_single_run_says(tmp_path: Path):
+    rs.sweep(plan(axes={"layout.spacing": ["80 mm"]}, run={"until": "fabrication"}), tmp_path)
+    (row,) = rows_of(tmp_path)
+    form = rs.Job.load(BASE, {"layout.spacing": 0.08}).run()
+    assert row["verdict"] == form.verdict.level
+    assert row["findings"].split() == list(dict.fromkeys(found.code for found in form.verdict.findings))
+
+
+def test_no_findings_are_selected_where_no_verdict_is_made():
+    with pytest.raises(rs.InputError, match=r"run\.without needs the verdict"):
+        read_plan(plan(run={"without": ["strength"]}))
+
+
 def test_the_best_form_is_kept_and_follows_the_sweep(tmp_path: Path):
     axes = {"layout.spacing": ["80 mm", "75 mm"]}
     rs.sweep(plan(axes=axes, run={"keep": "best"}), tmp_path)

@@ -11,8 +11,8 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.figures.form import Stiffness
 from rodshell.layout import FlatGrid, Profile, straight_rods
-from rodshell.results.records import Stiffness
 from rodshell.units import length_text, parse_quantity, read_unit, shown
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import instance, positive

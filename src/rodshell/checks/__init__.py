@@ -2,23 +2,23 @@
 
 from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check
-from rodshell.checks.contact import Contact, contact_of
-from rodshell.checks.deployment import Deployment, Elsewhere, deploy
-from rodshell.checks.other_shapes import OtherShape, OtherShapes, other_shapes
+from rodshell.checks.contact import contact_of
+from rodshell.checks.deployment import Deployment, OtherShape, deploy
+from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import SelfWeightCheck, self_weight
+from rodshell.checks.self_weight import self_weight
+from rodshell.figures.checks import Clearance, SelfWeight
 
 __all__ = [
     "Bending",
     "Checks",
-    "Contact",
+    "Clearance",
     "Deployment",
-    "Elsewhere",
     "JointLoads",
     "OtherShape",
     "OtherShapes",
     "Reactions",
-    "SelfWeightCheck",
+    "SelfWeight",
     "bending",
     "bending_of",
     "check",

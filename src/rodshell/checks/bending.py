@@ -25,6 +25,7 @@ Where a section changes along its rod, its fibres are as far from the axis as th
 outline in the pattern of the unchanged section, up to the largest stress of the changed one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 
@@ -260,6 +261,25 @@ class Bending:
     def bending_strain(self) -> Floats | None:
         """(k,) of the outermost fibre, without the axial strain."""
         return None if self.strain is None else np.asarray(self.strain - np.abs(self.axial_strain))
+
+
+PARTS = {
+    "max_bending_strain": "bending_strain",
+    "normal_curvature": "normal_curvature",
+    "geodesic_curvature": "geodesic_curvature",
+    "twist_rate": "twist_rate",
+    "torsion_stress": "torsion_stress",
+}
+
+
+def worst(shapes: Sequence[Bending], where: slice = slice(None)) -> dict[str, float | None]:
+    """The figures of a `Bent`, each the largest over a part of the rods' nodes in any of the shapes."""
+    sharp = max(float(shape.curvature[where].max()) for shape in shapes)
+    figures: dict[str, float | None] = {"min_radius": 1 / sharp if sharp > 0 else None}
+    for key, name in {"max_strain": "strain", "max_stress": "stress", **PARTS}.items():
+        parts = [part[where] for shape in shapes if (part := getattr(shape, name)) is not None]
+        figures[key] = max((float(np.abs(part).max()) for part in parts), default=None)
+    return figures
 
 
 def bending_of(

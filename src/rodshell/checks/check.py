@@ -8,13 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.checks.bending import VON_MISES, Bending, bending, bending_of, shell_normals
-from rodshell.checks.contact import Contact, contact, contact_of, worst_contact
+from rodshell.checks.bending import VON_MISES, Bending, bending, bending_of, shell_normals, worst
+from rodshell.checks.contact import contact, contact_of, worst_contact
 from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
-from rodshell.checks.other_shapes import OtherShapes, other_shapes
+from rodshell.checks.other_shapes import OtherShapes, other_shapes, searched
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import SelfWeightCheck, self_weight, weakest
+from rodshell.checks.self_weight import self_weight, weakest
 from rodshell.errors import OutOfTimeError
+from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, Stage
+from rodshell.figures.findings import Said, said
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.model.shell import UP
@@ -41,8 +43,8 @@ class ShellChecks:
     bending: Bending
     reactions: Reactions
     joints: JointLoads
-    contact: Contact
-    self_weight: SelfWeightCheck | None
+    contact: Clearance
+    self_weight: SelfWeight | None
     other_shapes: OtherShapes | None
 
     __repr__ = brief
@@ -59,8 +61,6 @@ class Checks:
     self_weight : by end condition, what share of its own weight the shell carries.
     contact : by end condition; `deployment_contact` of the deployment's stages.
     other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
-    clamped_from_flat : whether the pinned shell, reached from flat, comes to the clamped shape when its ends are
-        turned into their clamps; None where that is not known.
     stopped, missing : when the time limit came, or "", and which checks were not reached.
     """
 
@@ -69,11 +69,10 @@ class Checks:
     joints: dict[Ends, JointLoads]
     deployment: Deployment | None = None
     deployment_bending: tuple[Bending, ...] = ()
-    self_weight: dict[Ends, SelfWeightCheck] = field(default_factory=dict)
-    contact: dict[Ends, Contact] = field(default_factory=dict)
-    deployment_contact: tuple[Contact, ...] = ()
+    self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
+    contact: dict[Ends, Clearance] = field(default_factory=dict)
+    deployment_contact: tuple[Clearance, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
-    clamped_from_flat: bool | None = None
     stopped: str = ""
     missing: tuple[str, ...] = ()
 
@@ -104,19 +103,28 @@ class Checks:
         )
 
     @property
-    def out_of_time(self) -> str:
-        """A sentence on when that was and which checks are missing, or ""."""
-        return f"{self.stopped}; not checked: {', '.join(self.missing)}" if self.stopped else ""
+    def clamped_from_flat(self) -> bool | None:
+        """Whether the pinned shell, reached from flat, comes to the clamped shape when its ends are turned into their
+        clamps; None where that is not known."""
+        return self.deployment.clamped.reached_from_flat if self.deployment and self.deployment.clamped else None
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def out_of_time(self) -> str:
+        """A sentence on when that was and which checks are missing, or ""."""
+        return "".join(self._late)
+
+    @property
+    def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
-        late = (self.out_of_time,) if self.out_of_time else ()
-        turned: tuple[str, ...] = ()
+        turned: tuple[Said, ...] = ()
         if self.clamped_from_flat is False:
-            turned = ("turned into their clamps after deployment, the ends lead to another than the clamped shape",)
-        return (*late, *way, *turned, *self.tight)
+            turned = (said("turned", "clamped"),)
+        return (*self._late, *way, *turned, *self.tight)
+
+    @property
+    def _late(self) -> tuple[Said, ...]:
+        return (said("not_checked: late", when=self.stopped, missing=", ".join(self.missing)),) if self.stopped else ()
 
     @property
     def stages_below_final(self) -> tuple[tuple[float, Bending], ...]:
@@ -125,20 +133,23 @@ class Checks:
         return tuple((share, bent) for share, bent in zip(shares, self.deployment_bending, strict=True) if share < 1)
 
     @property
-    def closest_stage(self) -> tuple[float, Contact] | None:
-        """The stage below the final shape in which rods are nearest, by its share; None where nothing was checked."""
+    def closest_stage(self) -> Clearance | None:
+        """The stage below the final shape in which rods are nearest; None where nothing was checked."""
         if self.deployment is None or not self.deployment_contact:
             return None
-        pairs = zip(self.deployment.share.tolist()[:-1], self.deployment_contact[:-1], strict=True)
-        return min(pairs, key=lambda pair: inf if pair[1].clearance is None else pair[1].clearance)
+        stages = zip(self.deployment.share.tolist()[:-1], self.deployment_contact[:-1], strict=True)
+        found = [stage.changed(share=share) for share, stage in stages]
+        return min(found, key=lambda stage: inf if stage.clearance is None else stage.clearance)
 
     @property
-    def tight(self) -> tuple[str, ...]:
+    def tight(self) -> tuple[Said, ...]:
         """A sentence where rods that do not touch come so near to each other that there is no room for joints."""
         shapes = [(found, f"with {ends} ends") for ends, found in self.contact.items()]
         if (nearest := self.closest_stage) is not None:
-            share, found = nearest
-            shapes.append((found, f"during deployment (stage at {100 * share:.0f} %)" if share else "in the flat grid"))
+            share = nearest.share
+            shapes.append(
+                (nearest, f"during deployment (stage at {100 * share:.0f} %)" if share else "in the flat grid")
+            )
         near = [(found, where) for found, where in shapes if found.clearance is not None]
         if not near or any(found.pairs for found, _ in near):
             return ()
@@ -147,22 +158,17 @@ class Checks:
         assert worst.rods is not None
         assert worst.where is not None
         who = f"rods {worst.rods[0]} and {worst.rods[1]}" if worst.rods[0] != worst.rods[1] else f"rod {worst.rods[0]}"
-        return (
-            f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near "
-            f"({worst.where[0]:.4g}, {worst.where[1]:.4g}, {worst.where[2]:.4g}) m: that leaves hardly any room for "
-            "joints; use thinner rods (rod.section) or a larger spacing",
-        )
+        room, near_to = length_text(worst.clearance), ", ".join(f"{x:.4g}" for x in worst.where)
+        where = f"{where}, near ({near_to}) m"
+        return (said("no_room", None, worst.clearance, unit="m", place=worst.rods[0], who=who, room=room, where=where),)
 
-    def shear_unknown(self, strength: float | None) -> tuple[str, ...]:
+    def shear_unknown(self, strength: float | None) -> tuple[Said, ...]:
         """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
         parts = [bent.torsion_stress for bent in (*self.bending.values(), *self.deployment_bending)]
         sheared = max((float(part.max()) for part in parts if part is not None), default=0.0)
         if strength is None or sheared <= WORTH * strength:
             return ()
-        return (
-            f"torsion shears the rods by up to {stress_text(sheared)}, counted by von Mises as in isotropic "
-            "materials; timber and fibre composites withstand less shear along the fibres: give checks.shear_strength",
-        )
+        return (said("no_shear_strength", None, sheared, unit="Pa", stress=stress_text(sheared)),)
 
 
 def check(
@@ -206,16 +212,26 @@ def check(
         return checks
     mesh, flat, shells = done["pinned"].footprint.mesh, checks.deployment.positions[0], checks.deployment.shells
     directors = np.tile(UP, (len(mesh.edges), 1))
+    bent = (
+        bending(mesh, flat, rod, normals=shell_normals(mesh, flat)),
+        *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in shells),
+    )
     return replace(
         checks,
-        deployment_bending=(
-            bending(mesh, flat, rod, normals=shell_normals(mesh, flat)),
-            *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in shells),
-        ),
+        deployment=staged(checks.deployment, bent),
+        deployment_bending=bent,
         deployment_contact=(
             contact(mesh, flat[mesh.rod_nodes], rod, directors=directors),
             *(contact_of(*stage, rod) for stage in shells),
         ),
+    )
+
+
+def staged(deployment: Deployment, bent: Sequence[Bending]) -> Deployment:
+    """A deployment whose stages have their worst bending, of which `bent` is one each."""
+    stages = zip(deployment.share.tolist(), deployment.positions, bent, strict=True)
+    return deployment.changed(
+        stages=tuple(Stage(share=at, height=float(np.ptp(there[:, 2])), **worst([each])) for at, there, each in stages)
     )
 
 
@@ -232,7 +248,7 @@ def _long_checks(
     """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
     follow = "pinned" in done and stages > 0
     deployment, turned, stopped = None, None, ""
-    weighed, others = dict[Ends, SelfWeightCheck](), dict[Ends, OtherShapes]()
+    weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
     missing = [f"self-weight with {ends} ends" for ends in done]
     missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
     try:
@@ -246,7 +262,7 @@ def _long_checks(
                 progress("deployment", "turning the ends into their clamps", 0.0)
                 turned = reached_by_turning(popped["pinned"], popped["clamped"])
             missing.pop(0)
-        weighing = sum(weight.factorizations for weight in weighed.values())
+        weighing = sum(weight.factorizations or 0 for weight in weighed.values())
         for ends, search in _other_shapes(popped, done, deployment, weighing, progress):
             others[ends] = search
         missing.pop(0)
@@ -254,8 +270,7 @@ def _long_checks(
         stopped = str(error)
     return {
         "self_weight": weighed,
-        "deployment": deployment,
-        "clamped_from_flat": turned,
+        "deployment": deployment and deployment.changed(clamped=ClampedDeployment(reached_from_flat=turned)),
         "other_shapes": others,
         "stopped": stopped,
         "missing": tuple(missing),
@@ -271,7 +286,7 @@ def _other_shapes(
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
     work = weighing + sum(shape.report.factorizations for shape in popped.values())
-    left = (work + (0 if deployment is None else deployment.factorizations)) // 2
+    left = (work + (deployment.factorizations or 0 if deployment else 0)) // 2
     stable = {ends: shape for ends, shape in done.items() if shape.report.stable}
     for number, (ends, shape) in enumerate(stable.items()):
         most = 2 * left // 3 if number == 0 else left
@@ -316,18 +331,17 @@ class MergedChecks(Checks):
     patches: Mapping[str, Checks] = field(kw_only=True)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Said, ...]:
         words = [
-            f"patch {name}: {word}"
+            Said(f"patch {name}: {word}", word.finding)
             for name, checks in self.patches.items()
             for word in checks.warnings
             if word not in (checks.out_of_time, *checks.tight)
         ]
-        late = (self.out_of_time,) if self.out_of_time else ()
-        return (*late, *words, *self.tight)
+        return (*self._late, *words, *self.tight)
 
 
-def merged_checks(patches: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> MergedChecks:
+def merged_checks(patches: Mapping[str, Checks], contacts: Mapping[Ends, Clearance]) -> MergedChecks:
     """Checks of patches that share no rod: the results that all of them have, one patch after the other.
 
     The deployment has the stages that every patch was followed through. Each patch carries its own weight by itself,
@@ -350,7 +364,7 @@ def merged_checks(patches: Mapping[str, Checks], contacts: Mapping[Ends, Contact
     deployed = all(part.deployment is not None for part in parts)
     return MergedChecks(
         bending=stacked("bending"),
-        reactions=stacked("reactions"),
+        reactions={end: Reactions.merged([part.reactions[end] for part in parts]) for end in ends},
         joints=stacked("joints"),
         self_weight={end: weakest([part.self_weight[end] for part in parts]) for end in known("self_weight")},
         contact={end: contacts[end] for end in ends},
@@ -373,16 +387,16 @@ def _merged_deployment(patches: Mapping[str, Checks]) -> dict[str, Any]:
         name: [part.deployment_contact[row] for row in of_patch]
         for (name, part), of_patch in zip(patches.items(), rows, strict=True)
     }
+    bent = tuple(
+        _stacked([part.deployment_bending[of_patch[k]] for part, of_patch in zip(parts, rows, strict=True)])
+        for k in range(len(shares))
+    )
     return {
-        "deployment": _merged_stages(ways, rows),
-        "deployment_bending": tuple(
-            _stacked([part.deployment_bending[of_patch[k]] for part, of_patch in zip(parts, rows, strict=True)])
-            for k in range(len(shares))
-        ),
+        "deployment": staged(_merged_stages(ways, rows), bent),
+        "deployment_bending": bent,
         "deployment_contact": tuple(
             worst_contact({name: stages[k] for name, stages in contacts.items()}) for k in range(len(shares))
         ),
-        "clamped_from_flat": _all([part.clamped_from_flat for part in parts]),
     }
 
 
@@ -390,17 +404,21 @@ def _merged_stages(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Dep
     """The deployments of several patches at the shares that all reached, their `rows`."""
     lost = [way.lost_at for way in ways if way.lost_at is not None]
     elsewhere = [way.elsewhere for way in ways if way.elsewhere is not None]
+    snaps = sorted({snap for way in ways for snap in zip(way.snaps, way.snapped_by, strict=True)})
+    turned = [way.clamped.reached_from_flat if way.clamped else None for way in ways]
     return Deployment(
+        ends="pinned",
         share=ways[0].share[rows[0]],
         positions=np.concatenate([way.positions[row] for way, row in zip(ways, rows, strict=True)], axis=1),
-        shells=(),
-        snaps=tuple(sorted({snap for way in ways for snap in way.snaps}, key=lambda snap: snap.start)),
+        snaps=tuple(snap for snap, _ in snaps),
+        snapped_by=tuple(moved for _, moved in snaps),
         lost_at=max(lost, default=None),
         gap=max((way.gap for way in ways if way.gap is not None), key=lambda gap: gap.left, default=None),
         reached_from_flat=_all([way.reached_from_flat for way in ways]),
-        elsewhere=max(elsewhere, key=lambda shape: shape.distance, default=None),
+        elsewhere=max(elsewhere, key=lambda shape: shape.distance or 0.0, default=None),
         guided=max((way.guided for way in ways if way.guided is not None), default=None),
-        factorizations=sum(way.factorizations for way in ways),
+        clamped=ClampedDeployment(reached_from_flat=_all(turned)),
+        factorizations=sum(way.factorizations or 0 for way in ways),
     )
 
 
@@ -411,12 +429,12 @@ def _all(answers: Sequence[bool | None]) -> bool | None:
 
 def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:
     """The searches of several patches as one: each found the other shapes of its own shell."""
-    return OtherShapes(
-        tried=sum(part.tried for part in parts),
-        popped_through=any(part.popped_through for part in parts),
-        largest_kick=max(part.largest_kick for part in parts),
-        found=tuple(shape for part in parts for shape in part.found),
-        factorizations=sum(part.factorizations for part in parts),
+    return searched(
+        sum(part.tried or 0 for part in parts),
+        max(part.largest_kick or 0.0 for part in parts),
+        [shape for part in parts for shape in part.found],
+        sum(part.factorizations or 0 for part in parts),
+        through=any(part.popped_through for part in parts),
     )
 
 

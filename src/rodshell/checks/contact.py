@@ -15,7 +15,7 @@ material frames say, and without these upright on the shell.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -23,6 +23,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
+from rodshell.figures.checks import Clearance
 from rodshell.geometry.frames import adapted, cross, dot, unit
 from rodshell.geometry.near_pairs import near_pairs
 from rodshell.layout import FlatGrid, GridMesh
@@ -38,26 +39,11 @@ SLACK = 0.05  # of the rods' breadth: crossing rods that bend together overlap f
 ACROSS = 0.1  # cosine to a rod's axis up to which a direction is across it
 
 
-@dataclass(frozen=True)
-class Contact:
-    """The nearest two rods of a shape, those apart that meet by design.
-
-    Parameters
-    ----------
-    clearance : between their surfaces [m]; negative: how deep they overlap; None where no two rods come nearer than
-        a rod's breadth, or the section's outline is not known.
-    pairs : number of pairs of rods that touch or overlap; a rod that touches itself counts as one.
-    rods : names of the nearest two; the same twice of a rod that touches itself.
-    where : place between them [m].
-    """
-
-    clearance: float | None = None
-    pairs: int = 0
-    rods: tuple[str, str] | None = None
-    where: tuple[float, float, float] | None = None
+APART = Clearance(clearance=None, pairs=0, rods=None, where=None)
+"""No two rods come nearer than a rod's breadth, or the section's outline is not known."""
 
 
-def contact_of(shell: Shell, state: Floats, rod: Rod) -> Contact:
+def contact_of(shell: Shell, state: Floats, rod: Rod) -> Clearance:
     """Contact of a shell of equal rods in a `state` (N, 3).
 
     Parameters
@@ -70,7 +56,7 @@ def contact_of(shell: Shell, state: Floats, rod: Rod) -> Contact:
     return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
 
 
-def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], rod: Rod) -> Contact:
+def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], rod: Rod) -> Clearance:
     """Contact of shells of equal rods, each in its state, among each other too.
 
     Parameters
@@ -79,7 +65,7 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
     """
     outline = _Outline.of(rod, mesh)
     if outline is None:
-        return Contact()
+        return APART
     sizes = np.cumsum([0, *(len(shell.mesh.grid.rods) for shell, _ in patches)])
     parts = [_crossing_lines(mesh.grid.rods[a:b], outline) for a, b in pairwise(sizes)]
     positions = np.concatenate([state[shell.node_blocks] for shell, state in patches])
@@ -100,7 +86,7 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
 
 def contact(
     mesh: GridMesh, positions: Floats, rod: Rod, *, directors: Floats | None = None, crossings: Crossings | None = None
-) -> Contact:
+) -> Clearance:
     """Contact of the rods of `mesh`.
 
     Parameters
@@ -111,30 +97,31 @@ def contact(
     """
     outline = _Outline.of(rod, mesh)
     if outline is None:
-        return Contact()
+        return APART
     by_design = _crossing_lines(mesh.grid.rods, outline) if crossings is None else crossings
     edges = _Edges(mesh, positions, outline, directors, by_design)
     first, second, p, q, limit = edges.near()
     gap = edges.gaps(first, second, q - p)
     counted = gap <= limit
     if not counted.any():
-        return Contact()
+        return APART
     rods = np.sort(np.column_stack([edges.rods[first], edges.rods[second]]), axis=1)
     worst = int(np.argmin(np.where(counted, gap, np.inf)))
     a, b = (mesh.grid.rods[k].name for k in rods[worst])
     x, y, z = (0.5 * (p + q)[worst]).tolist()
-    return Contact(float(gap[worst]), len(np.unique(rods[counted & (gap <= 0)], axis=0)), (a, b), (x, y, z))
+    touching = len(np.unique(rods[counted & (gap <= 0)], axis=0))
+    return Clearance(clearance=float(gap[worst]), pairs=touching, rods=(a, b), where=(x, y, z))
 
 
-def worst_contact(parts: Mapping[str, Contact]) -> Contact:
+def worst_contact(parts: Mapping[str, Clearance]) -> Clearance:
     """Of several shells, by their names, each checked by itself: the worst, with the names of rods among all."""
     known = [(name, shape) for name, shape in parts.items() if shape.clearance is not None]
     if not known:
-        return Contact()
+        return APART
     name, worst = min(known, key=lambda pair: pair[1].clearance or 0.0)
     assert worst.rods is not None
     rods = (f"{name}-{worst.rods[0]}", f"{name}-{worst.rods[1]}")
-    return replace(worst, rods=rods, pairs=sum(shape.pairs for shape in parts.values()))
+    return worst.changed(rods=rods, pairs=sum(shape.pairs or 0 for shape in parts.values()))
 
 
 @dataclass(frozen=True, eq=False)

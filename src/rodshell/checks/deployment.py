@@ -16,8 +16,12 @@ from itertools import pairwise, takewhile
 from math import prod
 
 import numpy as np
+from pydantic import Field
 
 from rodshell.arrays import Floats
+from rodshell.figures import checks as figures
+from rodshell.figures.findings import Said, said
+from rodshell.figures.records import Found, key
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import end_directions, laid_below, turned
 from rodshell.model import Shell
@@ -42,24 +46,14 @@ MOST_TURNING = 400  # factorisations of turning the clamps; the paths that arriv
 AT_ONCE = 40  # iterations from the lifted grid to an equilibrium, before the energy is followed down
 
 
-@dataclass(frozen=True, eq=False)
-class Elsewhere:
-    """Another shape than the final one, in which a shell comes to rest from flat.
+class OtherShape(figures.OtherShape):
+    """Another stable shape on the same supports than the final one; with its nodes."""
 
-    Parameters
-    ----------
-    distance : of the farthest node from its final place, over half the shell's width.
-    energy : over that of the final shape.
-    positions : (n, 3) of the mesh's nodes [m].
-    """
-
-    distance: float
-    energy: float
-    positions: Floats
+    positions: Found[Floats] = Field(description="(n, 3) of the mesh's nodes [m]")
 
     @property
     def words(self) -> str:
-        return f"{percent_text(self.distance)} of half its width away, at {self.energy:.3g} times the energy"
+        return f"{percent_text(self.distance or 0.0)} of half its width away, at {self.energy:.3g} times the energy"
 
 
 @dataclass(frozen=True)
@@ -84,61 +78,44 @@ class Gap:
         return f"from flat {from_flat}, and from the final shape back down to {percent_text(self.left)}{ends}"
 
 
-@dataclass(frozen=True, eq=False)
-class Deployment:
-    """Stages of a deployment, in the order of the building site.
+class Deployment(figures.Deployment):
+    """Stages of a deployment, in the order of the building site, with their shapes and the models of the shell.
 
-    Parameters
-    ----------
-    share : (s,) of the deployment, ascending; 0 is the flat grid.
-    positions : (s, n, 3) of the mesh's nodes [m].
-    shells : at each stage but the flat grid, with its state (N, 3), whose twist angles belong to that shell's source
-        frames; none where ways of several shells were joined.
-    snaps : between stages, each in shares of the deployment: there the shell snaps forward by itself.
-    lost_at : share of the lowest stage that was found, or None; only the flat grid then stands before it.
-    gap : where it was lost, or None.
-    reached_from_flat : whether the shell comes to its final shape when it is lifted a little towards it and its ends
-        are driven on straight lines; None where that could not be followed.
-    elsewhere : where it comes to rest instead.
-    guided : the shares between which it has to be guided off the path that leads elsewhere.
+    The shell is lifted a little towards its final shape, and its ends are driven on straight lines. At a snap it snaps
+    forward by itself.
     """
 
-    share: Floats
-    positions: Floats
-    shells: tuple[tuple[Shell, Floats], ...]
-    snaps: tuple[Snap, ...] = ()
-    lost_at: float | None = None
-    gap: Gap | None = None
-    reached_from_flat: bool | None = None
-    elsewhere: Elsewhere | None = None
-    guided: tuple[float, float] | None = None
-    factorizations: int = 0
+    share: Found[Floats] = Field(description="(s,) of the deployment, ascending; 0 is the flat grid")
+    positions: Found[Floats] = Field(description="(s, n, 3) of the mesh's nodes [m]")
+    shells: Found[tuple[tuple[Shell, Floats], ...]] = Field(
+        default=(),
+        description="at each stage but the flat grid, with its state (N, 3), whose twist angles belong to that shell's "
+        "source frames; none where ways of several shells were joined",
+    )
+    gap: Found[Gap | None] = key("where it was lost")
+    elsewhere: OtherShape | None = key("the shape in which it ends instead")
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
-        words = list[str]()
+        found = list[Said]()
         if self.snaps:
-            where = places_text([snap.start for snap in self.snaps])
-            by = length_text(max(snap.moved for snap in self.snaps))
+            where = places_text([start for start, _ in self.snaps])
+            most = max(moved or 0.0 for moved in self.snapped_by)
             continues = ", and continues to its final shape" if self.reached_from_flat else ""
             other = "; a small difference can make it snap elsewhere" if len(self.snaps) > FEW else ""
-            words.append(
-                f"{where} of the deployment from flat the shell snaps forward by itself, by up to {by}"
-                f"{continues}{other}"
-            )
+            found.append(
+                said(
+                    "snaps", "pinned", most, unit="m",
+                    where=where, by=length_text(most), continues=continues, other=other,
+                )
+            )  # fmt: skip
         if self.reached_from_flat is False:
             where = "" if self.elsewhere is None else f", {self.elsewhere.words}"
-            words.append(
-                f"lifted from flat and driven by its ends alone, the shell comes to rest in another shape{where}: "
-                "it has to be guided into its final shape"
-            )
+            found.append(said("guided", "pinned", where=where))
         if self.gap is not None:
-            words.append(
-                f"the deployment could not be followed all the way: {self.gap.words}; stages are missing, and whether "
-                "the shell reaches its final shape from flat is not known"
-            )
-        return tuple(words)
+            found.append(said("lost", "pinned", self.lost_at, 0, how=self.gap.words))
+        return tuple(found)
 
 
 def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress = lambda share: None) -> Deployment:
@@ -173,17 +150,27 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
         down_to = lower.stages[-1][0]  # where it meets the path backwards
     elif not lower.arrived:
         end = lower.stages[-1][1]
-        elsewhere = Elsewhere(path.apart(end, final), end.energy / final.energy, shell.positions(end.state))
+        elsewhere = OtherShape(
+            distance=path.apart(end, final), energy=end.energy / final.energy, positions=shell.positions(end.state)
+        )
         guided = max((share for share, _ in lower.stages if share < down_to), default=0.0), down_to
     whole = [*(stage for stage in lower.stages if stage[0] < down_to), *(s for s in upper[::-1] if s[0] >= down_to)]
     wanted = [(share, there) for share, there in whole if share in shares]
+    snaps = [snap for snap in lower.snaps if guided is None or snap.stop <= guided[0]]
     return Deployment(
-        np.array([0.0, *(share for share, _ in wanted)]),
-        np.array([path.flat, *(shell.positions(there.state) for _, there in wanted)]),
-        tuple((shell.with_elements(there.elements), there.state) for _, there in wanted),
-        tuple(snap for snap in lower.snaps if guided is None or snap.stop <= guided[0]),
-        lost, gap, lower.arrived, elsewhere, guided, path.factorizations,
-    )  # fmt: skip
+        ends="pinned",
+        share=np.array([0.0, *(share for share, _ in wanted)]),
+        positions=np.array([path.flat, *(shell.positions(there.state) for _, there in wanted)]),
+        shells=tuple((shell.with_elements(there.elements), there.state) for _, there in wanted),
+        snaps=tuple((snap.start, snap.stop) for snap in snaps),
+        snapped_by=tuple(snap.moved for snap in snaps),
+        lost_at=lost,
+        gap=gap,
+        reached_from_flat=lower.arrived,
+        elsewhere=elsewhere,
+        guided=guided,
+        factorizations=path.factorizations,
+    )
 
 
 @dataclass(frozen=True)

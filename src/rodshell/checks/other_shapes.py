@@ -6,14 +6,15 @@ stiffness, one by one and mixed. From each start the energy is lowered to the ne
 is a shape of the shell; that nothing is found proves nothing, so the search says how far it looked.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
-from rodshell.checks.deployment import Deployment
+from rodshell.checks.deployment import Deployment, OtherShape
+from rodshell.figures import checks as figures
+from rodshell.figures.records import Rows, rows
 from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.geometry.frames import parallel_transport, signed_angle, unit
 from rodshell.layout import GridMesh
@@ -23,7 +24,6 @@ from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.path import SAME
 from rodshell.solve.problem import half_width
 from rodshell.solve.sparse_ldl import Multifrontal
-from rodshell.validation import brief
 
 MODES = 4
 MODE_SWEEPS = 4  # enough for directions to search in: the last eigenvalue may be a quarter too high
@@ -37,56 +37,32 @@ COPLANAR = 1e-3  # of the size: how far supports may lie off their plane for the
 MIRRORED = 0.02  # and the image off the reflection: trimmed ends lie some 1e-4 off the plane, layers keep their order
 
 
-@dataclass(frozen=True, eq=False)
-class OtherShape:
-    """Another stable shape.
+class OtherShapes(figures.OtherShapes):
+    """What a search found, the shapes with their nodes."""
 
-    Parameters
-    ----------
-    distance : of the farthest node from its place in the shell's own shape, over half the shell's width.
-    energy : over that of the shell's own shape.
-    from_flat : whether a deployment ends in it, that of this shell or its mirror image; None where none is known to.
-    mirror : whether it is the reflection in the plane of the supports; of rods in two layers, whose order stays,
-        that of the surface between them.
-    positions : (n, 3) of the mesh's nodes [m].
-    """
-
-    distance: float
-    energy: float
-    from_flat: bool | None
-    mirror: bool
-    positions: Floats
-
-    __repr__ = brief
+    found: Rows[OtherShape] = rows("shapes that were found")
 
 
-@dataclass(frozen=True)
-class OtherShapes:
+def searched(starts: int, kick: float, found: Iterable[OtherShape], work: int, *, through: bool) -> OtherShapes:
     """What a search found, and how far it looked.
 
     Parameters
     ----------
-    popped_through : whether popping through was among them.
-    largest_kick : over half the shell's width.
+    kick : the largest, over half the shell's width.
+    work : factorisations.
+    through : whether popping through was among the starts.
     """
-
-    tried: int
-    popped_through: bool
-    largest_kick: float
-    found: tuple[OtherShape, ...]
-    factorizations: int = 0
-
-    @property
-    def searched(self) -> str:
-        """How far the search looked, in a sentence."""
-        if not self.tried:
-            return "not looked for: the search may take half of the work that the form took, which is too little here"
-        ways = ["popped through"] if self.popped_through else []
-        if self.largest_kick:
-            kick = f"{100 * self.largest_kick:.0f} % of half its width"
-            ways.append(f"kicked by up to {kick} along its {MODES} softest modes or mixtures of them")
-        starts = f"{self.tried} start{'s' if self.tried > 1 else ''}"
-        return f"looked for from {starts} ({' and '.join(ways)}); others are not excluded"
+    ways = ["popped through"] if through else []
+    if kick:
+        by = f"{100 * kick:.0f} % of half its width"
+        ways.append(f"kicked by up to {by} along its {MODES} softest modes or mixtures of them")
+    words = "not looked for: the search may take half of the work that the form took, which is too little here"
+    if starts:
+        number = f"{starts} start{'s' if starts > 1 else ''}"
+        words = f"looked for from {number} ({' and '.join(ways)}); others are not excluded"
+    return OtherShapes(
+        tried=starts, searched=words, popped_through=through, largest_kick=kick, found=tuple(found), factorizations=work
+    )
 
 
 def other_shapes(
@@ -112,7 +88,8 @@ def other_shapes(
         progress(len(kicks) + 1)
         search.go(start, kick, most)
         kicks.append(kick)
-    return OtherShapes(len(kicks), 0.0 in kicks, max(kicks, default=0.0), tuple(search.shapes), search.factorizations)
+    largest = max(kicks, default=0.0)
+    return searched(len(kicks), largest, search.shapes, search.factorizations, through=0.0 in kicks)
 
 
 class _Search:
@@ -128,7 +105,7 @@ class _Search:
         self.image = self._mirrored((self.middle - origin) @ self.normal) if plane else None
         self.shapes = list[OtherShape]()
         if deployment is not None and (there := deployment.elsewhere) is not None:
-            self.shapes.append(OtherShape(there.distance, there.energy, True, False, there.positions))
+            self.shapes.append(there.changed(from_flat=True, mirror=False))
 
     def starts(self, most_factorizations: int) -> Iterator[tuple[float, Floats]]:
         """The kick's size over the shell's, and the state; zero for popping through, which comes first where the
@@ -163,8 +140,14 @@ class _Search:
             mirror = self.image is not None and self._apart(positions, self.image) < MIRRORED
             same = mirror and not self.shell.mesh.layered  # lifted to the other side it goes to its image
             from_flat = True if same and self.reached else None
-            energy = there.energy / self.found.energy
-            self.shapes.append(OtherShape(self._apart(positions, self.positions), energy, from_flat, mirror, positions))
+            found = OtherShape(
+                distance=self._apart(positions, self.positions),
+                energy=there.energy / self.found.energy,
+                from_flat=from_flat,
+                mirror=mirror,
+                positions=positions,
+            )
+            self.shapes.append(found)
 
     def _modes(self) -> list[Floats]:
         """The softest modes, the farthest node going by the shell's mean radius."""

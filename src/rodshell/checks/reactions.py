@@ -9,15 +9,20 @@ about the joint is that of the joint's energy: of the forces on the nodes next t
 twist angles. Both are resultants, whatever the joint is made of.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from pydantic import Field
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.figures import checks as figures
+from rodshell.figures.records import Found
 from rodshell.formfinding.finite_sections import joint_normals, joint_tangents
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.crossings import LinkerBend
+from rodshell.layout import FlatGrid
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium
@@ -26,47 +31,42 @@ from rodshell.validation import brief
 POINT = 1e-3  # edges: nodes as close as that are one point
 
 
-@dataclass(frozen=True, eq=False)
-class Reactions:
-    """Forces and moments of the supports on both ends of each rod in turn.
+class Reactions(figures.Reactions):
+    """Forces and moments of the supports on both ends of each rod in turn."""
 
-    Parameters
-    ----------
-    points : (2m, 3) where they act [m].
-    forces : (2m, 3) [N].
-    moments : (2m, 3), each about its own point [N m]; zero where the ends are pinned.
-    """
+    points: Found[Floats] = Field(description="(2m, 3) where they act [m]")
 
-    points: Floats
-    forces: Floats
-    moments: Floats
+    @classmethod
+    def at(cls, points: Floats, forces: Floats, moments: Floats) -> "Reactions":
+        """Of the forces and moments (2m, 3) at these `points`; all moments are summed about their middle."""
+        about_middle = np.cross(points - points.mean(axis=0), forces) + moments
+        return cls(
+            points=points,
+            force_sum=forces.sum(axis=0),
+            moment_sum=about_middle.sum(axis=0),
+            force_imbalance=_imbalance(forces),
+            moment_imbalance=_imbalance(about_middle),
+            largest_force=_largest(forces),
+            largest_moment=_largest(moments),
+            forces=forces,
+            moments=moments,
+        )
 
-    __repr__ = brief
+    @classmethod
+    def merged(cls, parts: Sequence["Reactions"]) -> "Reactions":
+        """Of several shells, one after the other."""
+        columns = zip(*((part.points, part.forces, part.moments) for part in parts), strict=True)
+        return cls.at(*map(np.concatenate, columns))
 
-    @property
-    def sum_of_forces(self) -> Floats:
-        """(3,) [N]"""
-        return np.asarray(self.forces.sum(axis=0))
 
-    @property
-    def about_middle(self) -> Floats:
-        """(2m, 3) moments about the middle of all points [N m]."""
-        return np.asarray(np.cross(self.points - self.points.mean(axis=0), self.forces) + self.moments)
+def _largest(parts: Floats) -> float:
+    return float(np.linalg.norm(parts, axis=1).max(initial=0.0))
 
-    @property
-    def sum_of_moments(self) -> Floats:
-        """(3,) about the middle of all points [N m]."""
-        return np.asarray(self.about_middle.sum(axis=0))
 
-    @property
-    def force_imbalance(self) -> float:
-        """Size of the sum of forces over the largest force."""
-        return _share(self.sum_of_forces, self.forces)
-
-    @property
-    def moment_imbalance(self) -> float:
-        """Size of the sum of moments over the largest moment about the middle."""
-        return _share(self.sum_of_moments, self.about_middle)
+def _imbalance(parts: Floats) -> float:
+    """Size of their sum over the largest."""
+    largest = _largest(parts)
+    return float(np.linalg.norm(parts.sum(axis=0))) / largest if largest > 0 else 0.0
 
 
 def reactions(shell: Shell, found: Equilibrium) -> Reactions:
@@ -84,12 +84,7 @@ def reactions(shell: Shell, found: Equilibrium) -> Reactions:
         at_ghosts = gradient[shell.ghosts]
         forces = forces + at_ghosts
         moments = np.cross(state[shell.ghosts] - points, at_ghosts)
-    return Reactions(points, forces, moments)
-
-
-def _share(total: Floats, parts: Floats) -> float:
-    largest = float(np.linalg.norm(parts, axis=1).max(initial=0.0))
-    return float(np.linalg.norm(total)) / largest if largest > 0 else 0.0
+    return Reactions.at(points, forces, moments)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +127,21 @@ class JointLoads:
     def out_of_plane_moments(self) -> Floats:
         """(c,) size of the moment about the axes in the joint's plane [N m]."""
         return np.asarray(np.linalg.norm(self.moments - self.shear_moments[:, None] * self.normals, axis=1))
+
+    def records(self, grid: FlatGrid) -> tuple[figures.JointLoad, ...]:
+        """What acts at each joint on its second rod."""
+        columns = {
+            "force": self.forces[:, 1],
+            "normal_force": self.normal_forces,
+            "shear_moment": self.shear_moments,
+            "out_of_plane_moment": self.out_of_plane_moments,
+            "scissor_deg": np.degrees(self.scissor),
+        }
+        rows = zip(grid.crossings.rods.tolist(), *(column.tolist() for column in columns.values()), strict=True)
+        return tuple(
+            figures.JointLoad(rods=(grid.rods[a].name, grid.rods[b].name), **dict(zip(columns, values, strict=True)))
+            for (a, b), *values in rows
+        )
 
 
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:

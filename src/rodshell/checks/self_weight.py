@@ -7,47 +7,22 @@ are in `rodshell.loads`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.figures.checks import SelfWeight
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import Equilibrium
-from rodshell.solve.load_path import load_path
+from rodshell.solve.load_path import Limit, load_path
 
 MOST = 100.0  # times its own weight: a shell that carries more is not loaded further
 
-Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "not followed", "no mass"]
 
-
-@dataclass(frozen=True)
-class SelfWeightCheck:
-    """How much of its own weight a shell carries.
-
-    Parameters
-    ----------
-    load_factor : on the weight, up to which the shell is stable; 0 if it is unstable unloaded; None where it is above
-        `MOST`, or where no mass is known. At most 0.2 % below where stability is lost.
-    deflection : largest displacement of a node under the whole weight [m]; None where the shell does not carry it.
-    limit : why the factor is what it is. "limit point": the load cannot grow, the shell snaps through; "bifurcation":
-        it gives way sideways; "none": it is stable up to `MOST`; "not followed": it is stable up to the factor, and
-        nothing is known above; "no mass": the rods have none, so that nothing is known.
-    """
-
-    load_factor: float | None
-    deflection: float | None
-    limit: Limit
-    factorizations: int = 0
-
-    @property
-    def at_least(self) -> float:
-        """The factor as a number: infinite above `MOST`, 0 where nothing is known."""
-        if self.load_factor is not None:
-            return self.load_factor
-        return np.inf if self.limit == "none" else 0.0
+def shown_limit(limit: Limit) -> str:
+    """What ended a path, in words of result.json."""
+    return "not followed" if limit == "lost" else limit
 
 
 def self_weight(
@@ -58,7 +33,7 @@ def self_weight(
     gravity: float = STANDARD_GRAVITY,
     most: float = MOST,
     progress: Callable[[int, float], None] = lambda count, factor: None,
-) -> SelfWeightCheck:
+) -> SelfWeight:
     """Load a shell with its own weight until it is no longer stable.
 
     Parameters
@@ -70,7 +45,7 @@ def self_weight(
     progress : as of `load_path`.
     """
     if not shell.mass[shell.stretch.blocks, 2].all():  # joints may have some even then
-        return SelfWeightCheck(None, None, "no mass")
+        return SelfWeight(load_factor=None, deflection=None, limit="no mass")
     load = np.zeros_like(found.state)
     weighed = shell.mass[:, 2] if mass is None else mass
     load[: len(weighed), 2] = -gravity * weighed
@@ -80,14 +55,16 @@ def self_weight(
         moved = shell.positions(whole.state) - shell.positions(found.state)
         deflection = float(np.linalg.norm(moved, axis=1).max())
     if end.limit == "none":
-        return SelfWeightCheck(None, deflection, "none", end.factorizations)
-    limit: Limit = "not followed" if end.limit == "lost" else end.limit
-    return SelfWeightCheck(end.factor, deflection, limit, end.factorizations)
+        return SelfWeight(load_factor=None, deflection=deflection, limit="none", factorizations=end.factorizations)
+    return SelfWeight(
+        load_factor=end.factor, deflection=deflection, limit=shown_limit(end.limit), factorizations=end.factorizations
+    )
 
 
-def weakest(parts: Sequence[SelfWeightCheck]) -> SelfWeightCheck:
+def weakest(parts: Sequence[SelfWeight]) -> SelfWeight:
     """Of patches that stand by themselves: the smallest factor; the largest deflection if all carry their weight."""
     least = min(parts, key=lambda part: part.at_least)
     sunk = [part.deflection for part in parts]
     deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)
-    return SelfWeightCheck(least.load_factor, deflection, least.limit, sum(part.factorizations for part in parts))
+    work = sum(part.factorizations or 0 for part in parts)
+    return least.changed(deflection=deflection, factorizations=work)

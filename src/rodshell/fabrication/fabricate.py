@@ -1,13 +1,20 @@
 """Cut list, layers, splices, stock and bracing of a grid, in one call, and the lengths that decide the cutting."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.fabrication.cutting import Nesting, nest, splices
+from rodshell.fabrication.cutting import nest, splices
+from rodshell.figures import fabrication as figures
+from rodshell.figures.fabrication import Brace, Piece
+from rodshell.figures.findings import Said, said
+from rodshell.figures.records import Found
 from rodshell.layout import GridMesh, Profile
 from rodshell.layout.cells import Pattern, diagonals, rim_diagonals
 from rodshell.layout.flatgrid import layers
@@ -17,17 +24,6 @@ from rodshell.units import length_text
 from rodshell.validation import array, flag, instance, keep, not_negative, number, positive
 
 SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
-
-
-@dataclass(frozen=True)
-class Diagonal:
-    """One diagonal of a cell: the joints that it ties, rod ends being counted on from them, and their distance flat and
-    in the final shape [m]; of a cable also its length free of stress [m]."""
-
-    joints: tuple[int, int]
-    flat: float
-    final: float
-    cut: float | None = None
 
 
 @dataclass(frozen=True)
@@ -83,28 +79,30 @@ class Lath:
         return lengths
 
 
-@dataclass(frozen=True, eq=False)
-class Fabricated:
-    """Cut list and more, rod by rod in the order of the grid.
+def lath_name(rod: str, number: int) -> str:
+    """What a lath is called: the first as its rod, the second "U07-2".
 
     Parameters
     ----------
-    cut_length : (m,) with both end allowances [m]; mass : (m,) of it [kg]; layer : (m,) 1 the lowest.
-    laths : of every rod, one rod after the other; more than one of a rod over part of which laths lie on each other.
-    pieces : (rod, lath, number along the lath, length [m]) of all that is cut from stock, in the order of the laths.
-    nesting : of the pieces; None where there is no stock length, or a piece does not fit.
-    bracing : diagonals between joints, by their index among the grid's crossings, and to rod ends.
+    rod : its id; number : of the lath.
+    """
+    return rod if number == 1 else f"{rod}-{number}"
+
+
+class Fabricated(figures.Fabrication):
+    """Cut list, stock and bracing, and more of each rod in the order of the grid; the mass is that of the rods alone.
+
+    There is no stock where there is no stock length, or a piece does not fit.
     """
 
-    options: Fabrication
-    cut_length: Floats
-    mass: Floats
-    layer: Ints
-    laths: tuple[Lath, ...]
-    pieces: tuple[tuple[int, int, int, float], ...]
-    nesting: Nesting | None
-    bracing: tuple[Diagonal, ...]
-    warnings: tuple[str, ...]
+    cut_length: Found[Floats] = Field(description="(m,) with both end allowances [m]")
+    mass: Found[Floats] = Field(description="(m,) as cut [kg]")
+    layer: Found[Ints] = Field(description="(m,) 1 the lowest")
+    laths: Found[tuple[Lath, ...]] = Field(
+        description="of every rod, rod by rod; more than one of a rod over part of which laths lie on each other"
+    )
+    pieces: Found[tuple[Piece, ...]] = Field(description="all that is cut from stock, in the order of the laths")
+    warnings: Found[tuple[Said, ...]] = Field(description="sentences on rods that cannot be spliced")
 
     @property
     def splices(self) -> tuple[tuple[float, ...], ...]:
@@ -145,17 +143,17 @@ def fabricate(
     lengths = np.array([rod_line.length for rod_line in rods])
     cut = lengths + 2 * options.end_allowance
     made, warnings = _laths(mesh, options, curvature)
-    pieces = _pieces_of(made)
-    nesting = None
+    names = [rod_line.name for rod_line in rods]
+    pieces, more = _pieces_of(made, names), dict[str, Any]()
     if options.stock_length is not None and not warnings:
         bars = partial(nest, stock=options.stock_length, kerf=options.kerf)
-        nesting = bars([length for *_, length in pieces])
         longer, _ = _laths(mesh, options, curvature, short=SHORT)
-        others = _pieces_of(longer)
-        tried = bars([length for *_, length in others])
-        if len(tried.bars) <= len(nesting.bars):
-            made, pieces, nesting = longer, others, tried
-    bracing: tuple[Diagonal, ...] = ()
+        others = _pieces_of(longer, names)
+        plan, tried = bars(pieces), bars(others)
+        if len(tried.bars) <= len(plan.bars):
+            made, pieces, plan = longer, others, tried
+        more["stock"] = plan
+    bracing: tuple[Brace, ...] = ()
     if final is not None:
         ends = mesh.ends.ravel()
         flat = np.vstack([mesh.flat[mesh.joint_nodes], mesh.flat[ends]])
@@ -168,14 +166,28 @@ def fabricate(
             distances: list[float] = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1).tolist()
             return distances
 
+        points = [*mesh.grid.joint_names, *mesh.grid.support_names]
         bracing = tuple(
-            Diagonal((a, b), laid, spanned, None if prestrain is None else spanned / (1.0 + prestrain))
+            Brace(start=points[a], end=points[b], flat=laid, final=spanned)
             for (a, b), laid, spanned in zip(pairs.tolist(), apart(flat), apart(there), strict=True)
         )
+        if prestrain is not None:
+            bracing = tuple(brace.changed(cut=(brace.final or 0.0) / (1.0 + prestrain)) for brace in bracing)
     mass = rod.mass_per_length * (cut + _more(mesh, rod, options))
     return Fabricated(
-        options, cut, mass, layers(len(rods), crossings.rods.tolist()), made, pieces, nesting, bracing, warnings
-    )  # fmt: skip
+        end_allowance=options.end_allowance,
+        stock_length=options.stock_length,
+        kerf=options.kerf,
+        total_mass=float(mass.sum()),
+        bracing=bracing,
+        cut_length=cut,
+        mass=mass,
+        layer=layers(len(rods), crossings.rods.tolist()),
+        laths=made,
+        pieces=pieces,
+        warnings=warnings,
+        **more,
+    )
 
 
 def _more(mesh: GridMesh, rod: Rod, options: Fabrication) -> Floats:
@@ -196,7 +208,7 @@ def _stretch(rod: Rod, profile: Profile, factors: Floats) -> Floats:
 
 def _laths(
     mesh: GridMesh, options: Fabrication, curvature: Floats | None, *, short: float = 0.0
-) -> tuple[tuple[Lath, ...], tuple[str, ...]]:
+) -> tuple[tuple[Lath, ...], tuple[Said, ...]]:
     """All laths with their splices, and a sentence about those that cannot be spliced.
 
     short : pieces of so many joint distances are avoided.
@@ -228,13 +240,13 @@ def _laths(
     first = next(iter(hopeless.values()))
     named = f"rod {first}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {first})"
     assert stock is not None
-    return tuple(made), (
-        f"{named} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock",
-    )
+    return tuple(made), (said("not_spliced", None, stock, unit="m", place=first, rods=named, stock=length_text(stock)),)
 
 
-def _pieces_of(laths: tuple[Lath, ...]) -> tuple[tuple[int, int, int, float], ...]:
-    """(rod, lath, number along the lath, length [m]) of every piece."""
+def _pieces_of(laths: tuple[Lath, ...], names: Sequence[str]) -> tuple[Piece, ...]:
+    """Every piece, named by its rod's name, lath and number."""
     return tuple(
-        (lath.rod, lath.number, number, length) for lath in laths for number, length in enumerate(lath.pieces, start=1)
+        Piece(piece=f"{lath_name(names[lath.rod], lath.number)}.{number}", length=length)
+        for lath in laths
+        for number, length in enumerate(lath.pieces, start=1)
     )

@@ -219,6 +219,16 @@ class FlatGrid:
         return np.bincount(self.crossings.rods.ravel(), minlength=len(self.rods))
 
     @cached_property
+    def joint_names(self) -> list[str]:
+        """Ids of the joints, the two rods' ids with a slash, in the order of the crossings."""
+        return ["/".join(self.rods[k].name for k in sorted(pair)) for pair in self.crossings.rods.tolist()]
+
+    @cached_property
+    def support_names(self) -> list[str]:
+        """Names of the rod ends, as "U03.1": start (0) and end (1) of each rod in turn."""
+        return [f"{rod.name}.{end}" for rod in self.rods for end in (0, 1)]
+
+    @cached_property
     def span(self) -> float:
         """The usual distance between neighbouring joints [m]: a quarter of the rods' length is in spans up to it, which
         does not depend on how many crossings nearly coincide."""

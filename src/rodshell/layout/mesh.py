@@ -64,6 +64,11 @@ class GridMesh:
         """Number of nodes n."""
         return len(self.flat)
 
+    def place(self, entry: int) -> tuple[str, float]:
+        """Of an entry of `rod_nodes`: the rod's name, and the distance from its start [m]."""
+        rod = self.grid.rods[int(np.searchsorted(self.rod_start, entry, side="right")) - 1]
+        return rod.name, float(self.stations[entry]) - rod.start
+
     def rod_slice(self, rod: int) -> slice:
         """The entries of `rod_nodes` and `stations` that belong to a rod."""
         stop = self.rod_start[rod + 1] if rod + 1 < len(self.rod_start) else len(self.rod_nodes)

@@ -13,15 +13,21 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+from pydantic import Field
 
 from rodshell.arrays import Floats, Ints
 from rodshell.checks.bending import require_known_stress, rod_frames
-from rodshell.checks.reactions import Reactions
-from rodshell.checks.self_weight import SelfWeightCheck, self_weight
+from rodshell.checks.self_weight import self_weight, shown_limit
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
+from rodshell.figures import loads as figures
+from rodshell.figures.checks import SelfWeight
+from rodshell.figures.findings import Said, said
+from rodshell.figures.loads import Governs, Utilisations
+from rodshell.figures.records import Found
 from rodshell.formfinding import PatchForm, PopUp, pop_up
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
+from rodshell.layout import GridMesh
 from rodshell.loads.bracing import Cables
 from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, LoadedNodes, Settlement, Temperature
@@ -37,7 +43,6 @@ from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.modes import LinearBuckling, linear_buckling, softest_motion
 from rodshell.units import shown
-from rodshell.validation import brief
 
 PERMANENT: Duration = "permanent"
 ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
@@ -45,82 +50,22 @@ SAME_SHAPE = 1e-4  # of the size: patches together are where each is alone
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
-@dataclass(frozen=True, eq=False)
-class LoadedShell:
-    """A shell under one combination of loads.
+class LoadedShell(figures.LoadedShell):
+    """A shell under one combination of loads, with its shapes."""
 
-    Parameters
-    ----------
-    at_factor : of the combination under which all but the factors stands: 1, or the last stable factor where the shell
-        loses its stability before; 0 where it is not stable without loads.
-    limit_factor : up to which the shell is stable, at most 0.2 % below where it loses its stability; None: above
-        `MOST`.
-    limit_kind : what ends the path, see `LoadPath.limit`; "lost": nothing is known above the factor.
-    linear_factor : lowest linear buckling factor about the unloaded shell; None: none up to `MOST`.
-    imperfect_factor : as `limit_factor`, the smallest of the shells with an imperfection in one mode; None: above
-        `MOST`, not asked for, or not found.
-    imperfect_kind : what ends the path of that shell; "lost": nothing is known above its factor;
-        None: not asked for.
-    load_sum : (3,) sum of the loads, those on supports included [N].
-    reactions : of the supports, without those of the unloaded shell.
-    support_forces : of the supports, with those of the unloaded shell: what acts on foundations, reversed.
-    displacements : (n, 3) of the mesh's nodes against the unloaded shell [m].
-    positions : (n, 3) of the mesh's nodes [m].
-    stress : (k,) largest stress of bending, axial force and torsion at each entry of `rod_nodes` [Pa]; None: unknown.
-    duration : of the combination, by which strengths are chosen.
-    used : what rods and joints use of their strength, and the erected shell of its permanent strength.
-    bracing_forces : (d,) axial force of each brace, tension positive, of slack cables exactly 0 [N].
-    bracing_utilisation : of the laths of a third layer, or of the cables in tension; None: there are none, or their
-        strength is not known.
-    joint_moments : (c,) moment of each locked joint about its normal [N m]; empty: none is locked.
-    mode_factors : (j,) linear buckling factors of `modes`.
-    modes : (j, n, 3) lowest linear buckling modes, the largest component being 1.
-    mode : (n, 3) how the shell gives way at the limit, or None.
-    """
-
-    at_factor: float
-    limit_factor: float | None
-    limit_kind: Limit
-    linear_factor: float | None
-    imperfect_factor: float | None
-    imperfect_kind: Limit | None
-    load_sum: Floats
-    reactions: Reactions
-    support_forces: Reactions
-    displacements: Floats
-    positions: Floats
-    stress: Floats | None
-    duration: Duration
-    used: Utilisation
-    bracing_forces: Floats
-    bracing_utilisation: float | None
-    joint_moments: Floats
-    modes: Floats
-    mode_factors: Floats
-    mode: Floats | None
-    factorizations: int
-
-    __repr__ = brief
-
-    @property
-    def utilisation(self) -> float | None:
-        """Largest of all; None: nothing is known."""
-        return None if self.used.governs is None else self.used.largest[self.used.governs[0]]
-
-    @property
-    def governs(self) -> tuple[By, int] | None:
-        """What is used most, and at which entry of `rod_nodes`; None: nothing is known."""
-        return self.used.governs
-
-    @property
-    def max_deflection(self) -> float:
-        """Largest displacement of a node [m]."""
-        return float(np.linalg.norm(self.displacements, axis=1).max())
-
-    @property
-    def reaction_sum(self) -> Floats:
-        """(3,) [N]"""
-        return self.reactions.sum_of_forces
+    displacements: Found[Floats] = Field(description="(n, 3) of the mesh's nodes against the unloaded shell [m]")
+    positions: Found[Floats] = Field(description="(n, 3) of the mesh's nodes [m]")
+    stress: Found[Floats | None] = Field(
+        description="(k,) largest of bending, axial force and torsion at each entry of `rod_nodes` [Pa]; None: unknown"
+    )
+    used: Found[Utilisation] = Field(
+        description="what rods and joints use of their strength, and the erected shell of its permanent strength"
+    )
+    bracing_forces: Found[Floats] = Field(
+        description="(d,) axial force of each brace, tension positive, of slack cables exactly 0 [N]"
+    )
+    modes: Found[Floats] = Field(description="(j, n, 3) lowest linear buckling modes, the largest component being 1")
+    mode: Found[Floats | None] = Field(description="(n, 3) how the shell gives way at the limit, or None")
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,48 +91,43 @@ class LoadChecks:
     missing: tuple[str, ...] = ()
     refused: str = ""
     frequencies: Mapping[Ends, Floats] = field(default_factory=dict)
-    self_weight: Mapping[Ends, SelfWeightCheck] = field(default_factory=dict)
+    self_weight: Mapping[Ends, SelfWeight] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         late = f", {self.stopped or self.refused}" if self.stopped or self.refused else ""
         return f"<LoadChecks of {', '.join(self.shells) or 'no combination'}{late}>"
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
         if self.refused:
-            return (f"the loads were not checked: {self.refused}",)
-        late = (f"{self.stopped}; not checked: {', '.join(self.missing)}",) if self.stopped else ()
+            return (said("not_checked: refused", why=self.refused),)
+        missing = ", ".join(self.missing)
+        late = (said("not_checked: late", when=self.stopped, missing=missing),) if self.stopped else ()
         return (*late, *self._unjudged, *self._unjudged_bracing)
 
     @property
-    def _unjudged(self) -> tuple[str, ...]:
+    def _unjudged(self) -> tuple[Said, ...]:
         """What strength was not judged by."""
         known, wanted = self.limits.bending, {self.asked.duration(name) for name in self.asked.combinations}
         if not known:
-            return (
-                "the design strength of the rods is not known, so that whether they break under the loads was not "
-                "judged: give strength.permanent and strength.short",
-            )
+            return (said("no_strength: rods"),)
         missing = [name for name in ("permanent", *sorted(wanted - {"permanent"})) if name not in known]
         if missing:
-            return (f"the design strength for {' and '.join(missing)} loads is not known and was not judged",)
+            return (said("no_strength: durations", durations=" and ".join(missing)),)
         return ()
 
     @property
-    def _unjudged_bracing(self) -> tuple[str, ...]:
+    def _unjudged_bracing(self) -> tuple[Said, ...]:
         every = [shell for by_ends in self.shells.values() for shell in by_ends.values()]
         if all(shell.bracing_utilisation is not None or not len(shell.bracing_forces) for shell in every):
             return ()
-        return (
-            "the design strength of the bracing is not known, so that whether it breaks under the loads was not "
-            "judged: compare its largest forces, which stand with the loads, with what it can carry",
-        )
+        return (said("no_strength: bracing", place="bracing"),)
 
 
 def check_shells(
     stages: PatchForm | PatchedForm, loads: Loads, *,
-    limits: Limits = Limits(bending={}), progress: Progress = silent,
+    limits: Limits = Limits(), progress: Progress = silent,
 ) -> LoadChecks:  # fmt: skip
     """Check every shell of a form that converged under each combination.
 
@@ -210,7 +150,7 @@ def check_shells(
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
     stopped, braced, vibrations = "", np.empty((0, 2), dtype=np.intp), dict[Ends, Floats]()
-    weighed = dict[Ends, SelfWeightCheck]()
+    weighed = dict[Ends, SelfWeight]()
     try:
         for ends, popped in done.items():
             if limits.bending:
@@ -223,9 +163,10 @@ def check_shells(
             for name, load in acting.items():
                 said = partial(_said, progress, f"{name}, {ends} ends")
                 try:
-                    found[name][ends] = loaded_shell(
+                    shell = loaded_shell(
                         structure, load, loads, limits=limits, duration=loads.duration(name), progress=said
                     )
+                    found[name][ends] = shell.changed(frequencies=vibrations[ends])
                 except InputError as reason:
                     raise InputError(f"combination {shown(name)}: {reason}") from None
                 missing.pop(0)
@@ -252,7 +193,7 @@ def unchecked(loads: Loads, *, refused: str = "", stopped: str = "") -> LoadChec
     """
     none: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     braced = np.empty((0, 2), dtype=np.intp)
-    return LoadChecks(loads, none, braced, Limits(bending={}), stopped, tuple(none), refused)
+    return LoadChecks(loads, none, braced, Limits(), stopped, tuple(none), refused)
 
 
 def _said(progress: Progress, where: str, what: str) -> None:
@@ -357,7 +298,7 @@ def _load(structure: Structure, nodes: LoadedNodes, loads: Loads, factors: Mappi
 
 def _move(structure: Structure, load: Settlement, factor: float, motions: Floats) -> None:
     shell = structure.shell
-    names = [f"{rod.name}.{end}" for rod in shell.mesh.grid.rods for end in (0, 1)]
+    names = shell.mesh.grid.support_names
     for name in load.supports:
         if name not in names:
             raise InputError(
@@ -371,7 +312,7 @@ def _move(structure: Structure, load: Settlement, factor: float, motions: Floats
 
 def loaded_shell(
     structure: Structure, load: Load, loads: Loads, *,
-    limits: Limits = Limits(bending={}), duration: Duration = "short",
+    limits: Limits = Limits(), duration: Duration = "short",
     progress: Callable[[str], None] = lambda what: None,
 ) -> LoadedShell:  # fmt: skip
     """A structure under one combination.
@@ -409,33 +350,61 @@ def loaded_shell(
     judged = partial(utilisation, rod=structure.rod, limits=limits, asked=loads.strength)
     moments = structure.locked_moments(found)
     slip = None if loads.locked_joints is None else loads.locked_joints.slip
-    used = judged(shell, found.state, forces=forces, duration=duration, bent=bent, moments=moments, slip_moment=slip)
-    erected = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration=PERMANENT)
+    alone = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration=PERMANENT)
+    used = judged(
+        shell, found.state, forces=forces, duration=duration, bent=bent, moments=moments, slip_moment=slip
+    ).with_permanent(alone)
     total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
     shapes = np.zeros((0, n, 3)) if buckling is None else buckling.shapes[:, :n]
+    held, supports = structure.reactions(found), structure.support_forces(found)
+    mesh, names = structure.mesh, structure.mesh.grid.joint_names
     return LoadedShell(
         at_factor=factor,
         limit_factor=None if path.limit == "none" else path.factor,
-        limit_kind=path.limit,
+        limit_kind=shown_limit(path.limit),
         linear_factor=float(buckling.factors[0]) if buckling is not None and len(buckling.factors) else None,
         imperfect_factor=imperfect_factor,
-        imperfect_kind=imperfect_kind,
+        imperfect_kind=None if imperfect_kind is None else shown_limit(imperfect_kind),
         load_sum=total,
-        reactions=structure.reactions(found),
-        support_forces=structure.support_forces(found),
+        reaction_sum=held.force_sum,
+        reactions=held.forces,
+        support_forces=supports.forces,
+        support_moments=supports.moments,
+        uplift=float(max(0.0, -supports.forces[:, 2].min())),
+        max_deflection=float(np.linalg.norm(positions - before, axis=1).max()),
+        max_stress=None if bent.stress is None else float(bent.stress.max()),
         displacements=positions - before,
         positions=positions,
         stress=bent.stress,
         duration=duration,
-        used=used.with_permanent(erected),
+        used=used,
+        utilisation=None if used.governs is None else used.largest[used.governs[0]],
+        utilisations=Utilisations(**used.largest),
+        euler=float(used.euler.max()),
+        euler_at=_place(mesh, int(np.argmax(used.euler))),
+        governs=None if used.governs is None else _place(mesh, used.governs[1], used.governs[0]),
         bracing_forces=structure.bracing_forces(found),
         bracing_utilisation=_of_bracing(structure, found, loads, limits, duration),
         joint_moments=moments,
+        joint_moment_at=names[int(np.argmax(np.abs(moments)))] if len(moments) else None,
+        slipping=tuple(names[k] for k in _slipping(mesh, used)),
         modes=shapes,
         mode_factors=np.zeros(0) if buckling is None else buckling.factors,
         mode=None if path.mode is None else path.mode[:n],
         factorizations=path.factorizations + more,
     )
+
+
+def _slipping(mesh: GridMesh, used: Utilisation) -> Ints:
+    """The crossings at which a joint slips."""
+    slip = used.uses.get("slip")
+    return np.empty(0, dtype=np.intp) if slip is None else np.flatnonzero((slip[mesh.at_crossings] > 1).any(axis=1))
+
+
+def _place(mesh: GridMesh, entry: int, by: By | None = None) -> Governs:
+    """The place of an entry of the mesh's `rod_nodes`."""
+    rod, at = mesh.place(entry)
+    return Governs(rod=rod, at=at, by=by)
 
 
 def _of_bracing(

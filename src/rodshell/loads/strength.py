@@ -25,11 +25,14 @@ from math import pi
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.bending import VON_MISES, Bending, bending_of
 from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
+from rodshell.figures.loads import DesignStrength
+from rodshell.figures.records import Found
 from rodshell.geometry.frames import dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
@@ -81,30 +84,18 @@ class Strength:
         return {name: getattr(self, name) for name in DURATIONS if getattr(self, name) is not None}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """What a rod is judged by.
+class Limits(DesignStrength):
+    """What a rod is judged by."""
 
-    Parameters
-    ----------
-    bending : design strength by duration [Pa]; an unknown one is missing.
-    erection : while the shell is erected [Pa]; None: not known.
-    axial : axial strength over bending strength.
-    shear_weight : bending strength over shear strength, see `checks.bending`.
-    cracked : share of the section that carries shear forces.
-    creep : growth of deflections under permanent loads, k_def; None: not known.
-    source : of these figures, in words.
-    given : whether they were given in place of a preset's.
-    """
+    shear_weight: Found[float] = Field(default=VON_MISES, description="bending over shear strength: checks.bending")
+    cracked: Found[float] = Field(default=1.0, description="share of the section that carries shear forces")
+    given: Found[bool] = Field(default=False, description="whether strengths were given in place of a preset's")
 
-    bending: dict[Duration, float]
-    erection: float | None = None
-    axial: float = 1.0
-    shear_weight: float = VON_MISES
-    cracked: float = 1.0
-    creep: float | None = None
-    source: str = "no strength is known"
-    given: bool = False
+    @property
+    def bending(self) -> dict[Duration, float]:
+        """Design strength by duration [Pa]; an unknown one is missing."""
+        known = {name: getattr(self, name) for name in DURATIONS}
+        return {name: strength for name, strength in known.items() if strength is not None}
 
     @staticmethod
     def of(
@@ -154,9 +145,10 @@ class Limits:
         if factors is not None and factors.creep:
             creep = factors.creep[service - 1 if moist else 0]
         return Limits(
-            bending=bending,
+            **bending,
             erection=asked.erection or bending.get("short"),
             axial=factors.axial if factors is not None else 1.0,
+            shear=1.0 / shear_weight,
             shear_weight=shear_weight,
             cracked=factors.cracked if factors is not None else 1.0,
             creep=creep,
@@ -175,7 +167,7 @@ def preset_limits(rod: Rod, service_class: int | None) -> Limits:
     material = rod.material
     factors = None if material is None or material.name is None else DESIGN.get(material.name)
     if material is None or factors is None:
-        return Limits(bending={})
+        return Limits()
     moist, bending, shear = len(factors.factors) > 1, material.bending_strength, material.shear_strength
     weight = VON_MISES if bending is None or shear is None else bending / shear
     asked = Strength(service_class=service_class if moist else None)
@@ -268,7 +260,7 @@ def utilisation(
     if strength is not None and bent.stress is not None:
         net = net_factors(mesh, section, asked.hole)
         drawn = np.abs(bent.axial_strain) * rod.stretch_stiffness / area_of(rod)
-        stress = bent.stress + drawn * (1.0 / limits.axial - 1.0)
+        stress = bent.stress + drawn * (1.0 / (limits.axial or 1.0) - 1.0)
         uses["bending"] = net * stress / strength
         if bent.torsion_stress is not None and (peak := _shear_peak(section)) is not None:
             sheared = spans.on_entries(across) * peak / (limits.cracked * area_of(rod) * areas)

@@ -209,4 +209,5 @@ class Structure:
         found : an equilibrium of this structure under loads.
         """
         loaded, before = self.support_forces(found), self.support_forces(self.equilibrium)
-        return replace(loaded, forces=loaded.forces - before.forces, moments=loaded.moments - before.moments)
+        points = found.state[self.shell.ends]
+        return Reactions.at(points, loaded.forces - before.forces, loaded.moments - before.moments)

@@ -13,8 +13,8 @@ from ezdxf.enums import TextEntityAlignment
 from ezdxf.layouts import Modelspace
 from ezdxf.lldxf.tagwriter import TagWriter
 
+from rodshell.figures.records import printable
 from rodshell.output.drawing import FORBIDDEN, LAYERS, Drawing, Path, Text
-from rodshell.results.records import printable
 
 LONGEST = 200  # letters of a layer's name
 CAPITAL = 0.716  # height of Arial's capitals over the text size; a DXF text is as high as its capitals

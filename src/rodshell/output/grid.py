@@ -7,12 +7,12 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import OutputError
+from rodshell.figures.form import Rod
 from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
 from rodshell.results.archive import Archive, made_once
 from rodshell.results.laths import laths_on
-from rodshell.results.records import Rod
 from rodshell.results.states import BENT, GAPS, SHELLS
 
 CAPTIONS = {

@@ -2,17 +2,18 @@
 stability, modes, foundations and bracing."""
 
 from collections.abc import Iterator
+from math import isnan
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from rodshell.figures.loads import LoadedShell
+from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
 from rodshell.output.schedules import loaded_shells
 from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
-from rodshell.results.loaded import LoadedShell
-from rodshell.results.records import Ends
 from rodshell.results.wording import millimetres, percent, rounded, rounded_down, rounding_of, shown_factor, stress
 from rodshell.units import percent_text
 
@@ -59,7 +60,7 @@ def loads_page(archive: Archive) -> dict[str, Any] | None:
         "frequencies": list(_frequencies(shells)),
         "modes": pictures,
         "foundations": [_foundation(results, *each) for each in shells],
-        "joints": [_joints(*each) for each in shells if each[2].joint_moments],
+        "joints": [_joints(*each) for each in shells if len(each[2].joint_moments)],
         "bracing": [_bracing(results, *each) for each in shells if each[2].bracing],
     }  # fmt: skip
 
@@ -147,7 +148,7 @@ def _stability(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
 def _frequencies(shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[str]:
     """Natural frequencies with each kind of ends: they do not depend on the combination."""
     for ends, shell in {ends: shell for _, ends, shell in shells}.items():
-        known = [rounded(value) for value in shell.frequencies if value is not None]
+        known = [rounded(value) for value in shell.frequencies.tolist() if not isnan(value)]
         if known:
             yield f"{ends} ends: {', '.join(known)} Hz"
 
@@ -155,9 +156,9 @@ def _frequencies(shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[str]:
 def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[tuple[str, Ends, str]]:
     """Caption, ends and state of the pictures: of the combination that falls first."""
     name, ends, shell = min(shells, key=lambda each: np.inf if each[2].limit_factor is None else each[2].limit_factor)
-    for k, factor in enumerate(shell.mode_factors[:MOST_MODES], start=1):
+    for k, factor in enumerate(shell.mode_factors[:MOST_MODES].tolist(), start=1):
         state = f"loaded_buckling_{ends}_{name}_{k}"
-        if state in archive.states and factor is not None:
+        if state in archive.states and not isnan(factor):
             yield (
                 f"Linear buckling mode {k} under {name}, {ends} ends: at {shown_factor(factor)} times the loads",
                 ends,
@@ -169,8 +170,9 @@ def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Ite
 
 def _foundation(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     """Load and reactions, and the largest forces that the foundations carry."""
-    forces = np.array(shell.support_forces, dtype=float).reshape(-1, 3)
-    load, held = shell.load_sum or (0.0, 0.0, 0.0), shell.reaction_sum or (0.0, 0.0, 0.0)
+    forces = shell.support_forces
+    sums = (shell.load_sum, shell.reaction_sum)
+    load, held = (np.zeros(3) if total is None else np.nan_to_num(total) for total in sums)
     across = np.linalg.norm(forces[:, :2], axis=1)
     down = int(np.argmax(forces[:, 2]))
     names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
@@ -185,13 +187,13 @@ def _foundation(results: Results, name: str, ends: Ends, shell: LoadedShell) -> 
     ]
 
 
-def _kilo(newtons: float | None) -> str:
-    return f"{round(1e-3 * (newtons or 0.0), 2) + 0.0:.2f}"
+def _kilo(newtons: float) -> str:
+    return f"{round(1e-3 * newtons, 2) + 0.0:.2f}"
 
 
 def _joints(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     """Moments of locked joints, and which joints slip."""
-    largest = max((abs(moment or 0.0) for moment in shell.joint_moments), default=0.0)
+    largest = float(np.abs(np.nan_to_num(shell.joint_moments)).max(initial=0.0))
     slip = None if shell.utilisations is None else shell.utilisations.slip
     more = f" and {len(shell.slipping) - MOST_NAMES} more" if len(shell.slipping) > MOST_NAMES else ""
     return [

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.figures.form import Section, Stiffness
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.grid import STAGE, Shape, deployed_shape, joint_places, joints_of, rods_of, shape_names, shape_of
 from rodshell.output.svg import tag
 from rodshell.results import Archive
-from rodshell.results.records import Section, Stiffness
 
 COMPRESSION = 3  # half the time of 6, for files that are 5 % longer
 COLOURS = {"CUT": (34, 40, 47), "MARK": (179, 55, 44), "FINAL": (31, 95, 139), "BOUNDARY-FINAL": (43, 122, 75)}

@@ -11,6 +11,10 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from rodshell.figures.checks import Clearance, Reactions
+from rodshell.figures.fabrication import Stock
+from rodshell.figures.form import Agreement, Drape, Gate, PopUp
+from rodshell.figures.records import Ends, Record
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
@@ -26,8 +30,6 @@ from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
 from rodshell.results.laths import laths_text
-from rodshell.results.records import Agreement, Drape, Ends, Gate, PopUp, Record
-from rodshell.results.results import Clearance, Reactions, Stock
 from rodshell.results.states import SHELLS
 from rodshell.results.strength_used import ENDS, by_design_strength
 from rodshell.results.verdict import facts, unknown_below

@@ -14,12 +14,13 @@ from math import ceil, isnan, log, pi
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.figures.form import Meeting, Stiffness
+from rodshell.figures.loads import LoadedShell
+from rodshell.figures.records import Ends, printable
 from rodshell.geometry.frames import unit
 from rodshell.output.grid import GridRod, joints_of, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
-from rodshell.results.loaded import LoadedShell
-from rodshell.results.records import Ends, Meeting, Stiffness, printable
 from rodshell.results.strength_used import ENDS
 from rodshell.results.wording import FINEST, Rounding, rounding_of
 
@@ -309,7 +310,7 @@ def foundations_table(archive: Archive) -> Table:
     rows = [[name, *map(mm, place)] for name, place in zip(names, results.boundary, strict=True)]
     for name, ends, shell in loaded_shells(results):
         held = {"force": ("N", shell.support_forces)}
-        if any(value for moment in shell.support_moments for value in moment):
+        if np.nan_to_num(shell.support_moments).any():
             held["moment"] = ("Nm", shell.support_moments)
         columns += [f"{what}_{axis}_{unit}_{ends}_{name}" for what, (unit, _) in held.items() for axis in "xyz"]
         rows = [[*row, *(_six(value) for _, each in held.values() for value in each[k])] for k, row in enumerate(rows)]
@@ -424,7 +425,7 @@ def _number(value: float | None, digits: int) -> str:
 
 def _six(value: float | None) -> str:
     """Forces and moments, to six figures."""
-    return "" if value is None else f"{value:.6g}"
+    return "" if value is None or isnan(value) else f"{value:.6g}"
 
 
 def _utilisation(rod: GridRod) -> float | None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from html import escape
 
-from rodshell.results.records import Rod, Stiffness
+from rodshell.figures.form import Rod, Stiffness
 from rodshell.results.wording import nice_ticks, rounded
 
 WIDTH, HEIGHT = 640, 300

@@ -1,4 +1,4 @@
-"""From checks and fabrication to what is kept of them: the records of result.json and the arrays of states.npz."""
+"""From checks, fabrication and loads to what is kept of them: records of result.json and arrays of states.npz."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -6,40 +6,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, Ints
 from rodshell.checks import Bending as BendingCheck
-from rodshell.checks import Checks, Elsewhere, JointLoads
-from rodshell.checks import Contact as ContactCheck
-from rodshell.checks import OtherShape as FoundShape
-from rodshell.checks import OtherShapes as ShapeSearch
-from rodshell.checks import Reactions as SupportReactions
+from rodshell.checks import Checks
+from rodshell.checks.bending import worst
 from rodshell.fabrication import Fabricated
+from rodshell.figures.checks import Bending, Contact, WorstBent
+from rodshell.figures.form import Bent, Rod
+from rodshell.figures.records import Ends
 from rodshell.layout import GridMesh
+from rodshell.loads.check import LoadChecks
 from rodshell.loads.strength import Limits
-from rodshell.results.laths import lath_name
-from rodshell.results.loaded import DesignStrength
-from rodshell.results.records import Bent, Ends, Rod
-from rodshell.results.results import (
-    Bar,
-    Bending,
-    Brace,
-    ClampedDeployment,
-    Clearance,
-    Contact,
-    Deployment,
-    Drawings,
-    Fabrication,
-    JointLoad,
-    OtherShape,
-    OtherShapes,
-    Piece,
-    Reactions,
-    Results,
-    SelfWeight,
-    Stage,
-    Stock,
-    WorstBent,
-)
+from rodshell.results.results import Drawings, Results
 from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import verdict
 
@@ -64,7 +42,7 @@ def checked_results(
     fabricated: Fabricated,
     *,
     strength: float | None,
-    limits: Limits = Limits(bending={}),
+    limits: Limits = Limits(),
     net: Floats | None = None,
     shear_strength: float | None = None,
     strength_of: str | None = None,
@@ -86,23 +64,23 @@ def checked_results(
     torsion = checks.shear_unknown(strength) if anisotropic and shear_strength is None else ()
     withstood = _Withstood.of(limits, strength, np.ones(len(mesh.rod_nodes)) if net is None else net)
     bending = _bending(checks, mesh, withstood)
+    joint = (results.joint.mass if results.joint else None) or 0.0
+    way, known = bending.deployment, limits.erection is not None
+    erected = way.utilisation if way and known else None
     found = results.changed(
         warnings=(*checks.warnings, *torsion, *results.warnings, *fabricated.warnings),
         rods=_rods(results.rods, mesh, checks, fabricated, withstood),
         bending=bending.changed(shear_strength=shear_strength, strength_of=None if withstood.given else strength_of),
-        strength=_design_strength(limits, bending),
-        reactions={ends: _reactions(held) for ends, held in checks.reactions.items()},
-        joint_loads={ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
-        self_weight={
-            ends: SelfWeight(load_factor=found.load_factor, deflection=found.deflection, limit=found.limit)
-            for ends, found in checks.self_weight.items()
-        },
-        contact=_contact(checks),
-        other_shapes={ends: _other_shapes(searched) for ends, searched in checks.other_shapes.items()},
-        fabrication=_fabrication(results, mesh, fabricated),
+        strength=limits.changed(erection_utilisation=erected),
+        reactions=dict(checks.reactions),
+        joint_loads={ends: loads.records(mesh.grid) for ends, loads in checks.joints.items()},
+        self_weight=dict(checks.self_weight),
+        contact=Contact(**checks.contact, **({"deployment": stage} if (stage := checks.closest_stage) else {})),
+        other_shapes=dict(checks.other_shapes),
+        fabrication=fabricated.changed(total_mass=(fabricated.total_mass or 0.0) + len(mesh.grid.crossings) * joint),
     )
     if checks.deployment is not None:
-        found = found.changed(deployment=_deployment(checks))
+        found = found.changed(deployment=checks.deployment)
     if checks.out_of_time and found.status == "converged":
         found = found.changed(status=checks.out_of_time)
     return found
@@ -152,15 +130,6 @@ def _stacked(rows: list[Any]) -> NDArray[np.float32]:
     return np.array(rows, dtype=np.float32)  # for colours: single precision is plenty
 
 
-_PARTS = {
-    "max_bending_strain": "bending_strain",
-    "normal_curvature": "normal_curvature",
-    "geodesic_curvature": "geodesic_curvature",
-    "twist_rate": "twist_rate",
-    "torsion_stress": "torsion_stress",
-}
-
-
 class _Withstood(NamedTuple):
     """By what the utilisation of the final shapes and that of the deployment are counted [Pa], and by which factors
     (k,) their stresses."""
@@ -184,12 +153,11 @@ class _Withstood(NamedTuple):
     def worst_place(self, bent: BendingCheck, mesh: GridMesh) -> dict[str, Any]:
         """The most stressed place: the rod, and how far along it [m]."""
         at = int(np.argmax(self.stressed(bent)))
-        rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
-        return {"rod": rod.name, "at": float(mesh.stations[at]) - rod.start}
+        return dict(zip(("rod", "at"), mesh.place(at), strict=True))
 
     def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
         """Worst figures over a part of the rods' nodes, in any of the shapes."""
-        figures = _worst([*final, *stages], where)
+        figures: dict[str, Any] = worst([*final, *stages], where)
         judged = ((final, self.standing), (stages, self.erection))
         shares = [
             float((self.net * shape.stress)[where].max()) / strength
@@ -198,34 +166,6 @@ class _Withstood(NamedTuple):
             if strength is not None and shape.stress is not None
         ]
         return figures | ({"utilisation": max(shares)} if shares else {})
-
-
-def _design_strength(limits: Limits, bending: Bending) -> DesignStrength:
-    """What was judged by, and the deployment judged by it."""
-    stages = bending.deployment
-    return DesignStrength(
-        **limits.bending,
-        erection=limits.erection,
-        axial=limits.axial,
-        shear=1.0 / limits.shear_weight,
-        creep=limits.creep,
-        erection_utilisation=stages.utilisation if stages and limits.erection is not None else None,
-        source=limits.source,
-    )
-
-
-def _worst(bent: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
-    """Worst figures over a part of the rods' nodes, in any of the shapes."""
-    sharp = max(float(shape.curvature[where].max()) for shape in bent)
-    figures: dict[str, Any] = {"min_radius": 1 / sharp if sharp > 0 else None}
-    strains = [float(shape.strain[where].max()) for shape in bent if shape.strain is not None]
-    stresses = [float(shape.stress[where].max()) for shape in bent if shape.stress is not None]
-    figures["max_strain"] = max(strains, default=None)
-    figures["max_stress"] = max(stresses, default=None)
-    for key, name in _PARTS.items():
-        parts = [float(np.abs(part[where]).max()) for shape in bent if (part := getattr(shape, name)) is not None]
-        figures[key] = max(parts, default=None)
-    return figures
 
 
 def _rods(
@@ -269,132 +209,55 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
     return Bending(strength=withstood.standing, erection_strength=withstood.erection, **shapes)
 
 
-def _contact(checks: Checks) -> Contact:
-    shapes: dict[str, Any] = {ends: Clearance(**_clearance(found)) for ends, found in checks.contact.items()}
-    if checks.closest_stage is None:
-        return Contact(**shapes)
-    share, found = checks.closest_stage
-    return Contact(**shapes, deployment=Clearance(**_clearance(found), share=share))
+def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Results:
+    """The results of a form with those under loads.
 
-
-def _clearance(found: ContactCheck) -> dict[str, Any]:
-    return {"clearance": found.clearance, "pairs": found.pairs, "rods": found.rods, "where": found.where}
-
-
-def _reactions(held: SupportReactions) -> Reactions:
-    return Reactions(
-        force_sum=held.sum_of_forces.tolist(),
-        moment_sum=held.sum_of_moments.tolist(),
-        force_imbalance=held.force_imbalance,
-        moment_imbalance=held.moment_imbalance,
-        largest_force=float(np.linalg.norm(held.forces, axis=1).max(initial=0.0)),
-        largest_moment=float(np.linalg.norm(held.moments, axis=1).max(initial=0.0)),
-        forces=held.forces.tolist(),
-        moments=held.moments.tolist(),
+    Parameters
+    ----------
+    mesh : of the flat grid, its rods in the order of the results.
+    """
+    found = results.changed(
+        loads={
+            name: {
+                ends: shell.changed(bracing=_in_order(results, mesh, checks.braced, shell.bracing_forces))
+                for ends, shell in by_ends.items()
+            }
+            for name, by_ends in checks.shells.items()
+        },
+        warnings=(*checks.warnings, *results.warnings),
+        self_weight={
+            ends: alone.changed(braced_factor=braced.load_factor, braced_limit=braced.limit)
+            if (braced := checks.self_weight.get(ends)) is not None
+            else alone
+            for ends, alone in results.self_weight.items()
+        },
     )
+    late = f"the loads were not checked: {checks.refused}" if checks.refused else checks.stopped
+    return found.changed(status=late) if late and found.status == "converged" else found
 
 
-def _joint_loads(mesh: GridMesh, loads: JointLoads) -> tuple[JointLoad, ...]:
-    """Of each joint, on its second rod."""
-    names = [rod.name for rod in mesh.grid.rods]
-    rows = zip(
-        mesh.grid.crossings.rods.tolist(),
-        loads.forces[:, 1].tolist(),
-        loads.normal_forces.tolist(),
-        loads.shear_moments.tolist(),
-        loads.out_of_plane_moments.tolist(),
-        np.degrees(loads.scissor).tolist(),
-        strict=True,
-    )
-    return tuple(
-        JointLoad(
-            rods=(names[a], names[b]),
-            force=force,
-            normal_force=normal,
-            shear_moment=shear,
-            out_of_plane_moment=out_of_plane,
-            scissor_deg=scissor,
-        )
-        for (a, b), force, normal, shear, out_of_plane, scissor in rows
-    )
+def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
+    """What states.npz holds of them: node positions (n, 3) [m] and stress (k,) [Pa], the mode at the limit and the
+    lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter".
+    """
+    states: dict[str, NDArray[Any]] = {}
+    for name, by_ends in checks.shells.items():
+        for ends, shell in by_ends.items():
+            states[f"loaded_{ends}_{name}"] = shell.positions
+            if shell.stress is not None:
+                states[f"loaded_stress_{ends}_{name}"] = shell.stress
+            if shell.mode is not None:
+                states[f"loaded_mode_{ends}_{name}"] = shell.mode
+            for k, mode in enumerate(shell.modes):
+                states[f"loaded_buckling_{ends}_{name}_{k + 1}"] = mode
+    return states
 
 
-def _deployment(checks: Checks) -> Deployment:
-    found = checks.deployment
-    assert found is not None
-    stages = tuple(
-        Stage(share=float(share), height=float(np.ptp(positions[:, 2])), **_worst([bent], slice(None)))
-        for share, positions, bent in zip(found.share, found.positions, checks.deployment_bending, strict=True)
-    )
-    return Deployment(
-        ends="pinned",
-        stages=stages,
-        snaps=tuple((snap.start, snap.stop) for snap in found.snaps),
-        snapped_by=tuple(snap.moved for snap in found.snaps),
-        lost_at=found.lost_at,
-        reached_from_flat=found.reached_from_flat,
-        elsewhere=None if found.elsewhere is None else _shape(found.elsewhere),
-        guided=found.guided,
-        clamped=ClampedDeployment(reached_from_flat=checks.clamped_from_flat),
-    )
-
-
-def _shape(shape: Elsewhere | FoundShape) -> OtherShape:
-    """All that is known of a shape but its positions."""
-    if isinstance(shape, Elsewhere):
-        return OtherShape(distance=shape.distance, energy=shape.energy)
-    return OtherShape(
-        distance=shape.distance, energy=shape.energy, from_flat=shape.from_flat, mirror=bool(shape.mirror)
-    )
-
-
-def _other_shapes(searched: ShapeSearch) -> OtherShapes:
-    return OtherShapes(
-        tried=searched.tried,
-        searched=searched.searched,
-        popped_through=searched.popped_through,
-        largest_kick=searched.largest_kick,
-        found=tuple(_shape(shape) for shape in searched.found),
-    )
-
-
-def joint_names(mesh: GridMesh) -> list[str]:
-    """Ids of the joints, the two rods' ids with a slash, in the order of the grid's crossings."""
-    names = [rod.name for rod in mesh.grid.rods]
-    return ["/".join(names[k] for k in sorted(pair)) for pair in mesh.grid.crossings.rods.tolist()]
-
-
-def support_names(mesh: GridMesh) -> list[str]:
-    """Names of the rod ends, as "U03.1": start (0) and end (1) of each rod in turn."""
-    return [f"{rod.name}.{end}" for rod in mesh.grid.rods for end in (0, 1)]
-
-
-def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fabrication:
-    names, joints = [rod.name for rod in mesh.grid.rods], joint_names(mesh)
-    points = [*joints, *support_names(mesh)]
-    joint_mass = (results.joint.mass if results.joint else None) or 0.0
-    stock = dict[str, Any]()
-    if fabricated.nesting is not None:
-        pieces = [
-            Piece(piece=f"{lath_name(names[rod], lath)}.{number}", length=length)
-            for rod, lath, number, length in fabricated.pieces
-        ]
-        bars = tuple(Bar(pieces=tuple(pieces[k] for k in bar.pieces), left=bar.left) for bar in fabricated.nesting.bars)
-        stock["stock"] = Stock(waste=fabricated.nesting.waste, fewest=fabricated.nesting.fewest, bars=bars)
-    return Fabrication(
-        end_allowance=fabricated.options.end_allowance,
-        stock_length=fabricated.options.stock_length,
-        kerf=fabricated.options.kerf,
-        total_mass=float(fabricated.mass.sum()) + len(joints) * joint_mass,
-        bracing=tuple(
-            Brace(
-                start=points[brace.joints[0]],
-                end=points[brace.joints[1]],
-                flat=brace.flat,
-                final=brace.final,
-                **({} if brace.cut is None else {"cut": brace.cut}),
-            )
-            for brace in fabricated.bracing
-        ),
-        **stock,
-    )
+def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) -> tuple[float | None, ...]:
+    """The force of each brace of the fabrication; None of those that are left out."""
+    names = [*mesh.grid.joint_names, *mesh.grid.support_names]
+    known = {
+        frozenset((names[a], names[b])): force for (a, b), force in zip(braced.tolist(), forces.tolist(), strict=True)
+    }
+    rows = results.fabrication.bracing if results.fabrication else ()
+    return tuple(known.get(frozenset((brace.start, brace.end))) for brace in rows) if known else ()

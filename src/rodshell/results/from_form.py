@@ -14,19 +14,8 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.checks import Checks
-from rodshell.formfinding import Agreement as FoundAgreement
-from rodshell.formfinding import Footprint, PatchForm, Trimmed
-from rodshell.formfinding.bound_drape import shape_of_net
-from rodshell.formfinding.finite_sections import is_flat
-from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.seams import End
-from rodshell.formfinding.trim import ends_past_net
-from rodshell.joints import joint_parameters
-from rodshell.joints.joint import Joint as JointModel
-from rodshell.kernels import description
-from rodshell.layout import FlatGrid, Profile
-from rodshell.nets import ChebyshevNet
-from rodshell.results.records import (
+from rodshell.figures.findings import said
+from rodshell.figures.form import (
     Agreement,
     Drape,
     Dropped,
@@ -50,13 +39,23 @@ from rodshell.results.records import (
     Stiffness,
     StrongBending,
     Target,
-    plain,
 )
+from rodshell.figures.records import Ends, plain
+from rodshell.formfinding import Footprint, PatchForm, Trimmed
+from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.finite_sections import is_flat
+from rodshell.formfinding.patches import PatchedForm
+from rodshell.formfinding.seams import End
+from rodshell.formfinding.trim import ends_past_net
+from rodshell.joints import joint_parameters
+from rodshell.joints.joint import Joint as JointModel
+from rodshell.kernels import description
+from rodshell.layout import FlatGrid, Profile
+from rodshell.nets import ChebyshevNet
 from rodshell.results.results import Results
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod as RodModel
 from rodshell.rods.varied import sizes
-from rodshell.solve.equilibrium import SolveReport
 from rodshell.targets import Target as TargetSurface
 from rodshell.targets.surface_mesh import surface_mesh
 from rodshell.version import __version__, version_of
@@ -68,15 +67,44 @@ States = dict[str, NDArray[Any]]
 
 
 def results_of(stages: PatchForm | PatchedForm) -> Results:
-    """The results of a form, before it is checked.
+    """The results of a form, before it is checked; those of patches are of one shell, with `patches` and `seams`.
 
     Parameters
     ----------
     stages : of a form in one piece, in patches, or from a table of rods.
     """
+    known = {
+        "rod": rod_type(stages.rod),
+        "joint": _joint(stages.joint),
+        **_grid(stages.footprint, stages.boundary.points, stages.dropped, stages.rod),
+        "pop_up": _pop_ups(stages),
+    }
+    if isinstance(stages, PatchForm) and stages.from_table:
+        return Results(**_head("rods", stages.status, stages.warnings), **known)
+    known |= {
+        "layout": Layout.model_validate(stages.layout.parameters()),
+        "end_tangents": stages.boundary.tangents.tolist(),
+        "agreement": _agreements(stages),
+    }
     if isinstance(stages, PatchedForm):
-        return patches_results(stages)
-    return table_results(stages, "rods") if stages.from_table else form_results(stages)
+        nets = [laid.net for laid in stages.patch_nets.values()]
+        tightest = min(nets, key=lambda net: net.min_angle)
+        known |= {
+            "target": _target(stages.target, flat=is_flat(stages.draped, stages.rod)),
+            "patches": tuple(_patch(stages, name) for name in stages.patches),
+            "seams": tuple(_seam(stages, k) for k in range(len(stages.seams))),
+            "net": _net(tightest).changed(error_estimate=max(net.error_estimate for net in nets)),
+            "drape": _drape_of_all([_drape(found.trimmed) for found in stages.patches.values()]),
+        }
+    else:
+        known |= {
+            "target": _target(stages.target, flat=is_flat(stages.trimmed.positions, stages.rod)),
+            "crossings_without_joint": _without_joint(stages.footprint.mesh.grid),
+            "drape": _drape(stages.trimmed),
+        }
+        if stages.draped.net is not None:
+            known["net"] = _net(stages.draped.net)
+    return Results(**_head(stages.target.name, stages.status, stages.warnings), **known)
 
 
 def states_of(stages: PatchForm | PatchedForm) -> States:
@@ -86,102 +114,25 @@ def states_of(stages: PatchForm | PatchedForm) -> States:
     ----------
     stages : as of `results_of`.
     """
+    mesh = stages.footprint.mesh
+    states: States = {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
     if isinstance(stages, PatchedForm):
-        return patches_states(stages)
-    return table_states(stages) if stages.from_table else form_states(stages)
-
-
-def form_results(form: PatchForm) -> Results:
-    """The results of a form in one piece, before it is checked."""
-    found = Results(
-        **_head(form.target.name, form.status, form.warnings),
-        target=_target(form.target, flat=is_flat(form.trimmed.positions, form.rod)),
-        layout=Layout.model_validate(form.layout.parameters()),
-        rod=rod_type(form.rod),
-        joint=_joint(form.joint),
-        **_grid(form.footprint, form.boundary.points, form.dropped, form.rod),
-        crossings_without_joint=_without_joint(form.footprint.mesh.grid),
-        end_tangents=form.boundary.tangents.tolist(),
-        agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
-        drape=_drape(form.trimmed),
-        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
-    )
-    return found if form.draped.net is None else found.changed(net=_net(form.draped.net))
-
-
-def form_states(form: PatchForm) -> States:
-    """The states of a form in one piece."""
-    states = _mesh_states(form.footprint)
-    if (draped := form.boundary.draped) is not None:
-        states["draped"] = draped
-        states["gap_draped"] = form.target.gap(draped).distance - form.footprint.mesh.heights
-        states |= _target_states(form.target, draped)
-    for ends, shell in form.popped.items():
+        draped: Floats | None = stages.draped
+        gaps = [found.target.gap(found.trimmed.positions).distance for found in stages.patches.values()]
+        states["gap_draped"] = np.concatenate(gaps)
+    elif (draped := stages.boundary.draped) is not None and not stages.from_table:
+        states["gap_draped"] = stages.target.gap(draped).distance - mesh.heights
+    if "gap_draped" in states and draped is not None:
+        points, faces = surface_mesh(stages.target, draped)  # of the target under the shell, for pictures
+        states |= {
+            "draped": draped,
+            "target_points": points.astype(np.float32),
+            "target_faces": faces.astype(np.uint32),
+        }
+    for ends, shell in stages.popped.items():
         states[f"popped_{ends}"] = shell.positions
-        if ends in form.agreement:
-            states[f"gap_{ends}"] = form.agreement[ends].gaps
-    return states
-
-
-def _target_states(target: TargetSurface, around: Floats) -> States:
-    """Triangles of the target under a shell, for pictures."""
-    points, faces = surface_mesh(target, around)
-    return {"target_points": points.astype(np.float32), "target_faces": faces.astype(np.uint32)}
-
-
-def table_results(table: PatchForm, name: str) -> Results:
-    """The results of a table of rods that was popped up, before it is checked.
-
-    Parameters
-    ----------
-    table : the stages; name : of the result, since a table has no target.
-    """
-    return Results(
-        **_head(name, table.status, table.warnings),
-        rod=rod_type(table.rod),
-        joint=_joint(table.joint),
-        **_grid(table.footprint, table.boundary.points, table.dropped, table.rod),
-        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in table.popped.items()},
-    )
-
-
-def table_states(table: PatchForm) -> States:
-    """The states of a table of rods that was popped up."""
-    return _mesh_states(table.footprint) | {f"popped_{ends}": shell.positions for ends, shell in table.popped.items()}
-
-
-def patches_results(form: PatchedForm) -> Results:
-    """The results of a form in patches, before it is checked: those of one shell, with `patches` and `seams`."""
-    nets = [laid.net for laid in form.patch_nets.values()]
-    tightest = min(nets, key=lambda net: net.min_angle)
-    return Results(
-        **_head(form.target.name, form.status, form.warnings),
-        target=_target(form.target, flat=is_flat(form.draped, form.rod)),
-        layout=Layout.model_validate(form.layout.parameters()),
-        rod=rod_type(form.rod),
-        joint=_joint(form.joint),
-        patches=tuple(_patch(form, name) for name in form.patches),
-        seams=tuple(_seam(form, k) for k in range(len(form.seams))),
-        net=_net(tightest).changed(error_estimate=max(net.error_estimate for net in nets)),
-        **_grid(form.footprint, form.boundary.points, form.dropped, form.rod),
-        end_tangents=form.boundary.tangents.tolist(),
-        agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
-        drape=_drape_of_all([_drape(found.trimmed) for found in form.patches.values()]),
-        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
-    )
-
-
-def patches_states(form: PatchedForm) -> States:
-    """The states of a form in patches."""
-    states = _mesh_states(form.footprint)
-    states["draped"] = form.draped
-    gaps = [found.target.gap(found.trimmed.positions).distance for found in form.patches.values()]
-    states["gap_draped"] = np.concatenate(gaps)
-    states |= _target_states(form.target, form.draped)
-    for ends, shell in form.popped.items():
-        states[f"popped_{ends}"] = shell.positions
-        if ends in form.agreement:
-            states[f"gap_{ends}"] = form.agreement[ends].gaps
+        if ends in stages.agreement:
+            states[f"gap_{ends}"] = stages.agreement[ends].gaps
     return states
 
 
@@ -210,22 +161,15 @@ def with_refinement(results: Results, found: "Refined") -> Results:
     results : of the form after it.
     """
     gates: tuple[Gate, ...] = get_args(Gate)
-    before, after = (
-        GapBefore(rms_relative=gap.rms_relative, max_relative=gap.max_relative)
-        for gap in (found.gap_before, found.gap_after)
-    )
-    said = [] if found.changed else [f"the form is not refined: {found.refused}"]
+    refused = [] if found.changed else [said("not_refined", found.ends, why=found.refused)]
     if found.stopped:
-        said.append(f"{found.stopped}: the refinement was stopped at what it had found")
+        refused.append(said("not_refined: late", found.ends, when=found.stopped))
     return results.changed(
-        warnings=(*results.warnings, *said),
-        refinement=Refinement(
-            vary=found.vary,
-            ends=found.ends,
-            before=before,
-            after=after,
-            factorizations=found.factorizations,
-            gate_factorizations=found.gate_factorizations,
+        warnings=(*results.warnings, *refused),
+        refinement=Refinement.taken_from(
+            found,
+            before=GapBefore.taken_from(found.gap_before),
+            after=GapBefore.taken_from(found.gap_after),
             gates={gate: found.gates[gate] for gate in gates},
             refused=found.refused or None,
         ),
@@ -280,23 +224,20 @@ def _drape(trimmed: Trimmed) -> Drape:
         off = ends_past_net(trimmed)
     more: dict[str, Any] = {}
     if draped.rest is not None:
-        more["fall"] = Rest(**asdict(draped.rest))
+        more["fall"] = Rest.taken_from(draped.rest)
     if draped.eccentricity:
         more["eccentricity"] = draped.eccentricity
     if draped.figures.strong_bending is not None:
-        more["strong_bending"] = StrongBending(**asdict(draped.figures.strong_bending))
+        more["strong_bending"] = StrongBending.taken_from(draped.figures.strong_bending)
     if off is not None:
         more["net_deviation"] = NetDeviation(max=float(np.abs(off).max()), median=float(np.median(np.abs(off))))
-    return Drape(
+    return Drape.taken_from(
+        draped.report,
         method=draped.method.name,
         status=draped.report.status.value,
-        dofs=draped.report.dofs,
-        levels=tuple(Solve(**_effort(level)) for level in draped.levels),
+        levels=tuple(Solve.taken_from(level, status=level.status.value) for level in draped.levels),
         seconds=sum(level.seconds for level in draped.levels),
-        force_residual=draped.report.force_residual,
-        max_strain=draped.report.max_strain,
         max_gap=draped.figures.max_gap,
-        negative_modes=draped.report.negative_modes,
         min_angle_deg=degrees(draped.figures.min_angle),
         min_angle_at=draped.figures.min_angle_at,
         contact_pulls=draped.figures.contact_pulls,
@@ -325,11 +266,6 @@ def _drape_of_all(parts: list[Drape]) -> Drape:
     return tightest.changed(**figures)
 
 
-def _mesh_states(footprint: Footprint) -> States:
-    mesh = footprint.mesh
-    return {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
-
-
 def _without_joint(grid: FlatGrid) -> int:
     """At how many crossings the rods have no joint."""
     return len(FlatGrid.of(grid.rods).crossings) - len(grid.crossings)
@@ -344,15 +280,7 @@ def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, s
             name, start = footprint.rods[other].name, footprint.rods[k].start
             joints[k].append(RodJoint(other=name, at=distance - start))
     rods = [
-        Rod(
-            id=rod.name,
-            family=rod.family,
-            offset=rod.offset,
-            start=rod.start,
-            end=rod.end,
-            length=rod.length,
-            joints=tuple(sorted(on_rod, key=lambda joint: joint.at)),
-        )
+        Rod.taken_from(rod, id=rod.name, joints=tuple(sorted(on_rod, key=lambda joint: joint.at)))
         for rod, on_rod in zip(footprint.rods, joints, strict=True)
     ]
     for k, rod in enumerate(footprint.rods):
@@ -377,32 +305,21 @@ def _stiffness(profile: Profile, length: float, kind: RodModel) -> Stiffness:
     )
 
 
-def _effort(report: SolveReport) -> dict[str, Any]:
+def _pop_ups(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
+    """Figures of the pop-up with each kind of ends."""
     return {
-        "dofs": report.dofs,
-        "status": report.status.value,
-        "iterations": report.iterations,
-        "factorizations": report.factorizations,
-        "seconds": report.seconds,
+        ends: PopUp.taken_from(
+            shell.report,
+            status=shell.report.status.value,
+            start=shell.start,
+            stable=shell.report.stable if shell.report.converged else None,
+        )
+        for ends, shell in stages.popped.items()
     }
 
 
-def _pop_up(report: SolveReport, start: str) -> PopUp:
-    """Figures of a pop-up that began from the shape `start`."""
-    return PopUp(
-        **_effort(report),
-        start=start,
-        force_residual=report.force_residual,
-        max_strain=report.max_strain,
-        negative_modes=report.negative_modes,
-        stable=report.stable if report.converged else None,
-    )
-
-
-def _agreement(gap: FoundAgreement) -> Agreement:
-    return Agreement(
-        max=gap.max, rms=gap.rms, max_relative=gap.max_relative, rms_relative=gap.rms_relative, where=gap.where
-    )
+def _agreements(stages: PatchForm | PatchedForm) -> dict[Ends, Agreement]:
+    return {ends: Agreement.taken_from(gap) for ends, gap in stages.agreement.items()}
 
 
 def _patch(form: PatchedForm, name: str) -> Patch:
@@ -418,9 +335,9 @@ def _patch(form: PatchedForm, name: str) -> Patch:
         flat_shift=form.flat.shifts[name].tolist(),
         ends_moved=form.moved[name],
         net=_net(laid.net),
-        agreement={ends: _agreement(gap) for ends, gap in found.agreement.items()},
+        agreement=_agreements(found),
         drape=_drape(found.trimmed),
-        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in found.popped.items()},
+        pop_up=_pop_ups(found),
     )
 
 

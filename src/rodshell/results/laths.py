@@ -1,7 +1,7 @@
 """Laths that lie on the rods of a result over part of their length: where, what they are called, how long all are."""
 
+from rodshell.figures.form import Rod
 from rodshell.layout import Profile
-from rodshell.results.records import Rod
 from rodshell.results.results import Results
 
 
@@ -13,16 +13,6 @@ def laths_on(rod: Rod) -> tuple[tuple[float, float], ...]:
     length = along.at[-1]
     profile = Profile(tuple(at / length for at in along.at), along.factors, "laths")
     return profile.laths(length, 0.5 * (_cut(rod) - length))
-
-
-def lath_name(rod: str, number: int) -> str:
-    """What a lath is called: the first as its rod, the second "U07-2".
-
-    Parameters
-    ----------
-    rod : its id; number : of the lath.
-    """
-    return rod if number == 1 else f"{rod}-{number}"
 
 
 def lengths_text(results: Results) -> str:

@@ -8,10 +8,12 @@ That holds where joints have no stiffness of their own: within 4 % on the exampl
 from collections.abc import Mapping, Sequence
 from math import inf, sqrt
 
-from rodshell.results.findings import Said
-from rodshell.results.records import Ends, RodType
-from rodshell.results.records import Section as RodSection
-from rodshell.results.results import Results, SelfWeight
+from rodshell.figures.checks import SelfWeight
+from rodshell.figures.findings import Said, said
+from rodshell.figures.form import RodType
+from rodshell.figures.form import Section as RodSection
+from rodshell.figures.records import Ends
+from rodshell.results.results import Results
 from rodshell.results.sizes_sold import half_sides, sizes_sold
 from rodshell.results.strength_used import THIN, bent_of, holds_while_erected, strength_name
 from rodshell.results.wording import FORM_AGAIN, part_of_weight, percent, rounded, rounded_down, shown_factor
@@ -53,7 +55,7 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], boo
     ----------
     results : with the checks of the self-weight.
     """
-    found, said = _carried(results, ends), list[Said]()
+    found, findings = _carried(results, ends), list[Said]()
     parts = _below(found, 1.0)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
     bracing = " with its bracing" * is_braced(results)
@@ -61,48 +63,41 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], boo
         unknown_above = any(results.self_weight[end].limit == "not followed" for end in bare)
         carries = "is known to carry only" if unknown_above else "carries only"
         weight = _parts(bare, "its own weight")
-        words = f"{_alone(bare)}the shell {carries} {weight} without its bracing: support it until that is in place"
-        said.append(Said(words, "needs_bracing", _one(bare), min(bare.values()), 1))
+        least, alone = min(bare.values()), _alone(bare)
+        findings.append(said("needs_bracing", _one(bare), least, 1, alone=alone, carries=carries, weight=weight))
     standing = [end for end, weighed in found.items() if end not in parts and weighed.limit not in (None, "no mass")]
     falling = {end: part for end, part in parts.items() if end not in lost}
     unknown = {end: part for end, part in parts.items() if end in lost}
     if falling:
         others = "".join(f"; with {end} ends it carries {_times(found[end])} its own weight" for end in standing)
         advice, offers = _other_rods(results, falling)
-        words = (
-            f"{_alone(falling)}the shell does not stand under its own weight{bracing}: it carries only "
-            f"{_parts(falling)}{others}{advice}"
-        )
-        said.append(Said(words, "falls", _one(falling), min(falling.values()), 1, offers=offers))
+        findings.append(said(
+            "falls", _one(falling), min(falling.values()), 1, offers=offers, alone=_alone(falling), bracing=bracing,
+            parts=_parts(falling), others=others, advice=advice,
+        ))  # fmt: skip
     short = {end: part for end, part in _below(found, reserve(results)).items() if end in standing and end not in lost}
     if short:
         weights = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in short)
         others = "".join(f"; with {end} ends it carries {_times(found[end])}" for end in standing if end not in short)
         advice, offers = _other_rods(results, short)
-        words = f"the shell{bracing} carries only {weights}, and {_asked(results)}{others}{advice}"
-        said.append(Said(words, "reserve", _one(short), min(short.values()), reserve(results), offers=offers))
+        findings.append(said(
+            "reserve", _one(short), min(short.values()), reserve(results), offers=offers, bracing=bracing,
+            weights=weights, asked=_asked(results), others=others, advice=advice,
+        ))  # fmt: skip
     if unknown:
-        words = (
-            f"{_alone(unknown)}it is not known whether the shell stands under its own weight{bracing}: it could be "
-            f"followed only up to {_parts(unknown)}"
-        )
-        said.append(Said(words, "not_followed", _one(unknown), min(unknown.values()), 1))
+        findings.append(said(
+            "not_followed: weight", _one(unknown), min(unknown.values()), 1, alone=_alone(unknown), bracing=bracing,
+            parts=_parts(unknown),
+        ))  # fmt: skip
     for end in standing:
         if end in lost:
-            words = (
-                f"with {end} ends the shell{bracing} carries {_times(found[end])} its own weight; above, it could not "
-                "be followed, and nothing is known"
-            )
-            said.append(Said(words, "not_followed", end, found[end].load_factor, reserve(results)))
+            factor, times = found[end].load_factor, _times(found[end])
+            findings.append(said("not_followed: reserve", end, factor, reserve(results), bracing=bracing, times=times))
     if any(weighed.limit == "no mass" for weighed in found.values()):
-        words = (
-            "no mass was given, so that it is not known what share of its own weight the shell carries: give "
-            "rod.section.mass"
-        )
-        said.append(Said(words, "no_mass"))
+        findings.append(said("no_mass"))
     if any(end not in found or found[end].limit is None for end in ends):
-        said.append(Said(f"whether it carries its own weight{bracing} was not checked", "not_checked"))
-    return said, bool(standing or (bracing and not falling))
+        findings.append(said("not_checked: weight", bracing=bracing))
+    return findings, bool(standing or (bracing and not falling))
 
 
 def _carried(results: Results, ends: Sequence[Ends]) -> dict[Ends, SelfWeight]:

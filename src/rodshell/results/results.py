@@ -1,12 +1,11 @@
-"""The content of result.json: the records of what was checked and made, and the whole with every value checked.
+"""The content of result.json: all records of `rodshell.figures` in a whole, with every value checked.
 
-`Results` reads the file of any version, writes it, and gives its JSON Schema; the records of what was asked for and
-found are in `records`.
+`Results` reads the file of any version, writes it, and gives its JSON Schema.
 """
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -14,33 +13,43 @@ import numpy as np
 from pydantic import FailFast, Field, ValidationError
 
 from rodshell.errors import InputError, OutputError
-from rodshell.results.loaded import DesignStrength, LoadCases
-from rodshell.results.manifest import read_table
-from rodshell.results.records import (
-    FARTHEST,
-    SHORTEST,
+from rodshell.figures.checks import (
+    Bending,
+    Contact,
+    Deployment,
+    EndsInTheAir,
+    JointLoad,
+    OtherShapes,
+    Reactions,
+    SelfWeight,
+)
+from rodshell.figures.fabrication import Fabrication
+from rodshell.figures.findings import Finding, Level
+from rodshell.figures.form import (
     Agreement,
-    Bent,
-    ByEnds,
     Drape,
     Dropped,
-    Flag,
-    Flat,
     Joint,
     Layout,
     Net,
-    Number,
     Patch,
-    Point,
     PopUp,
-    Real,
-    Record,
     Refinement,
     Rod,
     RodType,
-    Rows,
     Seam,
     Target,
+)
+from rodshell.figures.loads import DesignStrength, LoadCases
+from rodshell.figures.records import (
+    FARTHEST,
+    SHORTEST,
+    ByEnds,
+    Flat,
+    Number,
+    Point,
+    Record,
+    Rows,
     Text,
     Whole,
     by_ends,
@@ -49,203 +58,15 @@ from rodshell.results.records import (
     key,
     plain,
     printable,
-    required,
     rows,
 )
+from rodshell.results.manifest import read_table
 from rodshell.validation import instance, short
 
 FORMAT = "rodshell-result"
 VERSION = 2
 SIZE = 25e6  # bytes of result.json; its content takes up to a hundred times that
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
-
-Level = Literal["good", "check", "unbuildable", "unknown"]
-
-
-class WorstBent(Bent):
-    """Worst bending over all rods, and where the stress is largest."""
-
-    rod: Text | None = key("id of the rod with the largest stress")
-    at: Number = key("distance of that place from the rod's start", "m")
-    share: Number = key("share of the deployment at which it occurs; 0 flat, 1 popped up")
-
-
-class Bending(Record):
-    """Bending and stress of all rods in the shapes of the shell."""
-
-    strength: Number = key("by which the use of final shapes is counted: permanent, if that is known", "Pa")
-    erection_strength: Number = key("by which the use of the deployment's stages is counted", "Pa")
-    shear_strength: Number = key("shear strength; null: stress is counted by von Mises", "Pa")
-    strength_of: Text | None = key("the preset whose strengths these are; null where they were given")
-    pinned: WorstBent | None = key("final shape with pinned ends")
-    clamped: WorstBent | None = key("final shape with clamped ends")
-    pop_up: WorstBent | None = key("all stages of the deployment and the final shape")
-    deployment: WorstBent | None = key("stages of the deployment below the final shape")
-
-    def shapes(self) -> dict[str, WorstBent]:
-        """What is known, by the name of the shape."""
-        known = {"pinned": self.pinned, "clamped": self.clamped, "pop_up": self.pop_up, "deployment": self.deployment}
-        return {name: bent for name, bent in known.items() if bent is not None}
-
-
-class Clearance(Record):
-    """The nearest two rods of a shape, apart from those that cross there."""
-
-    clearance: Number = key("distance of their surfaces; negative: overlap; null: none are near, or not known", "m")
-    pairs: Whole | None = key("number of pairs of rods that touch")
-    rods: tuple[Text, Text] | None = key("ids of the nearest two rods")
-    where: Point | None = key("place between them", "m")
-    share: Number = key("share of the deployment of this shape; 0 flat, 1 popped up")
-
-
-class Contact(Record):
-    """Contact of rods with each other."""
-
-    pinned: Clearance | None = key("final shape with pinned ends")
-    clamped: Clearance | None = key("final shape with clamped ends")
-    deployment: Clearance | None = key("the worst stage of the deployment")
-
-    def of(self, shape: str) -> Clearance | None:
-        """Of "pinned", "clamped" or "deployment"."""
-        return {"pinned": self.pinned, "clamped": self.clamped, "deployment": self.deployment}.get(shape)
-
-
-class Reactions(Record):
-    """What the supports exert on the unloaded shell, in the order of `boundary`."""
-
-    force_sum: Point | None = key("sum of all forces", "N")
-    moment_sum: Point | None = key("sum of all moments", "N m")
-    force_imbalance: Number = key("sum of all forces over the largest")
-    moment_imbalance: Number = key("sum of all moments over the largest")
-    largest_force: Number = key("largest support force", "N")
-    largest_moment: Number = key("largest support moment", "N m")
-    forces: Rows[Point] = rows("force at each rod end", "N")
-    moments: Rows[Point] = rows("moment at each rod end", "N m")
-
-
-class JointLoad(Record):
-    """What acts at a joint on the second of its rods."""
-
-    rods: tuple[Text, Text] = Field(description="ids of the two rods")
-    force: Point | None = key("force", "N")
-    normal_force: Number = key("force along the joint's normal", "N")
-    shear_moment: Number = key("moment about the joint's normal", "N m")
-    out_of_plane_moment: Number = key("moment across the joint's normal", "N m")
-    scissor_deg: Number = key("growth of the angle between the rods since the flat grid", "deg")
-
-
-class SelfWeight(Record):
-    """How much of its own weight the shell carries."""
-
-    load_factor: Number = key("factor on the weight at which stability is lost; null: above 100, or no mass given")
-    deflection: Number = key("largest displacement under the whole weight; null: it does not carry it", "m")
-    limit: Text | None = key("limit point, bifurcation, unstable unloaded, none, not followed, or no mass")
-    braced_factor: Number = key("the load_factor of the shell with its bracing and locked joints")
-    braced_limit: Text | None = key("as limit, of the braced shell; absent without bracing")
-
-
-class EndsInTheAir(Record):
-    """Rod ends, those at seams left out, that lie higher than a fiftieth of the size above the lowest one."""
-
-    count: Whole | None = key("number of these ends")
-    highest: Number = key("height of the highest over the lowest end", "m")
-    largest_force: Number = key(
-        "largest force on what holds one of them, of all that were checked; null: none are", "N"
-    )
-
-
-class Stage(Bent):
-    """A stage of the deployment, and its worst bending."""
-
-    share: Real = Field(description="share of the deployment: 0 flat, 1 popped up")
-    height: Number = key("height of the shell", "m")
-
-
-class OtherShape(Record):
-    """Another stable shape on the same supports."""
-
-    distance: Number = key("distance of the farthest node from the shell's shape, over half the shell's width")
-    energy: Number = key("energy over that of the shell's shape")
-    mirror: Flag | None = key("whether it is the reflection in the plane of the supports")
-    from_flat: Flag | None = key("true where a deployment is known to end in it")
-
-
-class ClampedDeployment(Record):
-    """Deployment to the clamped shape: pinned first, then the ends are turned."""
-
-    reached_from_flat: Flag | None = key("whether turning the ends leads to the clamped shape; null: not known")
-
-
-class Deployment(Record):
-    """The deployment from flat to popped up with pinned ends, the ends driven along straight lines."""
-
-    ends: Text | None = key('end condition: "pinned"')
-    stages: Rows[Stage] = rows("equilibria from flat to popped up")
-    snaps: Rows[tuple[Real, Real]] = rows("pairs of shares between which the shell snaps forward")
-    snapped_by: Rows[Number] = rows("how far a node moves in each snap", "m")
-    lost_at: Number = key("share below which no stage was found; null: all were")
-    reached_from_flat: Flag | None = key("whether the deployment ends in the final shape; null: not known")
-    elsewhere: OtherShape | None = key("the shape in which it ends instead")
-    guided: tuple[Real, Real] | None = key("shares between which the shell has to be guided")
-    clamped: ClampedDeployment | None = key("deployment to the clamped shape")
-
-
-class OtherShapes(Record):
-    """Search for other stable shapes; what was not found is not excluded."""
-
-    tried: Whole | None = key("number of starts")
-    searched: Text = Field(default="", description="how far the search looked")
-    popped_through: Flag | None = key("whether popping through was among the starts")
-    largest_kick: Number = key("largest kick over half the shell's width")
-    found: Rows[OtherShape] = rows("shapes that were found")
-
-
-# Fabrication and drawings
-
-
-class Brace(Record):
-    """A diagonal between two joints, or from a joint to a support."""
-
-    start: Text = required("id of the first joint, the two rods' ids with a slash", alias="from")
-    end: Text = required("id of the second joint, or of a support, as U03.1", alias="to")
-    flat: Number = key("length in the flat grid", "m")
-    final: Number = key("length in the final shape", "m")
-    cut: Number = key("length of a cable free of stress; absent without bracing of cables", "m")
-
-
-class Piece(Record):
-    """A piece that is cut from stock."""
-
-    piece: Text = Field(
-        description="the rod's id, a dot and its number along the rod; of the second lath on a rod with -2 after the id"
-    )
-    length: Number = key("length", "m")
-
-
-class Bar(Record):
-    """A bar of stock."""
-
-    pieces: Rows[Piece] = rows("what is cut from it")
-    left: Number = key("what is left of it", "m")
-
-
-class Stock(Record):
-    """The cutting plan."""
-
-    waste: Number = key("share of the stock that is in no piece")
-    fewest: Whole | None = key("bars that the pieces' total length takes at least")
-    bars: Rows[Bar] = rows("the bars")
-
-
-class Fabrication(Record):
-    """How the rods are cut and braced."""
-
-    end_allowance: Number = key("length added at each end of a rod, for its support", "m")
-    stock_length: Number = key("length of the bars; null: every rod comes in one piece", "m")
-    kerf: Number = key("length lost at each saw cut", "m")
-    total_mass: Number = key("mass of rods and joints", "kg")
-    bracing: Rows[Brace] = rows("diagonals of the cells, those of a cell in a row")
-    stock: Stock | None = key("the cutting plan")
 
 
 class Drawings(Record):
@@ -279,18 +100,6 @@ else:
                 raise InputError(f"{cls.__name__}: {_first_fault(error)}") from None
             except RecursionError:
                 raise InputError(f"{cls.__name__}: a value contains itself: give plain ones") from None
-
-
-class Finding(Record):
-    """What one sentence of a verdict says, as data."""
-
-    code: Text = Field(description="what is judged, one of the codes in docs/files.md")
-    support: Text | None = key("the end condition; null: of all, or of none")
-    figure: Number = key("what was found, in `unit`")
-    limit: Number = key("what is compared with it, in the same unit")
-    unit: Text = Field(default="", description='"m", or "" for a number or a share')
-    place: Text | None = key("the rod, or the combination of loads")
-    offers: Rows[Text] = rows("commands that may mend it, to be run in the folder of the result")
 
 
 class Verdict(Record, metaclass=_Refusing):
@@ -487,7 +296,7 @@ def contradictions(results: Results) -> Iterator[str]:
             if len(forces.each) != len(seam.meetings):
                 where = f"seams[{k}].forces.{support}.each"
                 yield f"{where} has {len(forces.each)} entries for {len(seam.meetings)} meetings"
-    counts = {"footprint": results.footprint, "boundary": results.boundary, "end_tangents": results.end_tangents}
+    counts: dict[str, Sized] = {name: getattr(results, name) for name in ("footprint", "boundary", "end_tangents")}
     for support, held in results.reactions.items():
         counts |= {f"reactions.{support}.forces": held.forces, f"reactions.{support}.moments": held.moments}
     for name, supported in results.loads.items():

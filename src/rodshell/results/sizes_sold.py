@@ -1,7 +1,7 @@
 """The sizes in which a rod's material is sold, and whether a chosen section is among them."""
 
-from rodshell.results.records import RodType
-from rodshell.results.records import Section as RodSection
+from rodshell.figures.form import RodType
+from rodshell.figures.form import Section as RodSection
 from rodshell.rods.section import TRADE_SIZES, Section, size_text
 
 

@@ -15,7 +15,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError, OutputError
-from rodshell.results.records import FARTHEST, LARGEST, far_apart
+from rodshell.figures.records import FARTHEST, LARGEST, far_apart
 from rodshell.results.results import Results
 from rodshell.untrusted import limit, raised, read_bytes
 

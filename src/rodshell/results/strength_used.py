@@ -1,7 +1,8 @@
 """How much of their strength the rods of a result use, and by which strength that is counted."""
 
-from rodshell.results.records import Ends
-from rodshell.results.results import Results, WorstBent
+from rodshell.figures.checks import WorstBent
+from rodshell.figures.records import Ends
+from rodshell.results.results import Results
 
 ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
 THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths

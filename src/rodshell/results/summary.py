@@ -3,11 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees
 
+from rodshell.figures.checks import Bending, SelfWeight
+from rodshell.figures.form import Bent, RodType
+from rodshell.figures.loads import DesignStrength
+from rodshell.figures.records import printable
 from rodshell.results.laths import laths_text, lengths_text
-from rodshell.results.loaded import DesignStrength
 from rodshell.results.own_weight import is_braced
-from rodshell.results.records import Bent, RodType, printable
-from rodshell.results.results import Bending, Results, SelfWeight
+from rodshell.results.results import Results
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import strength_name
 from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict_of

@@ -1,11 +1,13 @@
 """Rod ends that something other than the ground may have to hold: along open arches, free edges and openings."""
 
-from collections.abc import Iterator, Sequence
-from math import hypot
+from collections.abc import Iterator
 
-from rodshell.results.findings import Said
-from rodshell.results.records import Point
-from rodshell.results.results import EndsInTheAir, Results
+import numpy as np
+
+from rodshell.arrays import Floats
+from rodshell.figures.checks import EndsInTheAir
+from rodshell.figures.findings import Said, said
+from rodshell.results.results import Results
 from rodshell.results.wording import newtons, shown_length
 
 ABOVE = 0.02  # of the size: higher ends are not on the level of the lowest
@@ -28,7 +30,7 @@ def in_the_air(results: Results) -> EndsInTheAir | None:
     held = {k for k, name in enumerate(names) if name in seams}
     ground = min(known)
     above = [k for k, z in enumerate(heights) if z is not None and z - ground > ABOVE * size and k not in held]
-    forces = [hypot(*(part or 0.0 for part in row[k])) for row in _forces(results) for k in above]
+    forces = [float(np.linalg.norm(np.nan_to_num(row[k]))) for row in _forces(results) for k in above]
     highest = max((heights[k] or 0.0) - ground for k in above) if above else 0.0
     return EndsInTheAir(count=len(above), highest=highest, largest_force=max(forces, default=None))
 
@@ -40,7 +42,7 @@ def width(results: Results) -> float:
     return max((max(column) - min(column) for column in known if column), default=0.0)
 
 
-def _forces(results: Results) -> Iterator[Sequence[Point]]:
+def _forces(results: Results) -> Iterator[Floats]:
     """(2m, 3) forces of the supports, without loads and under each combination, with every end condition."""
     loaded = [shell.support_forces for supported in results.loads.values() for shell in supported.values()]
     for forces in (*(held.forces for held in results.reactions.values()), *loaded):
@@ -57,9 +59,7 @@ def air_findings(results: Results) -> Iterator[Said]:
     force = found.largest_force
     under = "those under the loads among them" if results.loads else "before own weight and loads act"
     against = "" if force is None else f" against forces of up to {newtons(force)} each, {under}"
-    yield Said(
-        f"{found.count} of {len(results.boundary)} rod ends lie up to {high} above the lowest: where they do not stand "
-        f"on the ground, an edge beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has "
-        "to be designed",
+    yield said(
         "ends_in_the_air", None, found.highest, 0, "m",
+        count=found.count, all=len(results.boundary), high=high, against=against,
     )  # fmt: skip

@@ -6,13 +6,15 @@ not checked, and then the result is not good.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 
-from rodshell.results.findings import Said
-from rodshell.results.loaded import LoadedShell
+from rodshell.figures.checks import Clearance, Deployment, WorstBent
+from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
+from rodshell.figures.form import Agreement, PopUp
+from rodshell.figures.loads import LoadedShell
+from rodshell.figures.records import Ends
+from rodshell.figures.sentences import ANOTHER_WAY, SENTENCES
 from rodshell.results.own_weight import falling, is_braced, reserve, weight_findings
-from rodshell.results.records import Agreement, Ends, PopUp
-from rodshell.results.results import Clearance, Deployment, Finding, Level, Results, Verdict, WorstBent
+from rodshell.results.results import Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import (
     ENDS,
@@ -38,13 +40,12 @@ from rodshell.rods.design_strength import RESERVED
 
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
-FLAT = "the target is flat, nothing pops up"
+FLAT = SENTENCES["flat"]
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
 LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
 NEGLIGIBLE = 1e-3  # unless that gap is below this share of the target's size already
 CONVERGED, BUCKLED = "converged", "buckled"  # statuses that say something about the shell: it crumples in the second
-NOT_COMPUTED = "the computation did not converge, which says nothing about the shell itself"
 
 
 def verdict_of(results: Results) -> Verdict:
@@ -78,10 +79,10 @@ def verdict(results: Results) -> Verdict:
     grave = [sentence for ends in in_order for sentence in faults[ends]] + deployment + [*_erection(results)]
     if results.target and results.target.flat:
         warned = [word for word in results.warnings if word.startswith(FLAT)]
-        return _verdict("unbuildable", [Said(word, "flat") for word in warned or [FLAT]])
-    failed = [] if results.status == CONVERGED else [Said(f"{NOT_COMPUTED}: {results.status}", "not_computed")]
+        return _verdict("unbuildable", [Said(word, said("flat").finding) for word in warned or [FLAT]])
+    failed = [] if results.status == CONVERGED else [said("not_computed", status=results.status)]
     if not shells:
-        return _verdict("unknown", failed or [Said("there is no pop-up in this result", "not_computed")])
+        return _verdict("unknown", failed or [said("not_computed: nothing")])
     best = _best(results, usable)
     off = 0.0 if best is None else best[1].max_relative or 0.0
     far = [_off(results, *best)] if best is not None and off > OFF else []
@@ -92,7 +93,7 @@ def verdict(results: Results) -> Verdict:
     sinks = _sinks(results, usable)
     to_check = [
         *gravest, *weight, *sinks, *_loads(results, usable or there), *air_findings(results),
-        *_open_points(results, usable), *(Said(word, "warning") for word in results.warnings),
+        *_open_points(results, usable), *(word if isinstance(word, Said) else Said(word) for word in results.warnings),
     ]  # fmt: skip
     standing = set(usable) - falling(results)
     if lost and not standing and not deployment:
@@ -123,11 +124,14 @@ def facts(results: Results) -> list[str]:
     return [*_gaps(results), *_strength(results)]
 
 
-def _verdict(level: Level, said: Iterable[Said]) -> Verdict:
-    """Each reason once, with what it says in figures."""
+def _verdict(level: Level, reasons: Iterable[Said]) -> Verdict:
+    """Each reason once, with what it says in figures; what rules out one shell is less grave where another stands."""
     once = dict[str, Finding]()
-    for each in said:
-        once.setdefault(each.text, each.finding())
+    for each in reasons:
+        finding = each.finding
+        far = finding.code == "off_target" and (finding.figure or 0.0) > FAR_OFF
+        alone = "unbuildable" if far else level_of(finding.code)
+        once.setdefault(str(each), finding.changed(level=min(alone, level, key=RANKS.index)))
     return Verdict(level=level, reasons=tuple(once), findings=tuple(once.values()))
 
 
@@ -140,13 +144,12 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[Said]:
     """Why the shell with these ends cannot be built."""
     shell = results.pop_up[ends]
     if _status(shell) != CONVERGED:
-        yield Said(f"the pop-up with {ends} ends did not converge: {shell.status}", "not_computed", ends)
+        yield said("not_computed: pop-up", ends, status=shell.status)
         return
     if shell.stable is False:
         modes = shell.negative_modes
         count = f" ({modes} buckling mode{'s' if modes != 1 else ''})" if modes else ""
-        words = f"with {ends} ends the shell is unstable{count} and would snap to another shape"
-        yield Said(words, "unstable", ends, modes, 0)
+        yield said("unstable", ends, modes, 0, count=count)
     yield from _contact_faults(results, ends)
     yield from _fibre_faults(results, ends)
     yield from _load_faults(results, ends)
@@ -172,14 +175,10 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
             continue
         limit, used = found.limit_factor, found.utilisation
         if found.limit_kind == "unstable unloaded":
-            words = f"with {ends} ends the shell is unstable before the loads of {name} act"
-            yield Said(words, "unstable", ends, place=name)
+            yield said("unstable: unloaded", ends, place=name)
         elif limit is not None and limit < 1 and found.limit_kind != "not followed":
             how = "snaps through" if found.limit_kind == "limit point" else "buckles"
-            words = (
-                f"with {ends} ends the shell falls under {name}: it {how} at {rounded_down(limit)} times these loads"
-            )
-            yield Said(words, "falls_under_loads", ends, limit, 1, place=name)
+            yield said("falls_under_loads", ends, limit, 1, place=name, how=how, factor=rounded_down(limit))
         place, parts = found.governs, found.utilisations
         governs = (place.by if place else None) or ""
         uses = {governs: used or 0.0}
@@ -193,21 +192,19 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
         where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
         for by, share in before.items():
             if share > 1:
-                words = f"with {ends} ends {BY_WORDS[by].format(_too_much(share))}{where * (by == governs)}"
-                code = "slip" if by == "slip_unloaded" else "strength"
-                if len(words) > len(
-                    unloaded[by].text if by in unloaded else ""
-                ):  # the same under all, or with its place
-                    unloaded[by] = Said(words, code, ends, share, 1, place=place.rod if place else None)
+                sentence = "slip: unloaded" if by == "slip_unloaded" else "strength: unloaded"
+                rod, what = place.rod if place else None, BY_WORDS[by].format(_too_much(share))
+                word = said(sentence, ends, share, 1, place=rod, what=what, where=where * (by == governs))
+                if len(word) > len(unloaded.get(by, "")):  # the same under all, or with its place
+                    unloaded[by] = word
         worst = max(uses, key=lambda by: uses[by], default="")
         if uses.get(worst, 0.0) > 1:
             at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
-            words = BY_WORDS.get(worst, "the rods use {} of their design strength").format(_too_much(uses[worst]))
-            words = f"with {ends} ends {words} under {name}{at}{where * (worst == governs)}"
-            yield Said(words, "slip" if worst == "slip" else "strength_under_loads", ends, uses[worst], 1, place=name)
+            what = BY_WORDS.get(worst, "the rods use {} of their design strength").format(_too_much(uses[worst]))
+            code, where = "slip" if worst == "slip" else "strength_under_loads", where * (worst == governs)
+            yield said(code, ends, uses[worst], 1, place=name, what=what, at=at, where=where)
         if (braced := found.bracing_utilisation) is not None and braced > 1:
-            words = f"with {ends} ends the bracing uses {_too_much(braced)} of its design strength under {name}"
-            yield Said(words, "strength_of_bracing", ends, braced, 1, place=name)
+            yield said("strength_of_bracing", ends, braced, 1, place=name, share=_too_much(braced))
     yield from unloaded.values()
 
 
@@ -237,10 +234,9 @@ def _contact_faults(results: Results, shape: str) -> Iterator[Said]:
     rods = f"{first} and {second} overlap" if first != second else f"{first} runs into itself"
     worst = f"{touching.pairs} pairs of rods touch or cross, worst: " if touching.pairs > 1 else "rods touch: "
     where = f" near ({place(touching.where, rounding_of(results))})" if touching.where else ""
-    yield Said(
-        f"{_shape(shape, touching)} {worst}{rods} by {_mm(results, -(touching.clearance or 0.0))}{where}: use thinner "
-        "rods (rod.section) or a larger spacing",
-        "contact", _ends(shape), touching.clearance, 0, "m", first,
+    yield said(
+        "contact", _ends(shape), touching.clearance, 0, "m", place=first, shape=_shape(shape, touching), worst=worst,
+        rods=rods, depth=_mm(results, -(touching.clearance or 0.0)), where=where,
     )  # fmt: skip
 
 
@@ -250,20 +246,16 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[Said]:
     used, strain = bent.utilisation, bent.max_bending_strain
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
     if used is not None and used > 1 and not (shape not in ENDS and holds_while_erected(results, used)):
-        share = _too_much(used)
         if shape in ENDS and results.rod and "section" in (results.rod.chosen or {}):
             where += ": the section that was chosen is too thick; give a thinner one (rod.section)"
-        if by_design_strength(results):
-            words = f"{_shape(shape, bent)} the rods use {share} of {strength_name(results, shape)}{where}"
-        else:
-            words = f"{_shape(shape, bent)} the rods would break: {share} of their strength{where}"
-        yield Said(words, "strength", _ends(shape), used, 1, place=bent.rod)
+        yield said(
+            "strength" if by_design_strength(results) else "strength: given", _ends(shape), used, 1, place=bent.rod,
+            shape=_shape(shape, bent), share=_too_much(used), whose=strength_name(results, shape), where=where,
+        )  # fmt: skip
     if strain is not None and strain > THIN:
-        yield Said(
-            f"{_shape(shape, bent)} bending strains the rods by {percent(strain)}: they are too thick for this "
-            f"curvature, and the theory of thin rods is valid up to about {percent(THIN)}; use thinner rods or a "
-            "larger target",
+        yield said(
             "too_thick", _ends(shape), strain, THIN, place=bent.rod,
+            shape=_shape(shape, bent), strain=percent(strain), valid=percent(THIN),
         )  # fmt: skip
 
 
@@ -279,18 +271,17 @@ def _erection(results: Results) -> Iterator[Said]:
     borne = [each.load_factor for each in results.self_weight.values() if each.load_factor is not None]
     thinner = min(borne, default=asked) >= asked  # else its own weight asks for thicker ones
     used = bent.utilisation
-    said = [*_fibre_faults(results, "deployment")]
+    faults = [*_fibre_faults(results, "deployment")]
     if used is not None and used > 1 and holds_while_erected(results, used):
-        words = f"{_shape('deployment', bent)} the rods use {_too_much(used)} of {strength_name(results, 'deployment')}"
-        said.append(Said(words, "strength", None, used, 1, place=bent.rod))
+        faults.append(said(
+            "strength", None, used, 1, place=bent.rod, shape=_shape("deployment", bent), share=_too_much(used),
+            whose=strength_name(results, "deployment"), where="",
+        ))  # fmt: skip
     if _on_the_way(results):
-        said += _contact_faults(results, "deployment")
-    if said:
-        said[-1] = said[-1].and_so(
-            "; this is on one way, all ends moved evenly: erect it in another way that is checked, such as rod by rod "
-            f"over a scaffold, lifted at its middle, or one family's ends first{', or use thinner rods' * thinner}"
-        )
-    yield from (replace(each, code=f"erection_{each.code}") for each in said)
+        faults += _contact_faults(results, "deployment")
+    for k, fault in enumerate(faults, start=1):
+        other_way = ANOTHER_WAY + ", or use thinner rods" * thinner if k == len(faults) else ""
+        yield Said(fault + other_way, fault.finding.changed(code=f"erection_{fault.finding.code}"))
 
 
 def _ends(shape: str) -> Ends | None:
@@ -322,11 +313,9 @@ def _off(results: Results, ends: Ends, gap: Agreement) -> Said:
     bound = drape is not None and drape.method == "bound"
     dips = ends == "clamped" and bound and not buckles and not against_shear
     advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
-    return Said(
-        f"with {ends} ends, the nearest that can be used, the shell deviates from the target by up to "
-        f"{_mm(results, gap.max)} "
-        f"({percent(gap.max_relative)} of its size){where}{advice}",
+    return said(
         "off_target", ends, gap.max_relative, OFF,
+        gap=_mm(results, gap.max), share=percent(gap.max_relative), where=where, advice=advice,
     )  # fmt: skip
 
 
@@ -339,12 +328,8 @@ def _sinks(results: Results, usable: list[Ends]) -> list[Said]:
         return []
     (ends, depth), *others = sorted(known.items(), key=lambda pair: pair[1])
     further = "".join(f", by {_mm(results, more)} with {other} ends" for other, more in others)
-    words = (
-        f"with {ends} ends the shell moves by {_mm(results, depth)} ({percent(depth / sizes[0])} of its size) under "
-        f"its own weight{further}, so that it does not keep the shape whose gap to the target is given: use stiffer "
-        "rods, or brace it"
-    )
-    return [Said(words, "sinks", ends, depth / sizes[0], OFF)]
+    share = depth / sizes[0]
+    return [said("sinks", ends, share, OFF, depth=_mm(results, depth), share=percent(share), further=further)]
 
 
 def _open_points(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -352,14 +337,14 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[Said]:
     shells, status = results.pop_up, results.status
     stopped = any(_status(shell) != CONVERGED for shell in shells.values())
     if status not in (CONVERGED, "unknown") and not stopped and not any(status in word for word in results.warnings):
-        yield Said(f"the job is not complete: {status}", "not_computed")
+        yield said("not_computed: job", status=status)
     if any(shells[ends].stable is None for ends in usable):
-        yield Said("whether the shell is stable was not checked", "not_checked")
+        yield said("not_checked: stability")
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
     yield from _rods(results, usable)
     if results.target and not set(usable) <= set(results.agreement):
-        yield Said("the gap to the target was not checked", "not_checked")
+        yield said("not_checked: gap")
 
 
 def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
@@ -367,44 +352,25 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
     for name, by_ends in results.loads.items():
         for end in ends:
             if end not in by_ends:
-                yield Said(f"{name} with {end} ends was not checked", "not_checked", end, place=name)
+                yield said("not_checked: loads", end, place=name)
                 continue
             found = by_ends[end]
             limit, imperfect = found.limit_factor or 0.0, found.imperfect_factor
             linear, stands = found.linear_factor, found.limit_factor is None or limit >= 1
             if linear is not None and linear < 1 and stands:
-                yield Said(
-                    f"under {name} with {end} ends linear buckling is at {rounded_down(linear)} times these loads: "
-                    "the shell carries them only in another shape, its nodes having moved by "
-                    f"{_mm(results, found.max_deflection)}",
-                    "linear_buckling", end, linear, 1, place=name,
-                )  # fmt: skip
-            if found.limit_kind == "not followed" and limit < 1:
-                yield Said(
-                    f"whether the shell stands under {name} with {end} ends is not known: it could be followed only up "
-                    f"to {rounded_down(limit)} times these loads",
-                    "not_followed", end, limit, 1, place=name,
-                )  # fmt: skip
-            elif found.limit_kind == "not followed":
-                yield Said(
-                    f"under {name} with {end} ends the shell could not be followed beyond {rounded_down(limit)} times "
-                    "the loads, and nothing is known above",
-                    "not_followed", end, limit, 1, place=name,
-                )  # fmt: skip
-            imperfectly = f"under {name} with {end} ends and imperfections"
-            if found.imperfect_kind == "not followed" and imperfect is None:
-                yield Said(
-                    f"{imperfectly} no equilibrium was found, and nothing is known of it", "imperfect", end, place=name
-                )
-            elif found.imperfect_kind == "not followed":
-                words = f"{imperfectly} nothing is known above {rounded_down(imperfect or 0.0)} times the loads"
-                yield Said(words, "imperfect", end, imperfect, 1, place=name)
-            elif found.imperfect_kind == "unstable unloaded":
-                words = f"with {end} ends and imperfections the shell is unstable before the loads of {name} act"
-                yield Said(words, "imperfect", end, place=name)
-            elif imperfect is not None and imperfect < 1:
-                words = f"{imperfectly} the shell falls at {rounded_down(imperfect)} times these loads"
-                yield Said(words, "imperfect", end, imperfect, 1, place=name)
+                moved = _mm(results, found.max_deflection)
+                yield said("linear_buckling", end, linear, 1, place=name, factor=rounded_down(linear), moved=moved)
+            if found.limit_kind == "not followed":
+                sentence = "not_followed" if limit < 1 else "not_followed: above"
+                yield said(sentence, end, limit, 1, place=name, factor=rounded_down(limit))
+            factor, kind = rounded_down(imperfect or 0.0), found.imperfect_kind
+            if kind == "not followed" and imperfect is None:
+                yield said("imperfect: no equilibrium", end, place=name)
+            elif kind == "unstable unloaded":
+                yield said("imperfect: unloaded", end, place=name)
+            elif kind == "not followed" or (imperfect is not None and imperfect < 1):
+                sentence = "imperfect: not followed" if kind == "not followed" else "imperfect"
+                yield said(sentence, end, imperfect, 1, place=name, factor=factor)
 
 
 def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -413,28 +379,18 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
     if any(
         (met.of(ends) if met else None) is None or bent_of(results, ends).max_bending_strain is None for ends in usable
     ):
-        yield Said(
-            "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
-            "rod.section.fibre_distances for that",
-            "not_checked",
-        )
+        yield said("not_checked: contact")
     if results.rod and (thin := thinner_than_sold(results.rod)):
-        words = f"the chosen section is {thin}: have it made, or choose another material or a larger target"
-        yield Said(words, "not_sold")
+        yield said("not_sold", thin=thin)
     if results.bending is None or results.bending.strength is None:
         if width(results) > LARGE:
-            yield Said(
-                "no strength was given, so it is not known whether the rods hold (checks.strength)", "no_strength"
-            )
+            yield said("no_strength")
         return
     name = results.bending.strength_of
     used = max((bent_of(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
     if name and used > RESERVED and not by_design_strength(results):
-        yield Said(
-            f"the rods permanently use {percent(used)} of {strength_name(results, ENDS[0])}: "
-            "reduce it for duration and moisture and give the reduced value as checks.strength, or use thinner rods",
-            "strength_not_reduced", None, used, RESERVED,
-        )  # fmt: skip
+        whose = strength_name(results, ENDS[0])
+        yield said("strength_not_reduced", None, used, RESERVED, share=percent(used), whose=whose)
 
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[Said]:
@@ -444,14 +400,13 @@ def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[
         remedy = "" if late else ": this needs pinned ends (pop_up.ends) and checks.stages above 0"
         failed = _status(results.pop_up.get("pinned")) != CONVERGED
         why = ", since the pinned shell was not found" if failed else remedy
-        yield Said(f"whether the shell is reached from flat was not checked{why}", "not_checked")
+        yield said("not_checked: deployment", why=why)
     elif (
         "clamped" in usable
         and deployment.reached_from_flat
         and (deployment.clamped is None or deployment.clamped.reached_from_flat is None)
     ):
-        words = "whether the clamped shape is reached from the pinned one by turning the ends is not known"
-        yield Said(words, "not_checked", "clamped")
+        yield said("not_checked: clamped", "clamped")
 
 
 def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -464,11 +419,7 @@ def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
         ]
         if ends in usable and near:
             distance, energy = min(near, key=lambda pair: pair[0])
-            yield Said(
-                f"with {ends} ends the shell has another stable shape, {percent(distance)} of its size away "
-                f"at {rounded(energy)} times the energy: check on site that it takes the intended one",
-                "other_shape", ends, distance, NEAR,
-            )  # fmt: skip
+            yield said("other_shape", ends, distance, NEAR, distance=percent(distance), energy=rounded(energy))
 
 
 def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -484,36 +435,24 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
         if (gap := results.agreement.get(ends)) and gap.max_relative is not None
     ]
     near = f"; the gap to the target is at most {' and '.join(gaps)}, of its size" if gaps else ""
-    yield Said(
-        f"with {' and '.join(usable)} ends the shell{' with its bracing' * braced} is stable and carries {weight} "
-        f"times its own weight, {rounded(reserve(results))} being asked for{near}",
-        "stands", usable[0] if len(usable) == 1 else None, least, reserve(results),
+    yield said(
+        "stands", usable[0] if len(usable) == 1 else None, least, reserve(results), all=" and ".join(usable),
+        bracing=" with its bracing" * braced, weight=weight, asked=rounded(reserve(results)), near=near,
     )  # fmt: skip
     if not results.loads:
         known = results.strength is not None and results.strength.creep is not None
-        yield Said(
-            "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
-            "people) and imperfections were not checked"
-            f"{'' if known else ', nor creep, which is not known of these rods'}",
-            "no_loads",
-        )
+        yield said("no_loads", creep="" if known else ", nor creep, which is not known of these rods")
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)
-        words = f"under {name} it is stable up to {shown_factor(least)} times these loads"
-        yield Said(words, "stands_under_loads", None, least, 1, place=name)
+        yield said("stands_under_loads", None, least, 1, place=name, factor=shown_factor(least))
 
 
 def _perfect(results: Results) -> Iterator[Said]:
     """That factors under loads are those of the perfect shell."""
     if any(found.imperfect_kind is None for by_ends in results.loads.values() for found in by_ends.values()):
         offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
-        yield Said(
-            "imperfections were not looked at, and the factors on the loads are those of the perfect shell: have them "
-            f"looked at ({offer})",
-            "no_imperfections",
-            offers=(offer,),
-        )
+        yield said("no_imperfections", offers=(offer,), offer=offer)
 
 
 def _mm(results: Results, metres: float | None) -> str:

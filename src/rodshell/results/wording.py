@@ -7,8 +7,9 @@ from functools import cached_property
 from math import ceil, floor, isfinite, log10, pi
 from typing import Any
 
-from rodshell.results.records import Record
-from rodshell.results.results import Results, SelfWeight
+from rodshell.figures.checks import SelfWeight
+from rodshell.figures.records import Record
+from rodshell.results.results import Results
 from rodshell.units import percent_text, stress_text
 
 FINEST, COARSEST = 1e-3, 1.0  # mm

@@ -4,17 +4,20 @@ Of every finished job the store keeps result.json without its long lists, so tha
 computing anything again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from typing import Any
 
 from rodshell.errors import InputError
-from rodshell.results.results import Results, json_schema
+from rodshell.results.results import Results, Verdict, json_schema
 from rodshell.units import shown
 
-STANDARD = ("verdict", "status", "rms_pinned", "rms_clamped", "min_angle_deg", "total_length", "seconds")
+FINDINGS = "findings"  # codes of what the verdict says, with blanks between them
+TEXTS = ("verdict", "status", FINDINGS)
+NUMBERS = ("rms_pinned", "rms_clamped", "min_angle_deg", "total_length", "seconds")
+STANDARD = (*TEXTS, *NUMBERS)
 JOB = "job"  # its identity, by which its result folder is called
 CONVERGED = "converged"
 ANY = "NAME"  # in a table whose keys are the user's, such as load combinations
@@ -117,18 +120,19 @@ def _inside(node: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def row_of(results: Results, *, verdict: str, seconds: float) -> dict[str, Any]:
+def row_of(results: Results, *, verdict: Verdict | None, seconds: float) -> dict[str, Any]:
     """What is kept of a form: the standard columns, and the short content of its result.json.
 
     Parameters
     ----------
-    verdict : its level; "" where it was not checked.
+    verdict : None where it was not checked.
     seconds : processor time [s].
     """
     drape = results.drape
     return {
-        "verdict": verdict,
+        "verdict": verdict.level if verdict else "",
         "status": results.status,
+        FINDINGS: " ".join(dict.fromkeys(found.code for found in verdict.findings)) if verdict else None,
         "rms_pinned": _rms(results, "pinned"),
         "rms_clamped": _rms(results, "clamped"),
         "min_angle_deg": drape.min_angle_deg if drape else None,
@@ -138,9 +142,17 @@ def row_of(results: Results, *, verdict: str, seconds: float) -> dict[str, Any]:
     }
 
 
-def is_usable(row: Mapping[str, Any]) -> bool:
-    """Whether a form converged and can be built, as far as was checked; `row` as of `row_of`, or with a status only."""
+def is_usable(row: Mapping[str, Any], without: Collection[str] = ()) -> bool:
+    """Whether a form converged and can be built, as far as was checked, and its verdict has none of the findings
+    `without`; `row` as of `row_of`, or with a status only."""
+    if without and number_of(row.get(FINDINGS), without) != 0:
+        return False
     return row.get("status") == CONVERGED and row.get("verdict") != "unbuildable"
+
+
+def number_of(findings: object, codes: Collection[str]) -> int | None:
+    """How many of these codes are in a cell of the column "findings"; None where nothing was judged."""
+    return len({*findings.split()} & {*codes}) if isinstance(findings, str) else None
 
 
 def _rms(results: Results, ends: Any) -> float | None:

@@ -14,12 +14,13 @@ from typing import Any, Literal, get_args
 from rodshell.case import BUILT_IN
 from rodshell.case.load import flattened, toml_of
 from rodshell.errors import InputError
+from rodshell.figures.findings import CODES
 from rodshell.job import Job
 from rodshell.sweeps.axes import BASE, Axis, read_axes
-from rodshell.sweeps.columns import STANDARD, Column, read_columns
+from rodshell.sweeps.columns import NUMBERS, Column, read_columns
 from rodshell.units import parse_quantity, shown
 from rodshell.untrusted import read_text
-from rodshell.validation import choice, file_path
+from rodshell.validation import choice, choices_of, file_path
 
 EngineName = Literal["processes", "dask"]
 Keep = Literal["none", "best", "all"]
@@ -27,7 +28,7 @@ Until = Literal["pop-up", "fabrication"]
 Source = str | PathLike[str] | Mapping[str, Any]
 GENERATION = "generation"
 TABLES = ("base", "columns", "axes", "sample", "run")
-RUN = ("engine", "workers", "keep", "best", "until", "time_limit", "memory_limit")
+RUN = ("engine", "workers", "keep", "best", "without", "until", "time_limit", "memory_limit")
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Settings:
     workers : number of jobs at the same time, on this machine.
     keep : which forms are kept as result folders.
     best : the column whose smallest value is the best form's.
+    without : codes of findings; a form whose verdict has any of them is not the best.
     until : the last stage of a job, see `Job.run`; with "pop-up" there is no verdict.
     time_limit : longest time of one job [s]; memory_limit : largest memory of one job [B]; None: no limit.
     """
@@ -48,6 +50,7 @@ class Settings:
     workers: int = 1
     keep: Keep = "none"
     best: str = "rms_pinned"
+    without: tuple[str, ...] = ()
     until: Until = "fabrication"
     time_limit: float | None = None
     memory_limit: float | None = None
@@ -257,12 +260,17 @@ def read_settings(given: Mapping[str, Any], columns: Sequence[str]) -> Settings:
     workers = given.get("workers", 1)
     if type(workers) is not int or not 1 <= workers <= 1024:
         raise InputError(f"run.workers = {shown(workers)}: give a number of processes from 1 to 1024")
+    until = choice("run.until", given.get("until", "fabrication"), get_args(Until))
+    without = choices_of("run.without", given.get("without", ()), tuple(CODES))
+    if without and until == "pop-up":
+        raise InputError('run.without needs the verdict, which run.until = "pop-up" leaves out: leave one out')
     return Settings(
         engine=engine,
         workers=workers,
         keep=choice("run.keep", given.get("keep", "none"), get_args(Keep)),
-        best=choice("run.best", given.get("best", "rms_pinned"), (*STANDARD[2:], *columns)),
-        until=choice("run.until", given.get("until", "fabrication"), get_args(Until)),
+        best=choice("run.best", given.get("best", "rms_pinned"), (*NUMBERS, *columns)),
+        without=without,
+        until=until,
         time_limit=_limit(given, "time_limit", "time"),
         memory_limit=_limit(given, "memory_limit", "memory"),
     )

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
+from rodshell.figures.records import printable
 from rodshell.progress import Progress, silent
-from rodshell.results.records import printable
 from rodshell.sweeps.columns import CONVERGED, is_usable
 from rodshell.sweeps.computing import Computation, Wanted, opened_computation
 from rodshell.sweeps.identity import job_identity
-from rodshell.sweeps.plan import Source, SweepPlan, read_plan
+from rodshell.sweeps.plan import Settings, Source, SweepPlan, read_plan
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.store import FOUND, STORE, Store
 from rodshell.sweeps.table import header_notes, header_of, names_of, table_rows
@@ -108,7 +108,7 @@ def sweep(
         if plan.settings.keep == "best":
             _keep_best(plan, computation)
         if report:
-            shapes = best_jobs(store, plan.settings.best)[:SHAPES]
+            shapes = best_jobs(store, plan.settings)[:SHAPES]
             computation.compute(computation.archived(shapes), "shapes of the report", len(shapes))
             write_report(store, _page(plan, found, shapes))
     return found
@@ -160,7 +160,7 @@ def _wanted(plan: SweepPlan, computation: Computation) -> Iterator[Wanted]:
 def _keep_best(plan: SweepPlan, computation: Computation) -> None:
     """The result folder of the best design, in best/."""
     store = computation.store
-    best = next(iter(best_jobs(store, plan.settings.best)), None)
+    best = next(iter(best_jobs(store, plan.settings)), None)
     if best is None or (store.note(BEST) == best and (store.folder / BEST / "result.json").is_file()):
         return
     (wanted,) = computation.archived([best])
@@ -168,18 +168,13 @@ def _keep_best(plan: SweepPlan, computation: Computation) -> None:
     store.take_note(BEST, best)
 
 
-def best_jobs(store: Store, measure: str) -> list[str]:
-    """The jobs that converged and can be built, from the smallest value of a column on.
-
-    Parameters
-    ----------
-    store : of the sweep; measure : a column of its table.
-    """
+def best_jobs(store: Store, settings: Settings) -> list[str]:
+    """The jobs that converged, can be built, and are without the findings that are not wanted, the best first."""
     keys, columns = header_of(store)
-    place = names_of(keys, columns).index(measure)
+    place = names_of(keys, columns).index(settings.best)
     found = dict[str, float]()
     for design, row in zip(store.finished(), table_rows(store, columns), strict=True):
-        if is_usable(design.row) and isinstance(row[place], int | float):
+        if is_usable(design.row, settings.without) and isinstance(row[place], int | float):
             found[design.job] = float(row[place])
     return sorted(found, key=lambda job: found[job])
 
@@ -195,7 +190,7 @@ def _page(plan: SweepPlan, found: Swept, shapes: Sequence[str]) -> Page:
         first=(next(numbers, "total_length"), measure),
         measures=[measure],
         larger=(),
-        counts=lambda design: is_usable(design.row),
+        counts=lambda design: is_usable(design.row, plan.settings.without),
         shapes=shapes,
         caption=f"The designs with the smallest {measure} that converged and can be built. Click one for its report.",
     )

@@ -9,11 +9,13 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.figures.findings import CODES
 from rodshell.job import Job
 from rodshell.sweeps.axes import Axis, Span, flat_keys, read_listed, read_span
-from rodshell.sweeps.columns import STANDARD, read_column, read_columns
+from rodshell.sweeps.columns import FINDINGS, NUMBERS, STANDARD, number_of, read_column, read_columns
 from rodshell.sweeps.plan import GENERATION, Plan, Source, known, read_origin, read_settings, table
 from rodshell.units import shown
+from rodshell.validation import choices_of
 
 TABLES = ("base", "columns", "variables", "objectives", "constraints", "search", "run")
 BELOW_ONE = 1 - 1e-12
@@ -36,17 +38,22 @@ class Constraint:
     ----------
     low, high : bounds of a number; None: there is none.
     words : that it may be, in place of bounds.
+    without : codes of which the column "findings" may have none.
     """
 
     column: str
     low: float | None = None
     high: float | None = None
     words: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
 
     def violation(self, value: Any) -> float:
         """How far it is from holding: 0 or less where it holds, relative to the bound."""
         if self.words:
             return 0.0 if value in self.words else 1.0
+        if self.without:
+            count = number_of(value, self.without)
+            return FAR if count is None else float(count)
         if not isinstance(value, int | float):
             return FAR
         below = 0.0 if self.low is None else (self.low - value) / (abs(self.low) or 1.0)
@@ -110,6 +117,8 @@ def read_search(source: Source) -> SearchPlan:
     run, search = table(given, "run"), table(given, "search")
     if "best" in run:
         raise InputError("run.best: a search has objectives, which say what is best: leave it out")
+    if "without" in run:
+        raise InputError("run.without: a search has constraints: give findings = { without = [...] } there")
     known("search", search, ("population", "generations", "seed"))
     plan = SearchPlan(
         origin, keys, columns, read_settings(run, [column.name for column in columns]),
@@ -135,7 +144,7 @@ def _objectives(given: Mapping[str, Any]) -> tuple[Objective, ...]:
         if not isinstance(columns, list | tuple):
             raise InputError(f'objectives.{name} = {shown(columns)}: give a list of columns, such as ["rms_pinned"]')
         for column in columns:
-            if column not in STANDARD[2:]:
+            if column not in NUMBERS:
                 read_column(column)
             found.append(Objective(column, 1 if sign > 0 else -1))
     if not found:
@@ -157,6 +166,10 @@ def _flat_constraints(given: Mapping[str, Any], prefix: str = "") -> Iterator[tu
 def _constraint(column: str, given: Any) -> Constraint:
     if column not in STANDARD:
         read_column(column)
+    if column == FINDINGS:
+        if not isinstance(given, Mapping) or set(given) != {"without"}:
+            raise InputError(f'constraints findings = {shown(given)}: give {{ without = ["strength", "contact"] }}')
+        return Constraint(column, without=choices_of("constraints.findings.without", given["without"], tuple(CODES)))
     if isinstance(given, str):
         given = [given]
     if isinstance(given, list | tuple) and given and all(isinstance(word, str) for word in given):

@@ -10,8 +10,8 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rodshell.errors import InputError
+from rodshell.figures.records import printable
 from rodshell.output.schedules import safe_cell
-from rodshell.results.records import printable
 from rodshell.sweeps.columns import JOB, STANDARD, Column, read_column
 from rodshell.sweeps.store import Finished, Store, read_json, replaced
 from rodshell.validation import file_path

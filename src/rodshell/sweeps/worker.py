@@ -63,12 +63,9 @@ def reply_to(task: dict[str, Any]) -> dict[str, Any]:
     begun = process_time()
     try:
         form = Job.load(task["case"]).run(until=task["until"])
-        if task["until"] == "fabrication":
-            archive = form.archive()
-            results, verdict = archive.results, str(archive.verdict.level)
-        else:
-            results, verdict = form.results(), ""
-        row = row_of(results, verdict=verdict, seconds=process_time() - begun)
+        checked = task["until"] == "fabrication"
+        results = form.archive().results if checked else form.results()
+        row = row_of(results, verdict=form.verdict if checked else None, seconds=process_time() - begun)
     except RodshellError as error:
         return {"outcome": "refused", "row": {"status": _line(error), "seconds": process_time() - begun}}
     except Exception as error:

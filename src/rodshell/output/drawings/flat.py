@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
+from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
 from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
@@ -20,7 +21,6 @@ from rodshell.output.schedules import Show
 from rodshell.results import Archive
 from rodshell.results.archive import made_once
 from rodshell.results.laths import laths_text
-from rodshell.results.records import Stiffness
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}

@@ -15,13 +15,14 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.figures.form import Joint, Material, RodType, Section
+from rodshell.figures.records import json_text
 from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
 from rodshell.output.labels import Label, Room, nearby, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash
-from rodshell.results.records import Joint, Material, RodType, Section, json_text
 from rodshell.results.results import Drawings
 from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, rounding_of, stress

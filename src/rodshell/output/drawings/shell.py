@@ -7,6 +7,7 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
+from rodshell.figures.fabrication import Brace
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.boxes import each_meets
 from rodshell.output.drawing import (
@@ -28,7 +29,6 @@ from rodshell.output.grid import joint_places, outlines_of, rods_of
 from rodshell.output.labels import Room, callouts, closed_segments, outward, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
-from rodshell.results.results import Brace
 from rodshell.results.verdict import unknown_below
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of, whole_percent
 

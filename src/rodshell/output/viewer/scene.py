@@ -338,7 +338,7 @@ def _reactions(archive: Archive, rods: list[GridRod]) -> dict[str, tuple[Floats,
     """Forces on all rod ends by shape, see `Drawn`."""
     found = dict[str, tuple[Floats, str]]()
     for end, reactions in archive.results.reactions.items() if len(rods) == len(archive.results.rods) else ():
-        values = np.array(reactions.forces, dtype=float).reshape(-1, 3)
+        values = reactions.forces
         largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
         if len(values) == 2 * len(rods) and largest > 0:
             found[f"popped_{end}"] = (values / largest, wording.newtons(largest))

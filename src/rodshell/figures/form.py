@@ -1,195 +1,29 @@
-"""The records that result.json consists of: each key of the file with its meaning and its unit, in SI.
+"""What was asked for, and the form that was found."""
 
-A record keeps the keys that were set, so that a file is written back as it was read: a key that is absent stays absent,
-null is what is not known, and keys of later versions are kept as they are. Reading checks every value: a text in place
-of a number, a number that is not finite or a point with two coordinates is refused.
-"""
+from typing import Literal, Self
 
-import json
-from collections.abc import Mapping
-from math import isfinite
-from typing import Annotated, Any, Literal, Self, TypeVar
+from pydantic import Field, model_validator
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationInfo, model_validator
-from pydantic_core import CoreSchema, core_schema
+from rodshell.figures.records import (
+    ByEnds,
+    Ends,
+    Flag,
+    Flat,
+    Number,
+    Point,
+    Real,
+    Record,
+    Rows,
+    Text,
+    Whole,
+    by_ends,
+    key,
+    required,
+    rows,
+)
 
-Ends = Literal["pinned", "clamped"]
 Gate = Literal["flat", "from_flat", "remeshed", "tolerance", "stable"]
 FEWEST_STATIONS = 2
-LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
-MOST = 10**15  # of a count
-FARTHEST = 1e6  # m between two points of a shell, and of each of its lengths
-SHORTEST = 1e-9  # m of a rod
-ORIGIN = 1e9  # m from the origin, as in national grids
-
-
-def printable(text: str) -> str:
-    """`text` on one line, without the control characters and lone surrogates that no text file can hold."""
-    return text if text.isprintable() else "".join(letter if letter.isprintable() else " " for letter in text)
-
-
-def _finite_or_unknown(value: object, info: ValidationInfo) -> object:
-    """None for a number of a computation that is out of range; in a file such a number is an error."""
-    return None if info.mode == "python" and isinstance(value, float) and not abs(value) <= LARGEST else value
-
-
-def _in_range(value: Any, info: ValidationInfo) -> Any:
-    """The value of a key that is not known here: of an object, or of a later version."""
-    if info.mode == "python":
-        return plain(value)
-    if isinstance(value, int | float) and not abs(value) <= LARGEST:
-        raise ValueError(f"it must be a number from {-LARGEST:g} to {LARGEST:g}")
-    if isinstance(value, dict):
-        return {printable(name): _in_range(item, info) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_in_range(item, info) for item in value]
-    return printable(value) if isinstance(value, str) else value
-
-
-def _no_rows_for_null(value: object) -> object:
-    """A list that is not known has no entries."""
-    return () if value is None else value
-
-
-def _no_keys_for_null(value: object) -> object:
-    """A table that is not known has no entries."""
-    return {} if value is None else value
-
-
-class _Checked:
-    """What a value must be, by a schema that is written once: pydantic would infer it again for every key."""
-
-    def __init__(self, schema: CoreSchema) -> None:
-        self._schema = schema
-
-    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
-        return {**self._schema}
-
-
-_REAL = core_schema.float_schema(strict=True, ge=-LARGEST, le=LARGEST)
-_NUMBER = core_schema.with_info_before_validator_function(_finite_or_unknown, core_schema.nullable_schema(_REAL))
-
-Real = Annotated[float, _Checked(_REAL)]
-Number = Annotated[Real | None, _Checked(_NUMBER)]
-Whole = Annotated[int, _Checked(core_schema.int_schema(strict=True, ge=-MOST, le=MOST))]
-Flag = Annotated[bool, _Checked(core_schema.bool_schema(strict=True))]
-Text = Annotated[
-    str, _Checked(core_schema.no_info_after_validator_function(printable, core_schema.str_schema(strict=True)))
-]
-_Other = Annotated[Any, _Checked(core_schema.with_info_after_validator_function(_in_range, core_schema.any_schema()))]
-T = TypeVar("T")
-Rows = Annotated[tuple[T, ...], FailFast(), BeforeValidator(_no_rows_for_null)]
-ByEnds = Annotated[dict[Ends, T], BeforeValidator(_no_keys_for_null)]
-Flat = Annotated[tuple[Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 2))]
-Point = Annotated[tuple[Number, Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 3))]
-
-
-class Record(BaseModel):
-    """A part of result.json: frozen, with the keys that the file has."""
-
-    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, populate_by_name=True, defer_build=True)
-    __pydantic_extra__: dict[str, _Other] = Field(init=False)
-
-    def plain(self) -> dict[str, Any]:
-        """The record as it stands in result.json: plain dictionaries, lists and numbers, without absent keys."""
-        return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
-
-    def changed(self, **values: Any) -> Self:
-        """The same record with other values of some fields, by their names here; they are not checked."""
-        return self.model_copy(update=values)
-
-
-def key(meaning: str, unit: str = "") -> Any:
-    """A key that may be absent, with what it means and its unit.
-
-    Parameters
-    ----------
-    meaning : of the key, in words.
-    unit : of its value; "" without.
-    """
-    return Field(default=None, description=f"{meaning} [{unit}]" if unit else meaning)
-
-
-def required(meaning: str, *, alias: str) -> Any:
-    """A key that must be there, and that Python cannot have as a name.
-
-    Parameters
-    ----------
-    meaning : of the key, in words.
-    alias : name of the key in the file.
-    """
-    return Field(alias=alias, description=meaning)
-
-
-def rows(meaning: str, unit: str = "") -> Any:
-    """A list that may be absent.
-
-    Parameters
-    ----------
-    meaning : of the list's entries, in words.
-    unit : of their values; "" without.
-    """
-    return Field(default=(), description=f"{meaning} [{unit}]" if unit else meaning)
-
-
-def by_ends(meaning: str) -> Any:
-    """A table by end condition that may be absent."""
-    return Field(default_factory=dict, description=f"{meaning}, by end condition")
-
-
-def json_text(content: Mapping[str, Any]) -> str:
-    """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null.
-
-    Parameters
-    ----------
-    content : keys and values; NumPy's arrays and numbers are converted.
-    """
-    lines = []
-    for name, value in plain(content).items():
-        if isinstance(value, list) and value and isinstance(value[0], dict):
-            text = "[\n  " + ",\n  ".join(map(_dumps, value)) + "\n ]"
-        else:
-            text = _dumps(value)
-        lines.append(f" {_dumps(name)}: {text}")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def _dumps(value: Any) -> str:
-    return json.dumps(value, allow_nan=False, ensure_ascii=False)
-
-
-def plain(value: Any) -> Any:
-    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable.
-
-    Parameters
-    ----------
-    value : dictionaries, sequences, arrays, records, numbers, texts.
-    """
-    if isinstance(value, float):  # most are; NumPy's float64 is one
-        return float(value) if isfinite(value) else None
-    if isinstance(value, str):
-        return printable(value)
-    if isinstance(value, Mapping):
-        return {printable(str(name)): plain(item) for name, item in value.items()}
-    if isinstance(value, Record):
-        return value.plain()
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return value
-
-
-def far_apart(points: NDArray[Any]) -> str:
-    """What is wrong with the places (..., 2 or 3) [m] of points of one shell, one at least and finite; or nothing."""
-    rows = points.reshape(-1, points.shape[-1])
-    low, high = rows.min(axis=0).astype(float), rows.max(axis=0).astype(float)
-    if max(high.max(), -low.min()) > ORIGIN:
-        return f"a point more than {ORIGIN:g} m from the origin"
-    return f"points more than {FARTHEST:g} m apart" if max(high - low) > FARTHEST else ""
-
 
 # What was asked for
 

@@ -2,7 +2,22 @@
 
 from pydantic import Field
 
-from rodshell.results.records import ByEnds, Number, Point, Real, Record, Rows, Text, key, rows
+from rodshell.figures.records import (
+    ByEnds,
+    Number,
+    Numbers,
+    Points,
+    Real,
+    Record,
+    Rows,
+    Text,
+    Vector,
+    Whole,
+    key,
+    numbers,
+    points,
+    rows,
+)
 
 
 class Governs(Record):
@@ -43,8 +58,8 @@ class LoadedShell(Record):
     """The shell under a combination of loads. Factors multiply the whole combination."""
 
     at_factor: Number = key("of the combination, under which all but the factors stands: 1, or the last stable one")
-    load_sum: Point | None = key("sum of the loads, those on supports included", "N")
-    reaction_sum: Point | None = key("sum of the support forces, without those of the unloaded shell", "N")
+    load_sum: Vector | None = key("sum of the loads, those on supports included", "N")
+    reaction_sum: Vector | None = key("sum of the support forces, without those of the unloaded shell", "N")
     max_deflection: Number = key("largest displacement of a node", "m")
     linear_factor: Number = key("lowest linear buckling factor about the unloaded shell; null: above 100, or not known")
     limit_factor: Number = key("up to which the shell is stable; null: above 100")
@@ -59,22 +74,23 @@ class LoadedShell(Record):
     max_stress: Number = key("largest stress of bending, axial force and torsion", "Pa")
     governs: Governs | None = key("where strength is used most")
     uplift: Number = key("largest force by which the shell pulls at a support upwards; 0: at none", "N")
-    reactions: Rows[Point] = rows("force of each support, in the order of boundary, without the unloaded shell's", "N")
-    support_forces: Rows[Point] = rows("force of each support, with the unloaded shell's", "N")
-    support_moments: Rows[Point] = rows("moment of each support, with the unloaded shell's", "N m")
+    reactions: Points = points("force of each support, in the order of boundary, without the unloaded shell's", "N")
+    support_forces: Points = points("force of each support, with the unloaded shell's", "N")
+    support_moments: Points = points("moment of each support, with the unloaded shell's", "N m")
     bracing: Rows[Number] = rows(
         "axial force of each brace in the order of fabrication.bracing, tension positive, 0: slack; null: left out", "N"
     )
     bracing_utilisation: Number = key("utilisation of laths of a third layer or of cables; null: none, or not known")
-    joint_moments: Rows[Number] = rows(
+    joint_moments: Numbers = numbers(
         "moment of each locked joint about its normal, in the order of joint_loads; empty: none is locked", "N m"
     )
     joint_moment_at: Text | None = key("id of the joint whose moment is largest; null: none is locked")
     slipping: Rows[Text] = rows("ids of the joints that slip")
-    mode_factors: Rows[Number] = rows("linear buckling factors of the lowest modes")
-    frequencies: Rows[Number] = rows(
+    mode_factors: Numbers = numbers("linear buckling factors of the lowest modes")
+    frequencies: Numbers = numbers(
         "lowest natural frequencies without loads, of rods, joints and bracing; empty: not known", "Hz"
     )
+    factorizations: Whole | None = key("factorisations of the tangent, on all paths")
 
 
 LoadCases = dict[Text, ByEnds[LoadedShell]]

@@ -1,0 +1,147 @@
+"""All sentences that judge: what is said of a finding, by its code, and its variants by what follows a colon.
+
+`ends` is the finding's support, `place` its place; the other words are given where it is judged (`findings.said`).
+"""
+
+LOADS = "with {ends} ends {what} under {place}{at}{where}"
+UNLOADED = "with {ends} ends {what}{where}"
+
+SENTENCES = {
+    "contact": "{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section) or a larger spacing",
+    "ends_in_the_air": (
+        "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
+        "beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has to be designed"
+    ),
+    "falls": "{alone}the shell does not stand under its own weight{bracing}: it carries only {parts}{others}{advice}",
+    "falls_under_loads": "with {ends} ends the shell falls under {place}: it {how} at {factor} times these loads",
+    "flat": "the target is flat, nothing pops up",
+    "guided": (
+        "lifted from flat and driven by its ends alone, the shell comes to rest in another shape{where}: it has to be "
+        "guided into its final shape"
+    ),
+    "imperfect": "under {place} with {ends} ends and imperfections the shell falls at {factor} times these loads",
+    "imperfect: no equilibrium": (
+        "under {place} with {ends} ends and imperfections no equilibrium was found, and nothing is known of it"
+    ),
+    "imperfect: not followed": (
+        "under {place} with {ends} ends and imperfections nothing is known above {factor} times the loads"
+    ),
+    "imperfect: unloaded": "with {ends} ends and imperfections the shell is unstable before the loads of {place} act",
+    "linear_buckling": (
+        "under {place} with {ends} ends linear buckling is at {factor} times these loads: the shell carries them only "
+        "in another shape, its nodes having moved by {moved}"
+    ),
+    "lost": (
+        "the deployment could not be followed all the way: {how}; stages are missing, and whether the shell reaches "
+        "its final shape from flat is not known"
+    ),
+    "needs_bracing": "{alone}the shell {carries} {weight} without its bracing: support it until that is in place",
+    "no_imperfections": (
+        "imperfections were not looked at, and the factors on the loads are those of the perfect shell: have them "
+        "looked at ({offer})"
+    ),
+    "no_loads": (
+        "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
+        "people) and imperfections were not checked{creep}"
+    ),
+    "no_mass": (
+        "no mass was given, so that it is not known what share of its own weight the shell carries: give "
+        "rod.section.mass"
+    ),
+    "no_room": (
+        "{who} pass each other with {room} between them {where}: that leaves hardly any room for joints; use thinner "
+        "rods (rod.section) or a larger spacing"
+    ),
+    "no_shear_strength": (
+        "torsion shears the rods by up to {stress}, counted by von Mises as in isotropic materials; timber and fibre "
+        "composites withstand less shear along the fibres: give checks.shear_strength"
+    ),
+    "no_strength": "no strength was given, so it is not known whether the rods hold (checks.strength)",
+    "no_strength: bracing": (
+        "the design strength of the bracing is not known, so that whether it breaks under the loads was not judged: "
+        "compare its largest forces, which stand with the loads, with what it can carry"
+    ),
+    "no_strength: durations": "the design strength for {durations} loads is not known and was not judged",
+    "no_strength: rods": (
+        "the design strength of the rods is not known, so that whether they break under the loads was not judged: "
+        "give strength.permanent and strength.short"
+    ),
+    "not_checked: clamped": "whether the clamped shape is reached from the pinned one by turning the ends is not known",
+    "not_checked: contact": (
+        "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
+        "rod.section.fibre_distances for that"
+    ),
+    "not_checked: deployment": "whether the shell is reached from flat was not checked{why}",
+    "not_checked: gap": "the gap to the target was not checked",
+    "not_checked: late": "{when}; not checked: {missing}",
+    "not_checked: loads": "{place} with {ends} ends was not checked",
+    "not_checked: refused": "the loads were not checked: {why}",
+    "not_checked: stability": "whether the shell is stable was not checked",
+    "not_checked: weight": "whether it carries its own weight{bracing} was not checked",
+    "not_computed": "the computation did not converge, which says nothing about the shell itself: {status}",
+    "not_computed: job": "the job is not complete: {status}",
+    "not_computed: pop-up": "the pop-up with {ends} ends did not converge: {status}",
+    "not_computed: nothing": "there is no pop-up in this result",
+    "not_followed": (
+        "whether the shell stands under {place} with {ends} ends is not known: it could be followed only up to "
+        "{factor} times these loads"
+    ),
+    "not_followed: above": (
+        "under {place} with {ends} ends the shell could not be followed beyond {factor} times the loads, and nothing "
+        "is known above"
+    ),
+    "not_followed: weight": (
+        "{alone}it is not known whether the shell stands under its own weight{bracing}: it could be followed only up "
+        "to {parts}"
+    ),
+    "not_followed: reserve": (
+        "with {ends} ends the shell{bracing} carries {times} its own weight; above, it could not be followed, and "
+        "nothing is known"
+    ),
+    "not_refined": "the form is not refined: {why}",
+    "not_refined: late": "{when}: the refinement was stopped at what it had found",
+    "not_sold": "the chosen section is {thin}: have it made, or choose another material or a larger target",
+    "not_spliced": "{rods} cannot be spliced between joints from stock of {stock}: give longer stock",
+    "off_target": (
+        "with {ends} ends, the nearest that can be used, the shell deviates from the target by up to {gap} ({share} "
+        "of its size){where}{advice}"
+    ),
+    "other_shape": (
+        "with {ends} ends the shell has another stable shape, {distance} of its size away at {energy} times the "
+        "energy: check on site that it takes the intended one"
+    ),
+    "reserve": "the shell{bracing} carries only {weights}, and {asked}{others}{advice}",
+    "sinks": (
+        "with {ends} ends the shell moves by {depth} ({share} of its size) under its own weight{further}, so that it "
+        "does not keep the shape whose gap to the target is given: use stiffer rods, or brace it"
+    ),
+    "slip": LOADS,
+    "slip: unloaded": UNLOADED,
+    "snaps": "{where} of the deployment from flat the shell snaps forward by itself, by up to {by}{continues}{other}",
+    "stands": (
+        "with {all} ends the shell{bracing} is stable and carries {weight} times its own weight, {asked} being asked "
+        "for{near}"
+    ),
+    "stands_under_loads": "under {place} it is stable up to {factor} times these loads",
+    "strength": "{shape} the rods use {share} of {whose}{where}",
+    "strength: given": "{shape} the rods would break: {share} of their strength{where}",
+    "strength: unloaded": UNLOADED,
+    "strength_not_reduced": (
+        "the rods permanently use {share} of {whose}: reduce it for duration and moisture and give the reduced value "
+        "as checks.strength, or use thinner rods"
+    ),
+    "strength_of_bracing": "with {ends} ends the bracing uses {share} of its design strength under {place}",
+    "strength_under_loads": LOADS,
+    "too_thick": (
+        "{shape} bending strains the rods by {strain}: they are too thick for this curvature, and the theory of thin "
+        "rods is valid up to about {valid}; use thinner rods or a larger target"
+    ),
+    "turned": "turned into their clamps after deployment, the ends lead to another than the clamped shape",
+    "unstable": "with {ends} ends the shell is unstable{count} and would snap to another shape",
+    "unstable: unloaded": "with {ends} ends the shell is unstable before the loads of {place} act",
+}
+
+ANOTHER_WAY = (
+    "; this is on one way, all ends moved evenly: erect it in another way that is checked, such as rod by rod over a "
+    "scaffold, lifted at its middle, or one family's ends first"
+)
