@@ -141,7 +141,9 @@ KERNELS: dict[str, dict[str, str]] = {
     },
     "solve.sparse_ldl": {
         "_backward": "i1 f1 i1 i1 i1 i1 f1 f1 f1 f1",
+        "_backward_rows": "i1 f2 i1 i1 i1 i1 f1 f1 f1 f1",
         "_forward": "i1 f1 i1 f1 i1 i1 i1 i1 f1 f1 f1",
+        "_forward_rows": "i1 f2 i1 f2 i1 i1 i1 i1 f1 f1 f1",
         "_dissect": "f2 i2 i1 i1",
         "_numeric": "i1 f1 i1 i1 i1 i1 i1 i2 i1 i1 i1 i1 i1 f1 f1 f1 f1 f1",
         "_residual": "i1 i1 f1 f1 f1",

@@ -332,11 +332,11 @@ class NewtonStep:
 
     def _inverse_iteration(self, sweeps: int) -> tuple[Floats, float]:
         """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue [J]."""
-        start = generic(self._free.size, 1)
+        start, units = generic(self._free.size, 1), self._units
         values, (row, *_), _ = subspace_iteration(
-            lambda x: self._solve(x / self._units) / self._units, start, settled=1, tolerance=0.0, most_sweeps=sweeps
+            lambda rows: self._solve(rows / units) / units, start, settled=1, tolerance=0.0, most_sweeps=sweeps
         )
-        return row * self._units, 1.0 / float(values[0])
+        return row * units, 1.0 / float(values[0])
 
 
 def upwards(mode: Floats) -> Floats:

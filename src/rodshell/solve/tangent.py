@@ -81,7 +81,7 @@ class Tangent:
         -------
         Displacements of the same shape [m, rad].
         """
-        return self._each("loads", loads, self.factors.solve)
+        return self._of_fields("loads", loads, self.factors.solve)
 
     def product(self, motions: Floats) -> Floats:
         """Forces K x in the free directions; zero across them.
@@ -90,7 +90,9 @@ class Tangent:
         ----------
         motions : (N, 3) displacements [m, rad], or (k, N, 3) of k cases; their part in the free directions counts.
         """
-        return self._each("displacements", motions, lambda x: self.pattern.product(self.values, x))
+        return self._of_fields(
+            "displacements", motions, lambda rows: np.array([self.pattern.product(self.values, row) for row in rows])
+        )
 
     def lowest_modes(
         self,
@@ -126,25 +128,26 @@ class Tangent:
         count = min(count, int(np.count_nonzero(root)))
         factors, shift = self._positive_definite(weight)
 
-        def inverse(vector: Floats) -> Floats:
-            return root * factors.solve(root * vector)
+        def inverse(rows: Floats) -> Floats:
+            return root * factors.solve(root * rows)
 
         start = np.random.default_rng(0).standard_normal((size, min(count + guards, int(np.count_nonzero(root))))).T
         values, rows, settled = subspace_iteration(
             inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps
         )
-        shapes = np.array([factors.solve(root * row) for row in rows[:count]]).reshape(count, size)
+        shapes = factors.solve(root * rows[:count])
         shapes /= np.sqrt(np.einsum("ki,i,ki->k", shapes, weight, shapes))[:, None]
         expanded = np.array([self.freedom.expand(shape) for shape in shapes]).reshape(count, *self.state.shape)
         return Modes(1.0 / values[:count] - shift, expanded, settled)
 
-    def _each(self, what: str, fields: Floats, apply: Callable[[Floats], Floats]) -> Floats:
-        """A function of reduced vectors applied to one field (N, 3) or to many (k, N, 3)."""
+    def _of_fields(self, what: str, fields: Floats, apply: Callable[[Floats], Floats]) -> Floats:
+        """A function of reduced vectors (k, dofs) applied to one field (N, 3) or to many (k, N, 3)."""
         shape, free = self.state.shape, self.freedom
         if fields.shape[-2:] != shape or fields.ndim not in (2, 3):
             raise InputError(f"the {what} have the shape {fields.shape}: give {shape}, or (k, {shape[0]}, {shape[1]})")
-        results = [free.expand(apply(free.reduce(field))) for field in fields.reshape(-1, *shape)]
-        return np.array(results).reshape(fields.shape)
+        rows = [free.reduce(field) for field in fields.reshape(-1, *shape)]
+        results = apply(np.array(rows).reshape(len(rows), free.size))
+        return np.array([free.expand(row) for row in results]).reshape(fields.shape)
 
     def _checked_mass(self, mass: Floats) -> Floats:
         if mass.shape != self.state.shape:
@@ -169,7 +172,7 @@ class Tangent:
         root = np.sqrt(weight)
         start = np.random.default_rng(0).standard_normal((1, len(weight)))
         value, *_ = subspace_iteration(
-            lambda x: root * factors.solve(root * x),
+            lambda rows: root * factors.solve(root * rows),
             start,
             settled=1,
             tolerance=1e-2,
@@ -300,7 +303,7 @@ def subspace_iteration(
 
     Parameters
     ----------
-    apply : the operator, on vectors (n,).
+    apply : the operator, on each of the vectors (m, n).
     start : (m, n) vectors to begin with.
     settled : so many of the largest eigenvalues must have settled.
     tolerance : of the square of these ones' residuals over the eigenvalue, which is about the relative error of the
@@ -314,7 +317,7 @@ def subspace_iteration(
     rows, done = start, False
     for _ in range(most_sweeps):
         rows = orthonormal(rows)
-        images = np.array([apply(row) for row in rows])
+        images = apply(rows)
         values, turn = np.linalg.eigh(np.einsum("ik,jk->ij", rows, images))
         values, turn = values[::-1], turn[:, ::-1]
         before, rows = np.einsum("ji,jk->ik", turn, rows), np.einsum("ji,jk->ik", turn, images)
@@ -336,12 +339,12 @@ def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, toleran
 
     Parameters
     ----------
-    inverse : of the matrix, on vectors (n,).
+    inverse : of the matrix, on a vector (n,) or on each of many (k, n).
     start : (m, n) directions near which it is looked for: it is found at once if it is one of the m softest.
     tolerance : as of `subspace_iteration`.
     """
     values, (row, *_), settled = subspace_iteration(
-        lambda row: -inverse(row), start, settled=1, tolerance=tolerance, most_sweeps=FEW_SWEEPS
+        lambda rows: -inverse(rows), start, settled=1, tolerance=tolerance, most_sweeps=FEW_SWEEPS
     )
     if settled and values[0] > 0:
         return np.asarray(row)
