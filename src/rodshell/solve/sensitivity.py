@@ -22,7 +22,6 @@ from scipy.sparse import csc_array, csr_array
 
 from rodshell.arrays import Floats
 from rodshell.model.edge_properties import EA, LENGTH, PROPERTIES, EdgeProperties
-from rodshell.rods.elements import add_product
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.tangent import Modes, Tangent
 
@@ -163,8 +162,4 @@ class Sensitivity:
 
     def _product(self, motion: Floats, state: Floats | None = None) -> Floats:
         """(N, 3) product of the Hessian with displacements, held blocks too; at the equilibrium, or another state."""
-        state = self.here.state if state is None else state
-        result = np.zeros_like(state)
-        for element in (*self.edges.shell.elements, self._stretch):
-            add_product(element, state, motion, result)
-        return result
+        return self.edges.shell.energies.product(self.here.state if state is None else state, motion)
