@@ -23,11 +23,10 @@ from rodshell.formfinding.popup import end_directions, laid_below, turned
 from rodshell.model import Shell
 from rodshell.model.shell import last_edges
 from rodshell.rods.elements import Elements
-from rodshell.solve.continuation import EASY
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
-from rodshell.solve.path import SAME, Snap, Trace, follow, relax, trace, unaccounted
+from rodshell.solve.path import EASY, SAME, Snap, Trace, follow, relax, trace, unaccounted
 from rodshell.solve.problem import Problem, Supports, half_width
 from rodshell.units import FEW, length_text, percent_text, places_text
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from math import copysign
 
-EASY = 5  # a step that needs no more iterations may be followed by a longer one
 LONGER, SHORTER = 1.6, 0.4
 ARRIVED = 1e-9  # of the parameter: a step that ends so near ends there
 
@@ -44,10 +43,10 @@ class Continuation:
         """Whether the step is too short to be tried."""
         return self.step < self.shortest
 
-    def accept(self, iterations: int, *, easy: int = EASY) -> None:
-        """The step succeeded in so many iterations."""
+    def accept(self, *, easy: bool = False) -> None:
+        """The step succeeded."""
         self.t = self.there
-        if iterations <= easy:
+        if easy:
             self.step *= LONGER
 
     def shorten(self) -> None:

@@ -296,16 +296,7 @@ class ContactEuler:
         self.last: P | None = None
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
-        """One step.
-
-        Parameters
-        ----------
-        motion : its source frames being at the state.
-        state : (N, 3) at the start [m, at twist angles rad].
-        velocity : (N, 3) at the start [m/s, rad/s].
-        time : of the start [s].
-        step : its length [s].
-        """
+        """One step; parameters as of `ImplicitEuler.take`."""
         law = self._law
         touching = law.touching(motion.constraint_at(time + step), state)
         rubbing = np.zeros_like(state)

@@ -155,24 +155,13 @@ class LoadedAssembly:
         return result if self.load.forces is None else result - factor * self.load.forces
 
     def values(self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float) -> Floats:
-        """(nnz,) values of K in the order of the pattern; parameters as of `gradient`.
-
-        Parameters
-        ----------
-        elements : of structure and load at the factor, with their source frames at, or near, the state.
-        state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
-        """
+        """(nnz,) values of K in the order of the pattern; parameters as of `gradient`."""
         return self._assembly.values(elements, state, forces, self.load.stretch(self.problem.stretch, factor))[1]
 
     def tangent(
         self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float
     ) -> tuple[Tangent, Floats]:
         """The tangent stiffness, and the rate dx/dt (N, 3) of the state there [m, rad]; parameters as of `gradient`.
-
-        Parameters
-        ----------
-        elements : of structure and load at the factor, with their source frames at, or near, the state.
-        state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
 
         Raises
         ------

@@ -24,12 +24,13 @@ from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
 from rodshell.model import Potential
 from rodshell.rods.elements import with_frames
-from rodshell.solve.continuation import EASY, Continuation
+from rodshell.solve.continuation import Continuation
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.newton_matrix import SparseSum
 from rodshell.solve.problem import Problem, Supports
 
+EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25
 SMALLEST_STEP = 1e-3
 SNAP = 0.01  # step over which a structure may snap
@@ -125,7 +126,7 @@ def followed(
         )
         reports.append(found.report)
         if found.report.converged:
-            path.accept(found.report.iterations, easy=easy)
+            path.accept(easy=found.report.iterations <= easy)
             last = found
         else:
             path.shorten()
@@ -137,7 +138,7 @@ def followed(
             found = _fallen(going_on(problem_at(path.there), last), last, found, most_factorizations=left)
             reports.append(found.report)
             if found.report.stable:
-                path.accept(EASY + 1)
+                path.accept()
             last, path.step = (found, 4 * SNAP) if found.report.stable else (last, short)
         spent = most_of_all is not None and sum(report.iterations for report in reports) > most_of_all
         if path.lost or spent or (most_factorizations is not None and _made(reports) >= most_factorizations):
@@ -229,10 +230,10 @@ def trace(
             reports += back.reports
             if back.t != t or farthest(here, back.found) > SAME * problem.length:
                 snaps.append(Snap(t, there, farthest(here, found)))
-            path.accept(EASY + 1)
+            path.accept()
             path.step = 4 * shortest
         else:
-            path.accept(found.report.iterations)
+            path.accept(easy=found.report.iterations <= EASY)
         here = found
     return Trace(path.t, here, tuple(snaps), tuple(reports))
 
@@ -251,12 +252,7 @@ def going_on(problem: Problem, last: Equilibrium) -> Problem:
 
 def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule; parameters as for `surplus`.
-
-    Parameters
-    ----------
-    here, there : equilibria of one structure under one load, the second with prescribed `Supports`.
-    """
+    by the trapezoidal rule; parameters as of `surplus`."""
     return abs(surplus(here, there)) > UNACCOUNTED
 
 

@@ -129,12 +129,7 @@ class Sensitivity:
         return result
 
     def lowest_modes(self, count: int, *, mass: Floats | None = None) -> Modes:
-        """The lowest modes of the tangent, as `Tangent.lowest_modes`.
-
-        Parameters
-        ----------
-        mass : (N, 3) lumped mass of each component [kg, kg m2]; None: the modes of K itself.
-        """
+        """The lowest modes of the tangent, as `Tangent.lowest_modes`."""
         return self.tangent.lowest_modes(count, mass=mass)
 
     def mode_slopes(self, modes: Modes, parameters: Parameters) -> Floats:

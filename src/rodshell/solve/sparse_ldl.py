@@ -23,6 +23,7 @@ from rodshell.kernels import njit
 from rodshell.model import BlockRows
 from rodshell.solve.dense import (
     OVERWRITTEN,
+    PAD,
     add_rows,
     backward,
     backward_rows,
@@ -160,7 +161,7 @@ class Multifrontal:
         except IndexError:
             plan, count = self.plan, range(threads())
             eliminated = [(room(plan.largest_panel), workspace(plan.largest_front)) for _ in count]
-            largest = padded(plan.largest_front)
+            largest = plan.largest_front + PAD
             solved = [(room(ROWS * largest), room(ROWS * largest)) for _ in count]
             return _Scratch(eliminated, room(plan.stack_size), solved)
 
@@ -207,7 +208,7 @@ class MultifrontalFactors:
             result[k] = self._solved(right[k], _forward, _backward)
         return result
 
-    def _solved(self, right: Floats, forward: Callable[..., None], backward: Callable[..., None]) -> Floats:
+    def _solved(self, right: Floats, upwards: Callable[..., None], downwards: Callable[..., None]) -> Floats:
         """(n,) or (n, ROWS), by the kernels for it."""
         assert self._memory is not None, GIVEN_AWAY
         solver, plan, (panels, pivots) = self._solver, self._solver.plan, self._memory
@@ -218,15 +219,15 @@ class MultifrontalFactors:
         sums = np.zeros((last, len(above), *x.shape[1:]))
 
         def rise(part: int, thread: int) -> None:
-            forward(parts[part], x, place, sums[part], *fronts, *memory[thread])
+            upwards(parts[part], x, place, sums[part], *fronts, *memory[thread])
 
         def descend(part: int, thread: int) -> None:
-            backward(parts[part], x, *fronts, pivots, *memory[thread])
+            downwards(parts[part], x, *fronts, pivots, *memory[thread])
 
         if last:
             in_threads(rise, last, most=len(memory))
             x[above] += sums.sum(axis=0)
-        forward(parts[last], x, NONE_ABOVE, np.empty((0, *x.shape[1:])), *fronts, *memory[0])
+        upwards(parts[last], x, NONE_ABOVE, np.empty((0, *x.shape[1:])), *fronts, *memory[0])
         descend(last, 0)
         in_threads(descend, last, most=len(memory))
         solver.give_back(scratch)
