@@ -39,10 +39,8 @@ def system(unknowns: int) -> tuple[csc_matrix, np.ndarray]:
     step = NewtonStep(
         Problem(shell.elements, shell.stretch, Supports(free), RADIUS, flat_coordinates=shell.flat_coordinates), state
     )
-    step.take(state, np.zeros(len(shell.stretch.blocks)), False)
-    pattern = step._assembly
-    matrix = csc_matrix((step._data, pattern.indices, pattern.indptr), shape=(free.size, free.size))
-    return matrix, np.repeat(shell.flat_coordinates, free.count, axis=0)
+    step.take(step.start(state, np.zeros(len(shell.stretch.blocks))))
+    return step.assembly.pattern.upper(step.matrix.values), np.repeat(shell.flat_coordinates, free.count, axis=0)
 
 
 def least(work: Callable[[], object]) -> float:

@@ -7,7 +7,6 @@ from statistics import median
 
 import numpy as np
 import qdldl
-from scipy.sparse import csc_matrix
 
 import rodshell as rs
 from benchmarks.rows import Row, Section, clock, ms, timed
@@ -90,15 +89,15 @@ def _units() -> tuple[Callable[[], object], Callable[[], object], int]:
     """One Newton step of the bound system (assembly, factorisation, solve); QDLDL's factorisation; the unknowns."""
     step, state, forces = bound_system(auto())
 
+    start = step.start(state, forces)
+
     def newton() -> None:
-        step._chord = False
-        step.take(state, forces, False)
+        step.take(start)
 
     newton()
-    pattern = step._assembly
-    matrix = csc_matrix((step._data, pattern.indices, pattern.indptr), shape=(step.dofs, step.dofs))
+    matrix = step.assembly.pattern.upper(step.matrix.values)
     theirs = qdldl.Solver(matrix, upper=True)
-    return newton, lambda: theirs.update(matrix, upper=True), step.dofs
+    return newton, lambda: theirs.update(matrix, upper=True), matrix.shape[0]
 
 
 def bound_system(layout: rs.GridLayout) -> tuple[NewtonStep, np.ndarray, np.ndarray]:

@@ -35,7 +35,7 @@ def adjoint_rows(shell: str, family, laths: bool) -> Iterator[Row]:  # type: ign
         negative = 0
 
         def solve(self, right: np.ndarray) -> np.ndarray:
-            solves.append(1)
+            solves.extend([1] * len(np.atleast_2d(right)))
             return factors.solve(right)
 
     counted = Sensitivity(here.equilibrium, here.edges)

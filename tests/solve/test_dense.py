@@ -13,14 +13,16 @@ from rodshell.solve.dense import (
     OVERWRITTEN,
     add_rows,
     backward,
+    backward_rows,
     eliminate,
     forward,
+    forward_rows,
     padded,
     room,
     subtract_product,
     workspace,
 )
-from rodshell.solve.simd_kernels import LANES, adding, multiplying
+from rodshell.solve.simd_kernels import LANES, ROWS, adding, multiplying
 
 pytestmark = pytest.mark.skipif(
     COMPILED is not None, reason="parts of kernels, which only Numba calls on their own: RODSHELL_KERNELS=jit"
@@ -84,6 +86,28 @@ def test_substitutions_solve_with_the_front(own, more):
     expected = np.linalg.solve(upper[:, :own], solved / pivots - upper[:, own:] @ known)
     np.testing.assert_allclose(values[:own], expected, rtol=1e-10, atol=1e-13)
     np.testing.assert_array_equal(values[own:size], known)
+
+
+@pytest.mark.parametrize("more", MORE)
+@pytest.mark.parametrize("own", OWN)
+def test_substitutions_side_by_side_have_the_bits_of_each_alone(own, more):
+    _, _, panel, pivots, _ = eliminated(own, more)
+    stride, known = padded(own + more), slice(own + more, None)
+    rows = room(ROWS * stride)[: ROWS * stride].reshape(ROWS, stride)
+    rows[:] = np.random.default_rng(own).standard_normal(rows.shape)
+    rows[:, known] = 0.0
+    alone, aside = [room(stride)[:stride] for _ in rows], room(ROWS * own)
+    for values, row in zip(alone, rows, strict=True):
+        values[:] = row
+        forward(panel, values, aside)
+    forward_rows(panel, rows, aside)
+    np.testing.assert_array_equal(rows, alone)
+    rows[:, known] = 0.0
+    for values in alone:
+        values[known] = 0.0
+        backward(panel, pivots, values, aside)
+    backward_rows(panel, pivots, rows, aside)
+    np.testing.assert_array_equal(rows, alone)
 
 
 @pytest.mark.parametrize("bad", [0.0, -0.0, np.nan, np.inf, 1e-310])

@@ -586,7 +586,7 @@ def test_saddle_is_passed_over_if_asked_for():
 
 
 def test_saddle_that_cannot_be_left_is_refused(monkeypatch):
-    monkeypatch.setattr("rodshell.solve.rod_statics.MOST_DOWN", 0)
+    monkeypatch.setattr("rodshell.solve.equilibrium.LONGEST_SLIDE", 0)
     with pytest.raises(rs.ConvergenceError, match="not stable") as caught:
         squeezed()
     assert caught.value.report.negative_modes > 0

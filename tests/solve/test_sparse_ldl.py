@@ -335,6 +335,16 @@ def test_what_memory_held_before_does_not_matter(monkeypatch):
     np.testing.assert_array_equal(found[2], found[0])
 
 
+@pytest.mark.parametrize("count", [1, 3, 4, 9])
+def test_many_right_hand_sides_have_the_bits_of_each_alone(count):
+    matrix, places = grid_matrix(20)
+    triangle, right = upper(matrix), RANDOM.standard_normal((count, matrix.shape[0]))
+    solver = Multifrontal(triangle.indptr, triangle.indices, places)
+    together, alone = solver.factor(triangle.data), solver.factor(triangle.data)
+    np.testing.assert_array_equal(together.solve(right), [alone.solve(row) for row in right])
+    np.testing.assert_array_equal(together.solve(right[::-1]), [alone.solve(row) for row in right[::-1]])
+
+
 def test_scratch_memory_that_another_thread_takes_first_is_no_fault():
     class TakenMeanwhile(list):
         def __bool__(self):

@@ -58,7 +58,7 @@ def loads(count: int, shape: rs.PopUp) -> np.ndarray:
 
 def test_solutions_are_those_of_a_dense_solve_with_the_exact_hessian() -> None:
     shape, unknowns = popped(), free_unknowns(popped())
-    right = loads(3, shape)
+    right = loads(5, shape)  # four of them side by side
     found = shape.equilibrium.tangent.solve(right)
     for case, field in zip(found, right, strict=True):
         exact = np.linalg.solve(dense_hessian(), field.ravel()[unknowns])
@@ -240,9 +240,9 @@ def test_subspace_iteration_ends_where_its_eigenvalues_are_as_accurate_as_asked(
     values, directions = 1.5 ** -np.arange(60.0), np.linalg.qr(random.standard_normal((60, 60)))[0]
     applied = list[int]()
 
-    def apply(vector: np.ndarray) -> np.ndarray:
-        applied.append(1)
-        return np.asarray(directions @ (values * (directions.T @ vector)))
+    def apply(vectors: np.ndarray) -> np.ndarray:
+        applied.extend([1] * len(vectors))
+        return np.asarray(vectors @ directions * values @ directions.T)
 
     found, rows, settled = subspace_iteration(
         apply, random.standard_normal((6, 60)), settled=3, tolerance=tolerance, most_sweeps=50
@@ -263,8 +263,8 @@ def test_the_negative_mode_nearest_to_zero_is_found_wherever_it_lies(lowest: flo
     values = np.concatenate([[-lowest, -70.0], np.linspace(0.1, 90.0, 98)])
     directions = np.linalg.qr(random.standard_normal((100, 100)))[0]
 
-    def inverse(vector: np.ndarray) -> np.ndarray:
-        return np.asarray(directions @ ((directions.T @ vector) / values))
+    def inverse(vectors: np.ndarray) -> np.ndarray:
+        return np.asarray(vectors @ directions / values @ directions.T)
 
     found = negative_mode(inverse, random.standard_normal((4, 100)), tolerance=1e-5)
     assert abs(found @ directions[:, 0]) > 0.999 * np.linalg.norm(found)

@@ -5,6 +5,7 @@ Implicit Euler with the chosen coupling, with drag, without load. Pinned ends on
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion
 from rodshell.solve.linear_stability import step_limit
-from rodshell.solve.newton_matrix import narrow_or_dissected
+from rodshell.solve.newton_matrix import narrow_or_sparse
 from rodshell.solve.problem import Damping, Supports
 from rodshell.solve.simulate import Sample, simulate
 from rodshell.validation import instance, keep, not_negative, numbers, positive
@@ -128,7 +129,7 @@ def dynamic_pop_up(
     step = min(settings.time_step, OF_LIMIT * step_limit(motion, state))
     unit_force = rod.bend_stiffness / (0.5 * float(np.ptp(boundary.points, axis=0).max())) ** 2
     stop = _stop_check(shell, settings.moving_time, BALANCED * unit_force, progress)
-    matrix, steps, refused = narrow_or_dissected(shell.flat_coordinates), 0, 0
+    matrix, steps, refused = partial(narrow_or_sparse, coordinates=shell.flat_coordinates), 0, 0
     last = Sample(0.0, state, np.zeros_like(state), motion)
     for rate, until in zip(settings.drags, (settings.moving_time, settings.duration), strict=True):
         if until <= last.time:

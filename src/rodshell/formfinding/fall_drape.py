@@ -7,6 +7,7 @@ because touching nodes that are stopped at each step creep. How fast it would sl
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from time import process_time
 
 import numpy as np
@@ -27,7 +28,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.solve.implicit_euler import ContactEuler, Motion
 from rodshell.solve.linear_stability import NO_NODES, REMEDY, ExplicitTies, step_limit
-from rodshell.solve.newton_matrix import narrow_or_dissected
+from rodshell.solve.newton_matrix import narrow_or_sparse
 from rodshell.solve.problem import Damping, GravityForce
 from rodshell.solve.simulate import End, Sample, TimeSeries, simulate
 from rodshell.targets import Target
@@ -118,7 +119,7 @@ class _FallSimulation:
         self._still = STILL * float(-self.load[:, 2].sum()) * target.size
         self._balanced = BALANCED * float(-self.load[:, 2].min())
         self._law = ModifiedMass(target, massive, fall.stopped, fall.friction)
-        self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.flat_coordinates))
+        self.stepper = ContactEuler(self._law, partial(narrow_or_sparse, coordinates=shell.flat_coordinates))
         self._ties: ExplicitTies | None = None
         self._out_of_time = ""
         self._energies = list[tuple[float, float]]()  # times [s] and kinetic energies [J]

@@ -60,10 +60,7 @@ def out_of_balance(motion: Motion, state: Floats, load: Floats) -> Floats:
     state : (N, 3) nodes [m] and twist angles [rad].
     load : (N, 3) on them [N], [N m].
     """
-    gradient = -load
-    for element in (*motion.elements, *motion.explicit):
-        element.evaluate(state, gradient)
-    return gradient
+    return motion.energies.gradient(state) - load
 
 
 def unbalanced_force(motion: Motion, state: Floats, load: Floats, touching: Touching) -> float:

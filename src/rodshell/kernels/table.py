@@ -70,6 +70,9 @@ KERNELS: dict[str, dict[str, str]] = {
         "_reduce": "f2 f3 i1 i",
         "_scatter": "f3 i2 i3 i1 i1 f3 i i f1",
     },
+    "model.potential": {
+        "_add_product": "f3 i2 f2 f2",
+    },
     "nets.apron": {
         "_prolong": "f1 i2 b2 i1 f2",
         "_stretches": "f1 f1 b2 f2 f",
@@ -136,12 +139,11 @@ KERNELS: dict[str, dict[str, str]] = {
         "_solve": "f2 i i f2 i1 i1 f3 f1 f2",
         "_turn_whole": "f2 i i1 f3",
     },
-    "solve.newton_step": {
-        "_add_product": "f3 i2 f2 f2",
-    },
     "solve.sparse_ldl": {
         "_backward": "i1 f1 i1 i1 i1 i1 f1 f1 f1 f1",
+        "_backward_rows": "i1 f2 i1 i1 i1 i1 f1 f1 f1 f1",
         "_forward": "i1 f1 i1 f1 i1 i1 i1 i1 f1 f1 f1",
+        "_forward_rows": "i1 f2 i1 f2 i1 i1 i1 i1 f1 f1 f1",
         "_dissect": "f2 i2 i1 i1",
         "_numeric": "i1 f1 i1 i1 i1 i1 i1 i2 i1 i1 i1 i1 i1 f1 f1 f1 f1 f1",
         "_residual": "i1 i1 f1 f1 f1",

@@ -14,12 +14,13 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csc_matrix, diags
+from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
-from rodshell.model.assembly import Assembly, Freedom
+from rodshell.model.assembly import Freedom
+from rodshell.model.potential import Potential
 from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, Stretch
@@ -306,15 +307,11 @@ class ElasticRod:
 
     def energy(self, state: Floats) -> float:
         """Energy at `state` (N, 3) [J]."""
-        scrap = np.zeros_like(state)
-        return sum(part.evaluate(state, scrap) for part in (*self.elements, self.stretch))
+        return self._potential.energy(state)
 
     def gradient(self, state: Floats) -> Floats:
         """(N, 3) gradient of the energy at `state` (N, 3) [N, for angles N m]."""
-        gradient = np.zeros_like(state)
-        for part in (*self.elements, self.stretch):
-            part.evaluate(state, gradient)
-        return gradient
+        return self._potential.gradient(state)
 
     def hessian(self, state: Floats, freedom: Freedom | None = None) -> csc_matrix:
         """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's.
@@ -324,16 +321,7 @@ class ElasticRod:
         state : (N, 3) node positions [m] and twist angles [rad].
         freedom : free directions of the blocks.
         """
-        free = self.freedom() if freedom is None else freedom
-        parts = (*self.elements, self.stretch)
-        hessians = [np.empty((len(p.blocks), 3 * p.blocks.shape[1], 3 * p.blocks.shape[1])) for p in parts]
-        for part, values in zip(parts, hessians, strict=True):
-            part.evaluate(state, np.zeros_like(state), values)
-        blocks = [part.blocks for part in parts]
-        assembly = Assembly.of(blocks, free)
-        data = assembly.assemble(hessians, blocks, free)
-        upper = csc_matrix((data, assembly.indices, assembly.indptr), shape=(free.size, free.size))
-        return csc_matrix(upper + upper.T - diags(upper.diagonal()))
+        return self._potential.matrix(state, self.freedom() if freedom is None else freedom)
 
     def weight(self, gravity: ArrayLike) -> Floats:
         """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2].
@@ -345,6 +333,10 @@ class ElasticRod:
         load = np.zeros_like(self.mass)
         load[self.nodes] = self.mass[self.nodes] * vector("gravity", gravity)
         return load
+
+    @property
+    def _potential(self) -> Potential:
+        return Potential((*self.elements, self.stretch))
 
     @property
     def _bend_twist(self) -> BendTwist:

@@ -37,6 +37,7 @@ from rodshell.joints.joint import Elastic, elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
+from rodshell.model.potential import Potential
 from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, Stretch, turned, with_frames
@@ -134,6 +135,11 @@ class Shell:
     def elements(self) -> tuple[Elements, ...]:
         """All energies but the stretch, those of explicit ties included: an equilibrium is the same."""
         return (*self.within, *self.between)
+
+    @property
+    def energies(self) -> Potential:
+        """The sum of all energies."""
+        return Potential((*self.elements, self.stretch))
 
     @property
     def explicit(self) -> tuple[Elements, ...]:

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from rodshell.formfinding import Draped, Fall, drape, map_back, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import mesh_grid
-from rodshell.model import Shell
+from rodshell.model import Potential, Shell
 from rodshell.paper.figure import CASES, INK, LENGTH, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
 from rodshell.progress import Progress, silent
 from rodshell.solve.implicit_euler import Motion
@@ -267,13 +267,11 @@ class BareSolves:
         shell = Shell.of(mesh_grid(case.layout.flat_grid(case.rods, LENGTH), case.edge), ROD, coupling=coupling)
         motion, self._free = Motion.of(shell), shell.freedom()
         state = shell.state(shell.mesh.flat)
-        self._matrix = Banded([element.blocks for element in motion.elements], self._free)
+        self._matrix = Banded(Potential(motion.elements).blocks, self._free)
         self._matrix.clear()
-        for index, element in enumerate(motion.elements):
-            width = 3 * element.blocks.shape[1]
-            hessians = np.zeros((len(element.blocks), width, width))
-            element.evaluate(state, np.zeros_like(state), hessians)
-            self._matrix.add(index, hessians, element.blocks, self._free)
+        implicit = Potential(motion.elements)
+        for index, (blocks, hessians) in enumerate(zip(implicit.blocks, implicit.hessians(state), strict=True)):
+            self._matrix.add(index, hessians, blocks, self._free)
         self._matrix.add_blocks(motion.mass / step**2, NO_CURVATURE, self._free)
         self._summed, self._field = self._matrix.values.copy(), np.ones_like(state)
         self._band = np.asfortranarray(self._summed[: self._matrix.size, : self._matrix.half_bandwidth + 1].T)

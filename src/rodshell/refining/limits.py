@@ -61,9 +61,7 @@ class Energy:
     def slopes(self, here: Point) -> Floats:
         """By the gradient along the motions, and at a fixed state by the properties."""
         edges, by_properties = here.edges, here.parameters.by_properties.toarray().T
-        gradient = np.zeros_like(here.state)
-        for element in (*edges.shell.elements, edges.shell.stretch):
-            element.evaluate(here.state, gradient)
+        gradient = edges.shell.energies.gradient(here.state)
         change = np.einsum("pnx,nx->p", here.response.motions, gradient)
         for k, row in enumerate(by_properties.reshape(-1, *edges.table.shape)):
             ahead, behind = (_elastic(here, edges.table * np.exp(sign * PROBE * row)) for sign in (1.0, -1.0))
@@ -190,5 +188,4 @@ def _bend_lengths(here: Point) -> Floats:
 
 def _elastic(here: Point, table: Floats) -> float:
     """Elastic energy at the point's state of edges with other properties [J]."""
-    shell, unused = here.edges.varied(table).shell, np.zeros_like(here.state)
-    return sum(element.evaluate(here.state, unused) for element in (*shell.elements, shell.stretch))
+    return here.edges.varied(table).shell.energies.energy(here.state)

@@ -18,12 +18,13 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.model import Potential
+from rodshell.model.potential import product, room_for
 from rodshell.refining.structure import Point
-from rodshell.rods.elements import Elements, Stressed, Stretch, add_product
+from rodshell.rods.elements import Stressed
 from rodshell.solve.modes import LinearBuckling, linear_buckling
 
 STEP, MOST_MOVED = 1e-3, 1e-4  # of a logarithm, and a motion: differences of fourth order are then exact to 1e-7
-Energies = tuple[Elements, ...]
 LARGEST = 1e3  # times a load: factors above are not looked for
 
 
@@ -113,7 +114,7 @@ class _Loaded:
     def rate_slopes(self) -> Floats:
         """(p, N, 3) du/dp [m, rad]"""
         turned = [
-            self._along(k, lambda elements, stretch, state, step: _product(elements, stretch, state, self.rate))
+            self._along(k, lambda energies, state, step: energies.product(state, self.rate))
             for k in range(len(self.here.values))
         ]
         return np.asarray(self.here.sensitivity.tangent.solve(-np.array(turned)))
@@ -130,19 +131,16 @@ class _Loaded:
         result = np.zeros(len(here.values))
         for k, by_rate in enumerate(self.rate_slopes):
 
-            def quotient(
-                elements: Energies, stretch: Stretch, state: Floats, step: float, by_rate: Floats = by_rate
-            ) -> float:
-                softer = -_stressed(elements, stretch, state, rate + step * by_rate, shape)
-                return softer - inverse * float(np.sum(shape * _product(elements, stretch, state, shape)))
+            def quotient(energies: Potential, state: Floats, step: float, by_rate: Floats = by_rate) -> float:
+                softer = -_stressed(energies, state, rate + step * by_rate, shape)
+                return softer - inverse * energies.curvature(state, shape)
 
             result[k] = self._along(k, quotient)
-        whole = _product(here.edges.shell.elements, here.edges.shell.stretch, here.state, shape)
-        return result / float(np.sum(shape * whole))
+        return result / here.edges.shell.energies.curvature(here.state, shape)
 
-    def _along(self, k: int, function: Callable[[Energies, Stretch, Floats, float], Any]) -> Any:
-        """Derivative by parameter k of a function of the energies, the edges and the state a step ahead, and that step;
-        by differences of fourth order."""
+    def _along(self, k: int, function: Callable[[Potential, Floats, float], Any]) -> Any:
+        """Derivative by parameter k of a function of the energies and the state a step ahead, and that step; by
+        differences of fourth order."""
         here, rows, motion = self.here, self._rows[k], self.here.response.motions[k]
         farthest = float(np.abs(motion / here.equilibrium.problem.unit(len(motion))).max())
         unit = min(STEP / max(float(np.abs(rows).max()), 1e-12), MOST_MOVED / max(farthest, 1e-300))
@@ -151,8 +149,7 @@ class _Loaded:
             for step in (count * unit, -count * unit):
                 state = here.state + step * motion
                 shell = here.edges.varied(here.edges.table * np.exp(step * rows)).shell
-                elements = tuple(element.refreshed(state) for element in shell.elements)
-                result = result + np.sign(step) * weight * function(elements, shell.stretch, state, step)
+                result = result + np.sign(step) * weight * function(shell.energies.refreshed(state), state, step)
         return result / (12.0 * unit)
 
     @cached_property
@@ -162,22 +159,11 @@ class _Loaded:
         return np.asarray(by_properties.reshape(-1, *self.here.edges.table.shape))
 
 
-def _product(elements: tuple[Elements, ...], stretch: Stretch, state: Floats, motion: Floats) -> Floats:
-    """(N, 3) product of the Hessian with displacements."""
-    result = np.zeros_like(state)
-    for element in (*elements, stretch):
-        add_product(element, state, motion, result)
-    return result
-
-
-def _stressed(elements: tuple[Elements, ...], stretch: Stretch, state: Floats, rate: Floats, shape: Floats) -> float:
+def _stressed(energies: Potential, state: Floats, rate: Floats, shape: Floats) -> float:
     """v'Ks(u)v of the change of the internal forces with a rate u of the state [J]."""
-    total = 0.0
-    for element in (*elements, stretch):
-        if isinstance(element, Stressed):
-            count, width = element.blocks.shape
-            hessians = np.zeros((count, 3 * width, 3 * width))
-            element.stress_stiffness(state, rate, hessians)
-            moved = shape[element.blocks].reshape(count, -1)
-            total += float(np.einsum("mi,mij,mj->", moved, hessians, moved))
-    return total
+    stressed = [elements for elements in energies.sets if isinstance(elements, Stressed)]
+    blocks = [elements.blocks for elements in stressed]
+    hessians = room_for(blocks)
+    for elements, of_set in zip(stressed, hessians, strict=True):
+        elements.stress_stiffness(state, rate, of_set)
+    return float(np.sum(shape * product(hessians, blocks, shape)))

@@ -16,6 +16,7 @@ from rodshell.model.edge_properties import LENGTH, EdgeProperties
 from rodshell.model.rod_sections import RodSections
 from rodshell.refining.change import Change
 from rodshell.rods.section import Rod
+from rodshell.solve.continuation import Continuation
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.path import farthest
 from rodshell.solve.sensitivity import Parameters, Response, Sensitivity
@@ -249,14 +250,15 @@ def under_load(unloaded: Equilibrium, load: Floats) -> tuple[Equilibrium | None,
     The equilibrium, None where the shell falls before; and the number of factorisations.
     """
     first = np.zeros_like(load) if unloaded.problem.load is None else unloaded.problem.load
-    here, t, step, made = unloaded, 0.0, 1.0, 0
-    while t < 1.0 and step > SMALLEST_STEP:
-        there = min(1.0, t + step)
+    here, path, made = unloaded, Continuation(0.0, 1.0, 1.0, SMALLEST_STEP), 0
+    while not (path.arrived or path.lost):
+        there = path.there
         problem = replace(here.problem, load=(1.0 - there) * first + there * load)
         found = find_equilibrium(problem, here.state, here.forces, most_iterations=2 * MOST_ITERATIONS)
         made += found.report.factorizations
         if found.report.stable and farthest(here, found) <= FALLEN * problem.length:
-            here, t = found, there
+            path.accept()
+            here = found
         else:
-            step *= 0.4
-    return (here if t >= 1.0 else None), made
+            path.shorten()
+    return (here if path.arrived else None), made

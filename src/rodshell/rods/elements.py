@@ -147,22 +147,6 @@ def each_curvature(elements: Elements, state: Floats, motion: Floats) -> Floats:
     return np.asarray(np.einsum("mi,mij,mj->m", local, hessians, local))
 
 
-def add_product(elements: Elements, state: Floats, motion: Floats, result: Floats) -> None:
-    """Add the product of the Hessian with displacements to `result` (N, 3) [N].
-
-    Parameters
-    ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
-    motion : (N, 3) displacements [m, rad].
-    result : (N, 3), to which the product is added.
-    """
-    m, k = elements.blocks.shape
-    hessians = np.zeros((m, 3 * k, 3 * k))
-    elements.evaluate(state, np.zeros_like(state), hessians)
-    forces = np.einsum("mij,mj->mi", hessians, motion[elements.blocks].reshape(m, -1))
-    np.add.at(result, elements.blocks, forces.reshape(m, k, 3))
-
-
 def _exploded(elements: Elements, state: Floats) -> tuple[Elements, Floats]:
     """The elements on blocks of their own, and the state there."""
     rows = np.arange(elements.blocks.size, dtype=elements.blocks.dtype).reshape(elements.blocks.shape)

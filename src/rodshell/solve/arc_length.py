@@ -296,8 +296,8 @@ class ArcLength:
             tangent, _ = self._tangent(point.elements, point.state, point.forces, point.factor)
         size, scale = tangent.freedom.size, self._scale
 
-        def inverse(row: Floats) -> Floats:
-            return tangent.factors.solve(row / scale) / scale
+        def inverse(rows: Floats) -> Floats:
+            return tangent.factors.solve(rows / scale) / scale
 
         start = generic(size, MODES) if point.modes is None else point.modes / scale
         mode = tangent.freedom.expand(negative_mode(inverse, start, tolerance=LOSING_CLOSE) * scale)
@@ -370,7 +370,7 @@ class ArcLength:
         """
         scale, size = self._scale, tangent.freedom.size
         inverse, rows, _ = subspace_iteration(
-            lambda row: tangent.factors.solve(row / scale) / scale,
+            lambda rows: tangent.factors.solve(rows / scale) / scale,
             generic(size, MODES) if start is None else start / scale,
             settled=1,
             tolerance=MODES_CLOSE,

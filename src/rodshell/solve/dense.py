@@ -269,3 +269,54 @@ def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
         for i in range(k + 1, width):
             value -= row[i] * values[i]
         values[k] = value
+
+
+@njit(error_model="numpy", inline="always")
+def forward_rows(panel, values, aside):  # type: ignore[no-untyped-def]
+    """`forward` for each row of `values` (ROWS, stride), with the same bits. `aside` (ROWS width,) is scratch."""
+    width, stride = panel.shape
+    for k in range(width):
+        row = panel[k]
+        for r in range(ROWS):
+            value, right = values[r, k], values[r]
+            for i in range(k + 1, width):
+                right[i] -= row[i] * value
+            aside[ROWS * k + r] = value
+    begin = width // LANES * LANES
+    for j in range(begin, stride, _WIDE):
+        _subtract(
+            ROWS, min(REGISTERS, (stride - j) // LANES), _place(values, 0, j), stride, aside.ctypes.data, ROWS,
+            _place(panel, 0, j), stride, width, 1,
+        )  # fmt: skip
+    for k in range(begin, width):
+        for r in range(ROWS):
+            values[r, k] = aside[ROWS * k + r]
+
+
+@njit(error_model="numpy", inline="always")
+def backward_rows(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
+    """`backward` for each row of `values` (ROWS, stride), with the same bits. `aside` (2 width,) is scratch."""
+    width, stride = panel.shape
+    begin, whole = width // LANES * LANES, width // ROWS * ROWS
+    known = aside.ctypes.data + width * BYTES
+    for r in range(ROWS):
+        right, x = values[r], _place(values, r, begin)
+        for k in range(width):
+            aside[k] = right[k] / pivots[k]
+        for k in range(begin, width):
+            right[k] = 0.0
+        for k in range(0, whole, ROWS):
+            _multiply_4(known + k * BYTES, _place(panel, k, begin), stride, x, stride - begin)
+        for k in range(whole, width):
+            _multiply_1(known + k * BYTES, _place(panel, k, begin), stride, x, stride - begin)
+        for k in range(width):
+            right[k] = aside[k] - aside[width + k]
+    for k in range(width - 1, -1, -1):
+        row, a, b, c, d = panel[k], values[0, k], values[1, k], values[2, k], values[3, k]
+        for i in range(k + 1, width):  # side by side: each sum alone would wait for its last addition
+            factor = row[i]
+            a -= factor * values[0, i]
+            b -= factor * values[1, i]
+            c -= factor * values[2, i]
+            d -= factor * values[3, i]
+        values[0, k], values[1, k], values[2, k], values[3, k] = a, b, c, d

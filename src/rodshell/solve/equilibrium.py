@@ -14,12 +14,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from math import isfinite
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
+from rodshell.model import Potential
 from rodshell.rods.elements import Elements
 from rodshell.solve.newton_step import NewtonStep, TooManyModesError
 from rodshell.solve.problem import Problem
@@ -190,53 +190,52 @@ def find_equilibrium(
         that it raises ends the solve with that status.
     """
     begin = time.perf_counter()
-    step = NewtonStep(problem, state, limit_steps=limit_steps, most_modes=most_modes)
-    status, steps, reason = Status.STALLED, list[float](), ""
-    while step.iterations + step.counts <= most_iterations:
-        counted = step.counts
+    newton = NewtonStep(problem, state, descend=descend, limit_steps=limit_steps, most_modes=most_modes)
+    here, status, steps, reason = newton.start(state, forces), Status.STALLED, list[float](), ""
+    while here.iterations + here.counts <= most_iterations:
         try:
-            moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
+            there = newton.take(here)
         except TooManyModesError:
             status = Status.BUCKLED
             break
         except SingularError:
             status = Status.DIVERGED
             break
-        if not (isfinite(moved) and np.isfinite(forces_next).all()):
-            status = Status.DIVERGED
+        if not there.finite:
+            here, status = replace(here, iterations=there.iterations), Status.DIVERGED
             break
-        state, forces = state_next, forces_next
+        counted, here = here.counts, there
         if progress is not None and counted:
             try:
-                progress(step.iterations, moved)
+                progress(here.iterations, here.length)
             except OutOfTimeError as late:
                 reason = str(late)
-        if step.settled and mismatch < STRAIN_TOLERANCE:
+        if here.settled and here.mismatch < STRAIN_TOLERANCE:
             status = Status.CONVERGED
             break
         if reason:
             status = Status.OUT_OF_TIME
             break
-        steps.append(moved)
+        steps.append(here.length)
         if _repeats(steps):
             break
-        step.refresh(state)
-    mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
-    gradient = step.gradient(state, forces)
+        here = here.refreshed()
+    matrix, state, forces = newton.matrix, here.state, here.forces
+    mode = newton.lowest_mode() if status is Status.CONVERGED and matrix.negative_modes else None
+    gradient = newton.assembly.gradient(here.elements, state, forces)
     residual = problem.constraint.freedom(state).reduce(gradient)
     report = SolveReport(
         status=status,
-        dofs=step.dofs,
-        iterations=step.iterations,
-        factorizations=step.factorizations,
+        dofs=len(residual),
+        iterations=here.iterations,
+        factorizations=matrix.factorizations,
         seconds=time.perf_counter() - begin,
         force_residual=float(np.abs(residual).max(initial=0.0)),
-        max_strain=float(np.abs(step.strains(state)).max()),
-        negative_modes=step.negative_modes,
+        max_strain=float(np.abs(here.strains).max()),
+        negative_modes=matrix.negative_modes,
         reason=reason if status is Status.OUT_OF_TIME else "",
     )
-    step.refresh(state)
-    solved = replace(problem, elements=step.elements, pattern=step.pattern)
+    solved = replace(problem, elements=here.refreshed().elements, pattern=newton.assembly.pattern)
     return Equilibrium(solved, state, forces, gradient, report, mode)
 
 
@@ -266,14 +265,10 @@ def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
         tangent = saddle.tangent
     except SingularError:
         return nudged
-    second = np.zeros_like(state)
-    for step in (PROBE, -PROBE):
-        for element in (*problem.elements, stretch):
-            element.evaluate(state + step * mode, second)
-    for element in (*problem.elements, stretch):
-        at = np.zeros_like(state)
-        element.evaluate(state, at)
-        second -= 2.0 * at
+    second = problem.energies.gradient(state + PROBE * mode)
+    problem.energies.add_gradient(state - PROBE * mode, second)
+    for elements in problem.energies.sets:
+        second -= 2.0 * Potential((elements,)).gradient(state)
     bend = tangent.solve(-second / PROBE**2)
     bend -= np.vdot(shares, bend) / np.vdot(shares, mode) * mode
 
@@ -302,49 +297,64 @@ def find_stable(
     limit_steps: bool = False,
     most_modes: int | None = None,
     most_iterations: int = MOST_ITERATIONS,
+    slide: bool = True,
+    neutral: float = 0.0,
     progress: Progress | None = None,
 ) -> Equilibrium:
     """As `find_equilibrium`; where that ends on a saddle, slide off along its mode, to either side in turn.
 
-    Parameters are those of `find_equilibrium`.
-
     Parameters
     ----------
     problem, state, forces, limit_steps, most_modes, most_iterations, progress : see `find_equilibrium`.
+    slide : whether to leave a saddle.
+    neutral : where the energy falls along a single mode by less than this [J], nothing resists that mode, and it makes
+        no saddle.
 
     Returns
     -------
     The stable equilibrium; the saddle, with its negative modes counted, where neither side leads to one. The report
     counts the work of all solves.
     """
-    first = find_equilibrium(
-        problem,
-        state,
-        forces,
-        limit_steps=limit_steps,
-        most_modes=most_modes,
-        most_iterations=most_iterations,
-        progress=progress,
+    first = _without_neutral(
+        find_equilibrium(
+            problem,
+            state,
+            forces,
+            limit_steps=limit_steps,
+            most_modes=most_modes,
+            most_iterations=most_iterations,
+            progress=progress,
+        ),
+        neutral,
     )
     tries = [first]
-    if first.mode is not None:
+    if slide and first.mode is not None:
         counted = replace(first.report, factorizations=first.report.factorizations + 1)  # that of the tangent
         tries[0] = first = replace(first, report=counted)
         for side in (1.0, -1.0):
             assert first.mode is not None
             start, forces_there = beside(first, side * first.mode)
-            tries.append(
-                find_equilibrium(
-                    first.problem,
-                    start,
-                    forces_there,
-                    descend=True,
-                    most_iterations=min(2 * most_iterations, LONGEST_SLIDE),
-                    progress=progress,
-                )
+            found = find_equilibrium(
+                first.problem,
+                start,
+                forces_there,
+                descend=True,
+                most_iterations=min(2 * most_iterations, LONGEST_SLIDE),
+                progress=progress,
             )
+            tries.append(_without_neutral(found, neutral))
             if tries[-1].report.stable or tries[-1].report.status is Status.OUT_OF_TIME:
                 break
     last = tries[-1].report
     best = tries[-1] if last.stable or last.status is Status.OUT_OF_TIME else first
     return replace(best, report=best.report.after(*(tried.report for tried in tries if tried is not best)))
+
+
+def _without_neutral(found: Equilibrium, neutral: float) -> Equilibrium:
+    """An equilibrium, its one negative mode not counted if along it the energy [J] does not fall but by round-off."""
+    if found.mode is None or found.report.negative_modes != 1 or not neutral:
+        return found
+    energies = Potential((*found.elements, found.problem.stretch.with_forces(found.forces)))
+    if energies.curvature(found.state, found.mode) <= -neutral:
+        return found
+    return replace(found, mode=None, report=replace(found.report, negative_modes=0))

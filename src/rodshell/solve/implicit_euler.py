@@ -32,7 +32,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.kernels import njit
-from rodshell.model import Freedom
+from rodshell.model import Freedom, Potential
 from rodshell.rods.elements import NO_HESSIANS, Elements, in_parts
 from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
 from rodshell.solve.problem import NO_CURVATURE, Constraint, Damping, Force, ImplicitForce, PointLoads, Supports
@@ -125,9 +125,14 @@ class Motion:
     def constraint_at(self, time: float) -> Constraint:
         return self.constraint(time) if callable(self.constraint) else self.constraint
 
+    @property
+    def energies(self) -> Potential:
+        """The sum of all energies."""
+        return Potential((*self.elements, *self.explicit))
+
     def elastic_energy(self, state: Floats) -> float:
         """[J]"""
-        return sum(element.evaluate(state, np.zeros_like(state)) for element in (*self.elements, *self.explicit))
+        return self.energies.energy(state)
 
     def kinetic_energy(self, velocity: Floats) -> float:
         """[J]"""
@@ -198,7 +203,7 @@ class ImplicitEuler:
             if isinstance(force, Damping):
                 inertia += force.drag(motion.mass) / step
         if motion.explicit:
-            held -= _gradient(motion.explicit, state)
+            held -= Potential(motion.explicit).gradient(state)
         if not isfinite(float(held.sum())):
             raise InputError(f"an external force is not finite at t = {end:.6g} s: check its parameters")
         self._plan(motion, implicit, free)
@@ -291,16 +296,7 @@ class ContactEuler:
         self.last: P | None = None
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
-        """One step.
-
-        Parameters
-        ----------
-        motion : its source frames being at the state.
-        state : (N, 3) at the start [m, at twist angles rad].
-        velocity : (N, 3) at the start [m/s, rad/s].
-        time : of the start [s].
-        step : its length [s].
-        """
+        """One step; parameters as of `ImplicitEuler.take`."""
         law = self._law
         touching = law.touching(motion.constraint_at(time + step), state)
         rubbing = np.zeros_like(state)
@@ -327,13 +323,6 @@ class ContactEuler:
             landed = law.landed(taken.velocity, touching)
             return Step(taken.state, landed, taken.reactions + rubbing, iterations, factorizations)
         return Refused(f"contact has not settled in {MOST_PASSES} passes", factorizations)
-
-
-def _gradient(elements: tuple[Elements, ...], state: Floats) -> Floats:
-    gradient = np.zeros_like(state)
-    for element in elements:
-        element.evaluate(state, gradient)
-    return gradient
 
 
 @dataclass(eq=False)

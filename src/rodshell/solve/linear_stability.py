@@ -24,8 +24,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, StabilityError
-from rodshell.model import Assembly, Freedom
-from rodshell.rods.elements import NO_HESSIANS, Elements
+from rodshell.model import Assembly, Freedom, Potential
+from rodshell.rods.elements import NO_HESSIANS
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.sparse_ldl import Factors, Multifrontal, SingularError
 from rodshell.solve.tangent import FIRST_SHIFT, generic
@@ -60,7 +60,7 @@ class ExplicitTies:
         state : (N, 3) [m, at twist angles rad].
         stopped : (k,) blocks that lose all their velocity at each step.
         """
-        implicit, explicit = (_hessians(elements, state) for elements in (motion.elements, motion.explicit))
+        implicit, explicit = (Potential(sets).hessians(state) for sets in (motion.elements, motion.explicit))
         self._data = self._assembly.assemble([*implicit, *(-hessians for hessians in explicit)], self._blocks, free)
         weight = np.full((len(state), 1), 4.0)
         weight[stopped] = 2.0
@@ -161,10 +161,9 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     free : the free directions, without blocked ones.
     curvature : (N, 3, 3) what constraints that turn with the state add to the stiffness [N/m].
     """
-    elements: tuple[Elements, ...] = (*motion.elements, *motion.explicit, _Curvature(curvature))
-    stiffness = tangent_stiffness(elements, state, free)
+    energies = Potential((*motion.energies.sets, _Curvature(curvature)))
     root = 1.0 / np.sqrt(free.reduce_diagonal(motion.mass))
-    scaled = csc_matrix(diags(root) @ stiffness @ diags(root))
+    scaled = csc_matrix(diags(root) @ energies.matrix(state, free) @ diags(root))
     identity, shift = eye(free.size, format="csc"), FIRST_SHIFT * float(np.abs(scaled.diagonal()).mean())
     upper = triu(scaled + shift * identity, format="csc")
     solver = Multifrontal(upper.indptr.astype(np.int64), upper.indices.astype(np.int64))
@@ -175,30 +174,6 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     start = generic(free.size, 1)[0]
     values = eigsh(scaled, k=count, sigma=-shift, OPinv=inverse, v0=start, tol=1e-6, return_eigenvectors=False)
     return np.sort(values)
-
-
-def tangent_stiffness(elements: tuple[Elements, ...], state: Floats, free: Freedom) -> csc_matrix:
-    """Hessian in the free directions, both triangles: (dofs, dofs).
-
-    Parameters
-    ----------
-    elements : with their source frames at, or near, the state.
-    state : (N, 3) [m, at twist angles rad].
-    """
-    blocks = [element.blocks for element in elements]
-    assembly = Assembly.of(blocks, free)
-    data = assembly.assemble(_hessians(elements, state), blocks, free)
-    upper = csc_matrix((data, assembly.indices, assembly.indptr), shape=(free.size, free.size))
-    return csc_matrix(upper + upper.T - diags(upper.diagonal()))
-
-
-def _hessians(elements: tuple[Elements, ...], state: Floats) -> list[Floats]:
-    scrap = np.zeros_like(state)
-    widths = [3 * element.blocks.shape[1] for element in elements]
-    hessians = [np.zeros((len(e.blocks), width, width)) for e, width in zip(elements, widths, strict=True)]
-    for element, values in zip(elements, hessians, strict=True):
-        element.evaluate(state, scrap, values)
-    return hessians
 
 
 class _Curvature:

@@ -19,7 +19,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch, add_product
+from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch
 from rodshell.solve.problem import Problem
 from rodshell.solve.tangent import Tangent, TangentAssembly
 
@@ -133,7 +133,6 @@ class LoadedAssembly:
         self.load = load
         self.problem = replace(problem, elements=load.elements(problem.elements, state, 0.0))
         self._assembly = TangentAssembly(self.problem, state)
-        self._constant = np.zeros_like(state) if problem.load is None else problem.load
 
     def strains(self, state: Floats, factor: float) -> Floats:
         """(e,) elastic strains of the edges [-].
@@ -152,28 +151,17 @@ class LoadedAssembly:
         elements : of structure and load at the factor, with their source frames at, or near, the state.
         state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
         """
-        result = self._assembly.gradient(elements, state, forces) - self._constant
+        result = self._assembly.gradient(elements, state, forces)
         return result if self.load.forces is None else result - factor * self.load.forces
 
     def values(self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float) -> Floats:
-        """(nnz,) values of K in the order of the pattern; parameters as of `gradient`.
-
-        Parameters
-        ----------
-        elements : of structure and load at the factor, with their source frames at, or near, the state.
-        state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
-        """
+        """(nnz,) values of K in the order of the pattern; parameters as of `gradient`."""
         return self._assembly.values(elements, state, forces, self.load.stretch(self.problem.stretch, factor))[1]
 
     def tangent(
         self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float
     ) -> tuple[Tangent, Floats]:
         """The tangent stiffness, and the rate dx/dt (N, 3) of the state there [m, rad]; parameters as of `gradient`.
-
-        Parameters
-        ----------
-        elements : of structure and load at the factor, with their source frames at, or near, the state.
-        state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
 
         Raises
         ------
@@ -191,10 +179,7 @@ class LoadedAssembly:
             stretch.add_axial(state, -self._by_warming(stretch, state, factor), right)
         if load.motions is None:
             return tangent, tangent.solve(right)
-        held = np.zeros_like(state)
-        for element in (*elements, stretch.with_forces(forces)):
-            add_product(element, state, load.motions, held)
-        right -= held
+        right -= self._assembly.product(load.motions)
         return tangent, tangent.solve(right) + load.motions
 
     def stress_values(self, elements: Sequence[Elements], state: Floats, rate: Floats) -> Floats:

@@ -154,7 +154,7 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
         factors = assembly.pattern.solver.factor(shifted)
     start = generic(len(scale), 1)
     values, rows, _ = subspace_iteration(
-        lambda row: scale * factors.solve(scale * row), start, settled=1, tolerance=0.0, most_sweeps=SOFTEST
+        lambda rows: scale * factors.solve(scale * rows), start, settled=1, tolerance=0.0, most_sweeps=SOFTEST
     )
     return 1.0 / float(values[0]), freedom.expand(orthonormal(rows)[0])
 

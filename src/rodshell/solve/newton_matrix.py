@@ -7,7 +7,7 @@ need nothing else. Elements are summed straight into the band. Without pivots th
 D are the inertia. Matrices of any other pattern go to a sparse solver (`SparseSum`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -195,32 +195,18 @@ class SparseSum:
         return free.expand(self._factors.solve(free.reduce(field)))
 
 
-def narrow_or_sparse(element_blocks: Sequence[Ints], free: Freedom) -> SummedMatrix:
+def narrow_or_sparse(
+    element_blocks: Sequence[Ints], free: Freedom, *, coordinates: Floats | None = None
+) -> SummedMatrix:
     """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell.
 
     Parameters
     ----------
     element_blocks : (m, k) blocks of each element, for each set of elements.
+    coordinates : (N, d) where the blocks lie [m], by which a sparse matrix is ordered, if that is known.
     """
     banded = Banded(element_blocks, free, widest=WIDEST)
-    return banded if banded.half_bandwidth <= WIDEST else SparseSum(element_blocks, free)
-
-
-def narrow_or_dissected(coordinates: Floats) -> Callable[[Sequence[Ints], Freedom], SummedMatrix]:
-    """`Banded` where the band is narrow; else by the multifrontal solver.
-
-    Parameters
-    ----------
-    coordinates : (N, d) where the blocks lie [m], by which they are ordered.
-    """
-
-    def make(element_blocks: Sequence[Ints], free: Freedom) -> SummedMatrix:
-        banded = Banded(element_blocks, free, widest=WIDEST)
-        if banded.half_bandwidth <= WIDEST:
-            return banded
-        return SparseSum(element_blocks, free, coordinates)
-
-    return make
+    return banded if banded.half_bandwidth <= WIDEST else SparseSum(element_blocks, free, coordinates)
 
 
 def _chain_order(element_blocks: Sequence[Ints], count: int) -> Ints:

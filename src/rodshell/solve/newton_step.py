@@ -14,11 +14,10 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import dot
-from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all, twist_angles
-from rodshell.solve.problem import NO_CURVATURE, Problem
-from rodshell.solve.sparse_ldl import Factors, SingularError
-from rodshell.solve.tangent import generic, subspace_iteration
+from rodshell.rods.elements import Elements, twist_angles
+from rodshell.solve.problem import Problem
+from rodshell.solve.shifted_matrix import ShiftedMatrix
+from rodshell.solve.tangent import TangentAssembly, generic
 
 # A motion is measured by `Problem.unit`: shares of the length, or turns
 TOLERANCE = 1e-13  # motion: estimate of the error that is left
@@ -36,16 +35,14 @@ ELASTIC = 1 / 3  # of their last change: the next one of elastic forces after a 
 AGAIN = 3.0  # times as much of the last change as that was of the one before: the next one after a chord step, at most
 CHORD = 5e-3  # motion: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
-SHIFT_GROWTH = 8.0
-LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eigenvalues may be round-off
 SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
 TINY = 1e-300  # no step is shorter, except zero
 
 
 @dataclass(frozen=True, eq=False)
-class _LastStep:
-    """The last step, so that less of it can be taken: from where, at how many negative modes; the whole motion (n, 3),
-    `reach` far, with the change (e,) of the forces; and the share taken of both."""
+class Step:
+    """A step: from where, at how many negative modes; the whole motion (n, 3), `reach` far, with the change (e,) of the
+    forces; and the share taken of both."""
 
     state: Floats
     forces: Floats
@@ -57,286 +54,225 @@ class _LastStep:
     share: float
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Iterate:
+    """Where an iteration is, and what its steps so far say of the next one.
+
+    Parameters
+    ----------
+    state, forces : (n, 3) [m, rad], and axial forces (e,) [N].
+    elements : with their source frames at, or near, the state.
+    strains : (e,) of the edges [-]; mismatch : how far the forces are from matching them [-].
+    step, length : the last step, and how long it is; moved, changed : the last whole step and its change of the forces,
+        both relative.
+    longest : the longest step allowed; nearest : the last step that was near.
+    shifted : the last step was one of the shifted Hessian.
+    chord : the next step is by the factors at hand; was_chord : the last one was.
+    settled : whether the error that is left is small enough.
+    """
+
+    state: Floats
+    forces: Floats
+    elements: tuple[Elements, ...]
+    strains: Floats
+    mismatch: float = np.inf
+    step: Step | None = None
+    length: float = np.inf
+    moved: float = np.inf
+    changed: float = np.inf
+    longest: float = LONGEST_STEP
+    nearest: float = np.inf
+    shifted: bool = False
+    chord: bool = False
+    was_chord: bool = False
+    settled: bool = False
+    iterations: int = 0
+
+    @property
+    def counts(self) -> bool:
+        """Whether the next step is an iteration: chord steps in a row stand for one of Newton's."""
+        return not (self.chord and self.was_chord)
+
+    @property
+    def finite(self) -> bool:
+        return bool(np.isfinite(self.length) and np.isfinite(self.forces).all())
+
+    def refreshed(self) -> "Iterate":
+        """The same with the source frames of the elements at the state."""
+        return replace(self, elements=tuple(element.refreshed(self.state) for element in self.elements))
+
+
 class TooManyModesError(Exception):
     """The start of an iteration has too many negative modes for an equilibrium to be near."""
 
 
 class NewtonStep:
-    """One iteration, with the buffers, the pattern and the factorisation that all iterations share."""
+    """Takes the steps of one iteration, with the matrix and the buffers that these share.
+
+    Parameters
+    ----------
+    descend, limit_steps, most_modes : as of `find_equilibrium`.
+    """
 
     def __init__(
-        self, problem: Problem, state: Floats, *, limit_steps: bool = False, most_modes: int | None = None
+        self,
+        problem: Problem,
+        state: Floats,
+        *,
+        descend: bool = False,
+        limit_steps: bool = False,
+        most_modes: int | None = None,
     ) -> None:
-        self._problem, self._limit_steps, self._most_modes = problem, limit_steps, most_modes
-        self.elements = problem.elements
-        self._free = problem.constraint.freedom(state)
+        self._problem, self._descend, self._limit_steps = problem, descend, limit_steps
+        self._most_modes = most_modes
         self._unit = problem.unit(len(state))
-        self._units = self._unit[:, 0].repeat(self._free.count)  # of the unknowns
-        self._blocks = problem.blocks(len(state))
-        self.pattern = problem.pattern_at(state)
-        self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
-        self._factors: Factors | None = None  # their memory serves for all factorisations of this iteration
-        *sets, _ = self._blocks
-        self._hessians = [np.empty((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in sets]
-        self._curvature, self._curved = NO_CURVATURE, True  # until the constraint says that it is not
-        self._no_forces = np.zeros(len(problem.stretch.blocks))
+        self.assembly = TangentAssembly(problem, state)
+        free = problem.constraint.freedom(state)
+        self.matrix = ShiftedMatrix(self.assembly.pattern, self._unit[:, 0].repeat(free.count))
         self._least_force = LEAST_FORCE * float(problem.stretch.stiffness.max())
-        self._strained = state, problem.stretch.strains(state)
-        self.dofs = self._free.size
-        self.iterations = 0
-        self.factorizations = 0
-        self.negative_modes = 0
-        self._shift = 0.0
-        self._longest = LONGEST_STEP
-        self._nearest = np.inf  # the last step that was near
-        self._shifted = False  # the last step was one of the shifted Hessian
-        self._last_step: _LastStep | None = None
-        self._factored = state, self._no_forces  # where the matrix is from
-        self._last = np.inf, np.inf  # length of the last step and change of the forces, both relative
-        self._chord = self._was_chord = self.settled = False
+        self._no_forces = np.zeros(len(problem.stretch.blocks))
+        self._factored, self._free = (state, self._no_forces), free  # where the matrix is from
 
-    @property
-    def counts(self) -> bool:
-        """Whether the next step is an iteration: chord steps in a row stand for one of Newton's."""
-        return not (self._chord and self._was_chord)
-
-    def refresh(self, state: Floats) -> None:
-        """Carry the source frames of the elements to `state` (n, 3)."""
-        self.elements = tuple(element.refreshed(state) for element in self.elements)
-
-    def gradient(self, state: Floats, forces: Floats) -> Floats:
-        """Gradient of energy and load.
+    def start(self, state: Floats, forces: Floats) -> Iterate:
+        """Where the iteration begins.
 
         Parameters
         ----------
-        state : (n, 3) [m, rad].
-        forces : (e,) axial forces that the edges carry [N].
+        state, forces : (n, 3) [m, rad], and axial forces (e,) [N].
         """
-        gradient = np.zeros_like(state) if self._problem.load is None else -self._problem.load
-        for element in self.elements:
-            element.evaluate(state, gradient)
-        self._problem.stretch.add_axial(state, forces, gradient)
-        return gradient
+        strains = self._problem.stretch.strains(state)
+        return Iterate(state=state, forces=forces, elements=self._problem.elements, strains=strains)
 
-    def take(self, state: Floats, forces: Floats, descend: bool) -> tuple[float, Floats, Floats, float]:
-        """One step.
-
-        Parameters
-        ----------
-        state : (n, 3) [m, rad].
-        forces : (e,) axial forces [N].
-        descend : shift the Hessian wherever it is indefinite.
-
-        Returns
-        -------
-        Length of the step (`Problem.unit`), the next state and forces, and how far these are from matching the strains
-        [-].
+    def take(self, here: Iterate) -> Iterate:
+        """The next iterate.
 
         Raises
         ------
         SingularError : a pivot vanishes, and not by a mode without stiffness.
         TooManyModesError : the start has more negative modes than are allowed.
         """
-        problem, stretch = self._problem, self._problem.stretch
-        if not self._chord:
-            self._factored, self._free = (state, forces), problem.constraint.freedom(state)
-        at, free, strains = self._factored[0], self._free, self.strains(state)
+        problem, stretch, state, forces = self._problem, self._problem.stretch, here.state, here.forces
         base = forces if problem.inextensible else self._no_forces
-        gradient = np.zeros_like(state) if problem.load is None else -problem.load
-        hessians = [NO_HESSIANS] * len(self.elements) if self._chord else self._hessians[:-1]
-        evaluate_all(self.elements, state, gradient, hessians)
-        if self._chord:  # what the edges lack acts along those of the matrix, else strains do not settle
-            stretch.add_axial(state, forces, gradient)
-            if self._curved:  # less the forces of the constraint, which act across the free directions of this state
+        if here.chord:  # what the edges lack acts along those of the matrix, else strains do not settle
+            gradient = self.assembly.gradient(here.elements, state, forces)
+            if self.assembly.curved:  # less the constraint's forces, which act across the free directions of this state
                 gradient = problem.constraint.freedom(state).within(gradient)
-            stretch.add_axial(at, base + stretch.stiffness * strains - forces, gradient)
+            stretch.add_axial(self._factored[0], base + stretch.stiffness * here.strains - forces, gradient)
         else:
-            if self._curved:
-                by_force = gradient.copy()
-                stretch.add_axial(state, forces, by_force)
-                self._curvature = problem.constraint.curvature(state, by_force)
-                self._curved = len(self._curvature) > 0
-            axial = stretch.with_forces(forces, multipliers=base)
-            evaluate_all((axial,), state, gradient, self._hessians[-1:])
+            self._factored, self._free = (state, forces), problem.constraint.freedom(state)
+            gradient = self.assembly.linearise(here.elements, state, forces, multipliers=base)
         prescribed = problem.constraint.remaining(state)
         if prescribed is not None:
-            gradient += self._times(prescribed)
-        direction = self._direction(-free.reduce(gradient), descend)
+            gradient += self.assembly.product(prescribed)
+        right = -self._free.reduce(gradient)
+        direction, here = (self.matrix.solve(right), here) if here.chord else self._direction(here, right)
         if direction is None:
-            return self._shorten()
-        motion = free.expand(direction)
+            return self._shortened(here)
+        motion = self._free.expand(direction)
         if prescribed is not None:
             motion += prescribed
         reach = self._reach(motion)
-        if self._chord and not reach <= SLOW * self._last[0]:  # of no use: Newton's step instead
-            self._chord = False
-            return self.take(state, forces, descend)
-        share = min(1.0, self._longest / reach) if reach > 0 else 1.0
-        change = base + stretch.stiffness * (strains + stretch.elongation(at, motion)) - forces
-        last = _LastStep(state, forces, self.elements, self.negative_modes, motion, change, reach, share)
-        state_next, forces_next = self._after(last)
-        left = self.strains(state_next)
-        if not problem.inextensible:
-            left = left - forces_next / stretch.stiffness
-        self._judge(reach, forces, forces_next)
-        return reach, state_next, forces_next, float(np.abs(left).max())
+        if here.chord and not reach <= SLOW * here.moved:  # of no use: Newton's step instead
+            return self.take(replace(here, chord=False))
+        share = min(1.0, here.longest / reach) if reach > 0 else 1.0
+        change = base + stretch.stiffness * (here.strains + stretch.elongation(self._factored[0], motion)) - forces
+        step = Step(state, forces, here.elements, self.matrix.negative_modes, motion, change, reach, share)
+        return self._judged(here, step)
 
-    def strains(self, state: Floats) -> Floats:
-        """(e,) strains of the edges at a state (n, 3), the latest of which is remembered."""
-        if state is not self._strained[0]:
-            self._strained = state, self._problem.stretch.strains(state)
-        return self._strained[1]
+    def lowest_mode(self) -> Floats:
+        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated, its largest motion 1; to
+        the side on which it goes up on the whole, so that every run, size and heading of a structure has the same."""
+        start = self._generic_motion()
+        self.matrix.shift_until_definite(self._softest, start, down=True)
+        mode = self._free.expand(self.matrix.lowest(start, sweeps=12)[0])
+        return upwards(mode / self._unit) * self._unit / self._reach(mode)
 
     def _reach(self, motion: Floats) -> float:
         """Largest motion of a block (n, 3), over its unit."""
         shares = motion / self._unit
         return float(np.sqrt(dot(shares, shares).max()))
 
-    def _after(self, last: _LastStep) -> tuple[Floats, Floats]:
+    @property
+    def _softest(self) -> float:
+        """How soft a wave as long as the shell is against the bending of an edge [J]."""
+        hessians, blocks = self.assembly.hessians[0], self.assembly.blocks[0]
+        bending, units = np.einsum("mii->mi", hessians), self._unit[blocks, 0].repeat(3, axis=1)
+        slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
+        return slender**4 * float((bending * units**2).mean())
+
+    def _generic_motion(self) -> Floats:
+        """(1, dofs) of `generic_motion` where the matrix is from."""
+        state = self._factored[0]
+        return self._free.reduce(generic_motion(state, twist_angles(self._problem.elements, len(state))))[None]
+
+    def _direction(self, here: Iterate, right: Floats) -> tuple[Floats | None, Iterate]:
+        """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
+        where the step that led there was too long. And the iterate with what is known then."""
+        matrix = self.matrix
+        regular = matrix.factorise(self.assembly.assembled(self._free))
+        if matrix.factorizations == 1 and self._most_modes is not None and matrix.negative_modes > self._most_modes:
+            raise TooManyModesError
+        if matrix.negative_modes and regular and not self._descend:
+            step = matrix.solve(right)
+            reach = self._reach(self._free.expand(step))
+            before = min(here.nearest, np.inf if here.shifted else here.moved) if self._limit_steps else np.inf
+            if reach < min(NEAR, NEARER * before):  # to the equilibrium at hand, be it a saddle
+                return step, replace(here, nearest=reach, shifted=False)
+        if self._limit_steps and _too_far(here.step, matrix.negative_modes):
+            return None, here
+        if matrix.negative_modes:
+            shifted = True
+            matrix.shift_until_definite(self._softest, self._generic_motion())
+        else:
+            shifted = False
+        return matrix.solve(right), replace(here, longest=min(LONGER * here.longest, LONGEST_STEP), shifted=shifted)
+
+    def _after(self, step: Step) -> tuple[Floats, Floats]:
         """State and forces after a step."""
-        self._last_step = last
-        state = self._problem.constraint.retract(last.state + last.share * last.motion)
-        return state, last.forces + last.share * last.change
+        state = self._problem.constraint.retract(step.state + step.share * step.motion)
+        return state, step.forces + step.share * step.change
 
-    def _shorten(self) -> tuple[float, Floats, Floats, float]:
-        """As `take`, for a part of the last step in its place: no iteration of its own."""
-        assert self._last_step is not None
-        last = replace(self._last_step, share=PART * self._last_step.share)
-        self._longest = moved = last.share * last.reach
-        self.elements = last.elements
-        return moved, *self._after(last), np.inf
+    def _shortened(self, here: Iterate) -> Iterate:
+        """After a part of the last step in its place: no iteration of its own."""
+        assert here.step is not None
+        step = replace(here.step, share=PART * here.step.share)
+        (state, forces), length = self._after(step), step.share * step.reach
+        return replace(
+            here, state=state, forces=forces, elements=step.elements, strains=self._problem.stretch.strains(state),
+            mismatch=np.inf, step=step, length=length, longest=length,
+        )  # fmt: skip
 
-    def _near(self, moved: float) -> bool:
-        """Whether a step of Newton's so long leads to the equilibrium at hand, be it a saddle."""
-        before = min(self._nearest, np.inf if self._shifted else self._last[0]) if self._limit_steps else np.inf
-        near = moved < min(NEAR, NEARER * before)
-        if near:
-            self._nearest = moved
-        return near
-
-    def _too_far(self) -> bool:
-        """Whether the last step was not short and led to more negative modes than it began with: by several, which are
-        rods that buckle; one more is a saddle on the way."""
-        last = self._last_step
-        if last is None or not self._limit_steps or self.negative_modes <= last.negative_modes + 1:
-            return False
-        return last.share * last.reach > NEAR
-
-    def _judge(self, moved: float, before: Floats, after: Floats) -> None:
-        """Whether the error that is left is small enough, and whether the factorisation serves for another step.
+    def _judged(self, here: Iterate, step: Step) -> Iterate:
+        """After a step: whether the error that is left is small enough, and whether the factors serve for another one.
 
         After Newton's step the error is about its square; after a chord step it shrinks as from the last step to this.
         The last factorisation is made where the forces are nearly those of the equilibrium: it counts its modes.
         """
-        self.iterations += self.counts
-        size = max(float(np.abs(after).max(initial=0.0)), self._least_force)
-        changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
-        shrunk = moved / max(self._last[0], TINY), changed / max(self._last[1], TINY)
-        multipliers = self._problem.inextensible
-        rates = shrunk if self._chord else (max(CURVED * moved, changed), MULTIPLIERS if multipliers else changed)
-        self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
-        foreseen = AGAIN * shrunk[1] if self._chord else MULTIPLIERS if multipliers else ELASTIC
-        count_again = since >= STALE > foreseen * changed
-        self._was_chord, self._last = self._chord, (moved, changed)
-        self._chord = moved < CHORD and not count_again and not self.negative_modes
-
-    def _times(self, motion: Floats) -> Floats:
-        """(n, 3) product of the Hessian last evaluated with displacements (n, 3)."""
-        result = np.zeros_like(motion)
-        for hessians, blocks in zip(self._hessians, self._blocks[:-1], strict=True):
-            _add_product(hessians, blocks, motion, result)
-        return result
-
-    def lowest_mode(self) -> Floats:
-        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated, its largest motion 1; to
-        the side on which it goes up on the whole, so that every run, size and heading of a structure has the same."""
-        self._shift_until_definite(down=True)
-        mode = self._free.expand(self._inverse_iteration(12)[0])
-        return upwards(mode / self._unit) * self._unit / self._reach(mode)
-
-    def _direction(self, right: Floats, descend: bool) -> Floats | None:
-        """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
-        where the step that led there was too long."""
-        if self._chord:
-            return self._solve(right)
-        self._data = self._assembly.assemble([*self._hessians, self._curvature], self._blocks, self._free)
-        regular = self._count_negative_modes()
-        if self.factorizations == 1 and self._most_modes is not None and self.negative_modes > self._most_modes:
-            raise TooManyModesError
-        if self.negative_modes and regular and not descend:
-            step = self._solve(right)
-            if self._near(self._reach(self._free.expand(step))):
-                self._shifted = False
-                return step
-        if self._too_far():
-            return None
-        self._longest = min(LONGER * self._longest, LONGEST_STEP)
-        self._shifted = self.negative_modes > 0
-        if self.negative_modes:
-            self._shift_until_definite()
-        return self._solve(right)
-
-    def _count_negative_modes(self) -> bool:
-        """Factorise the Hessian; whether that can be done. A mode without stiffness counts as a negative one."""
-        self.factorizations += 1
-        try:
-            self.negative_modes = self._factor(self._data)
-        except SingularError:
-            if not np.isfinite(self._data).all():
-                raise
-            self.negative_modes = 1
-            return False
-        return True
-
-    def _shift_until_definite(self, *, down: bool = False) -> None:
-        """Factorise with the diagonal shifted by about twice the most negative eigenvalue, motions in their units.
-
-        A Newton step then doubles what the state has of its mode. The search begins where a wave as long as the
-        shell is soft against the bending of an edge, or below the last shift that sufficed, and goes up; first `down`,
-        next to a saddle, whose mode may be much softer.
-        """
-        bending, units = np.einsum("mii->mi", self._hessians[0]), self._unit[self._blocks[0], 0].repeat(3, axis=1)
-        slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
-        softest = slender**4 * float((bending * units**2).mean())
-        shift, tries = max(softest, self._shift / SHIFT_GROWTH), 0
-        negative = self._factor_shifted(shift)
-        while down and not negative and shift > LEAST_SHIFT * softest:
-            shift /= SHIFT_GROWTH
-            negative = self._factor_shifted(shift)
-        while negative and tries < 40:
-            shift, tries = SHIFT_GROWTH * shift, tries + 1
-            negative = self._factor_shifted(shift)
-        less = 2.0 * (shift - self._inverse_iteration(4)[1])  # of an eigenvalue that may be too high
-        if 0.0 < less < 0.5 * shift:
-            if self._factor_shifted(less):
-                self._factor_shifted(shift)
-            else:
-                shift = less
-        self._shift = shift
-
-    def _factor_shifted(self, shift: float) -> int:
-        shifted = self._data.copy()
-        shifted[self._assembly.diagonal] += shift / self._units**2
-        self.factorizations += 1
-        return self._factor(shifted)
-
-    def _factor(self, data: Floats) -> int:
-        """Factorise; the number of negative modes."""
-        self._factors = self._solver.factor(data, reuse=self._factors)
-        return self._factors.negative
-
-    def _solve(self, right: Floats) -> Floats:
-        """By the last factors."""
-        assert self._factors is not None
-        return self._factors.solve(right)
-
-    def _inverse_iteration(self, sweeps: int) -> tuple[Floats, float]:
-        """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue [J]."""
-        start = self._free.reduce(generic_motion(self._factored[0], twist_angles(self.elements, len(self._unit))))[None]
-        values, (row, *_), _ = subspace_iteration(
-            lambda x: self._solve(x / self._units) / self._units, start, settled=1, tolerance=0.0, most_sweeps=sweeps
+        stretch, multipliers = self._problem.stretch, self._problem.inextensible
+        state, forces = self._after(step)
+        strains, moved = stretch.strains(state), step.reach
+        left = strains if multipliers else strains - forces / stretch.stiffness
+        size = max(float(np.abs(forces).max(initial=0.0)), self._least_force)
+        changed, since = (
+            float(np.abs(forces - old).max(initial=0.0)) / size for old in (here.forces, self._factored[1])
         )
-        return row * self._units, 1.0 / float(values[0])
+        shrunk = moved / max(here.moved, TINY), changed / max(here.changed, TINY)
+        rates = shrunk if here.chord else (max(CURVED * moved, changed), MULTIPLIERS if multipliers else changed)
+        settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
+        foreseen = AGAIN * shrunk[1] if here.chord else MULTIPLIERS if multipliers else ELASTIC
+        count_again = since >= STALE > foreseen * changed
+        return replace(
+            here, state=state, forces=forces, strains=strains, mismatch=float(np.abs(left).max()),
+            step=step, length=moved, moved=moved, changed=changed, settled=settled, was_chord=here.chord,
+            chord=moved < CHORD and not count_again and not self.matrix.negative_modes,
+            iterations=here.iterations + here.counts,
+        )  # fmt: skip
+
+
+def _too_far(last: Step | None, negative_modes: int) -> bool:
+    """Whether a step was not short and led to more negative modes than it began with: by several, which are rods that
+    buckle; one more is a saddle on the way."""
+    return last is not None and negative_modes > last.negative_modes + 1 and last.share * last.reach > NEAR
 
 
 def generic_motion(state: Floats, twists: Bools) -> Floats:
@@ -363,15 +299,3 @@ def upwards(mode: Floats) -> Floats:
     if abs(whole) <= SIDEWAYS * float(np.abs(along).sum()):
         whole = float(along[np.argmax(np.abs(along) > 0.5 * np.abs(along).max())])
     return np.asarray(np.copysign(1.0, whole) * mode)
-
-
-@njit()
-def _add_product(hessians, blocks, motion, result):  # type: ignore[no-untyped-def]
-    """Add to `result` (n, 3) what elements with `hessians` (m, 3k, 3k) on `blocks` (m, k) make of displacements."""
-    for m in range(blocks.shape[0]):
-        for a in range(blocks.shape[1]):
-            for b in range(blocks.shape[1]):
-                i, j = blocks[m, a], blocks[m, b]
-                for k in range(3):
-                    for d in range(3):
-                        result[i, k] += hessians[m, 3 * a + k, 3 * b + d] * motion[j, d]

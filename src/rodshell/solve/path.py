@@ -22,6 +22,9 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
+from rodshell.model import Potential
+from rodshell.rods.elements import with_frames
+from rodshell.solve.continuation import Continuation
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.newton_matrix import SparseSum
@@ -70,11 +73,46 @@ def follow(
     The equilibrium at t = 1, or at the last t reached, with the status STALLED. Iterations,
     factorizations and seconds of the report are those of the whole path, failed steps included.
     """
-    t, step = 0.0, first_step
-    reports = list[SolveReport]()
+    path = followed(
+        problem_at, state, forces, first_step=first_step, snap=snap, most_factorizations=most_factorizations,
+        most_modes=most_modes, progress=progress,
+    )  # fmt: skip
+    last = path.reports[-1]
+    report = path.found.report.after(*(report for report in path.reports if report is not path.found.report))
+    if path.t < 1.0:
+        status = Status.OUT_OF_TIME if last.status is Status.OUT_OF_TIME else Status.STALLED
+        report = replace(report, status=status, reason=last.reason)
+    return replace(path.found, report=report)
+
+
+def followed(
+    problem_at: Callable[[float], Problem],
+    state: Floats,
+    forces: Floats,
+    *,
+    first_step: float,
+    snap: bool = False,
+    neutral: float = 0.0,
+    slide: bool = True,
+    easy: int = EASY,
+    most: int = MOST,
+    most_of_all: int | None = MOST_OF_ALL,
+    most_factorizations: int | None = None,
+    most_modes: int | None = None,
+    progress: Callable[[float, int, float], None] | None = None,
+) -> "Trace":
+    """As `follow`, as far as it went.
+
+    Parameters
+    ----------
+    neutral, slide : as of `find_stable`.
+    easy : iterations of a step that may be followed by a longer one.
+    most, most_of_all : iterations of a step, and of the path; None: as many as it takes.
+    """
+    path, reports = Continuation(0.0, 1.0, first_step, SMALLEST_STEP), list[SolveReport]()
     last: Equilibrium | None = None
-    while t < 1.0:
-        there = min(1.0, t + step)
+    while not path.arrived:
+        there = path.there
 
         def at_share(iteration: int, residual: float, there: float = there) -> None:
             if progress is not None:
@@ -82,37 +120,32 @@ def follow(
 
         problem = problem_at(there)
         if last is not None:
-            problem = going_on(problem, last)
-        found = find_stable(problem, state, forces, most_iterations=MOST, progress=at_share)
+            problem, state, forces = going_on(problem, last), last.state, last.forces
+        found = find_stable(
+            problem, state, forces, slide=slide, neutral=neutral, most_iterations=most, progress=at_share
+        )
         reports.append(found.report)
         if found.report.converged:
-            t, state, forces, last = there, found.state, found.forces, found
-            if found.report.iterations <= EASY:
-                step *= 1.6
+            path.accept(easy=found.report.iterations <= easy)
+            last = found
         else:
-            step = 0.4 * min(step, there - t)
+            path.shorten()
         if found.report.status is Status.OUT_OF_TIME:
             break
-        if snap and last is not None and step < SNAP and not found.report.converged:
-            there = min(1.0, t + SNAP)
+        if snap and last is not None and path.step < SNAP and not found.report.converged:
+            short, path.step = path.step, SNAP
             left = None if most_factorizations is None else most_factorizations - _made(reports)
-            found = _fallen(going_on(problem_at(there), last), last, found, most_factorizations=left)
+            found = _fallen(going_on(problem_at(path.there), last), last, found, most_factorizations=left)
             reports.append(found.report)
             if found.report.stable:
-                t, state, forces, last, step = there, found.state, found.forces, found, 4 * SNAP
-        if t < 1.0 and (step < SMALLEST_STEP or sum(report.iterations for report in reports) > MOST_OF_ALL):
-            break
-        if t < 1.0 and most_factorizations is not None and _made(reports) >= most_factorizations:
+                path.accept()
+            last, path.step = (found, 4 * SNAP) if found.report.stable else (last, short)
+        spent = most_of_all is not None and sum(report.iterations for report in reports) > most_of_all
+        if path.lost or spent or (most_factorizations is not None and _made(reports) >= most_factorizations):
             break
         if found.report.converged and most_modes is not None and found.report.negative_modes > most_modes:
             break
-    ended = last or found
-    report = ended.report.after(*(report for report in reports if report is not ended.report))
-    if t >= 1.0:
-        return replace(ended, report=report)
-    late = found.report.status is Status.OUT_OF_TIME
-    status = Status.OUT_OF_TIME if late else Status.STALLED
-    return replace(ended, report=replace(report, status=status, reason=found.report.reason))
+    return Trace(path.t, last or found, (), tuple(reports))
 
 
 def _made(reports: Sequence[SolveReport]) -> int:
@@ -137,7 +170,7 @@ class Snap:
 
 @dataclass(frozen=True)
 class Trace:
-    """How far a path was traced: the last t with its stable equilibrium, the snaps on the way, and all its solves."""
+    """How far a path was followed: the last t with its equilibrium, the snaps on the way, and all its solves."""
 
     t: float
     found: Equilibrium
@@ -172,19 +205,20 @@ def trace(
     -------
     The path; its t is `stop` where it arrived.
     """
-    t, step, snaps, reports = start, abs(stop - start), list[Snap](), list[SolveReport]()
-    while t != stop:
-        progress(t, here)
-        step = min(step, abs(stop - t))
-        there = stop if step == abs(stop - t) else t + float(np.copysign(step, stop - t))
+    path, snaps, reports = Continuation(start, stop, abs(stop - start), shortest), list[Snap](), list[SolveReport]()
+    while not path.arrived:
+        progress(path.t, here)
+        t, there = path.t, path.there
         problem = going_on(problem_at(there), here)
         found = find_stable(problem, here.state, here.forces, most_iterations=MOST_A_STEP)
         reports.append(found.report)
         if not found.report.stable or unaccounted(here, found):
-            if _made(reports) >= most_factorizations or (step <= shortest and not snap):
+            at_shortest = path.length <= shortest
+            if _made(reports) >= most_factorizations or (at_shortest and not snap):
                 break
-            if step > shortest:
-                step = max(0.4 * step, shortest)
+            if not at_shortest:
+                path.shorten()
+                path.step = max(path.step, shortest)
                 continue
             found = _fallen(problem, here, found)
             reports.append(found.report)
@@ -196,11 +230,12 @@ def trace(
             reports += back.reports
             if back.t != t or farthest(here, back.found) > SAME * problem.length:
                 snaps.append(Snap(t, there, farthest(here, found)))
-            step = 4 * shortest
-        elif found.report.iterations <= EASY:
-            step *= 1.6
-        t, here = there, found
-    return Trace(t, here, tuple(snaps), tuple(reports))
+            path.accept()
+            path.step = 4 * shortest
+        else:
+            path.accept(easy=found.report.iterations <= EASY)
+        here = found
+    return Trace(path.t, here, tuple(snaps), tuple(reports))
 
 
 def going_on(problem: Problem, last: Equilibrium) -> Problem:
@@ -211,17 +246,13 @@ def going_on(problem: Problem, last: Equilibrium) -> Problem:
     problem : the next one on a path.
     last : the equilibrium that the next solve starts from.
     """
-    return replace(problem, elements=last.elements, pattern=last.problem.pattern)
+    elements = tuple(map(with_frames, problem.elements, last.elements))
+    return replace(problem, elements=elements, pattern=last.problem.pattern)
 
 
 def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule; parameters as for `surplus`.
-
-    Parameters
-    ----------
-    here, there : equilibria of one structure under one load, the second with prescribed `Supports`.
-    """
+    by the trapezoidal rule; parameters as of `surplus`."""
     return abs(surplus(here, there)) > UNACCOUNTED
 
 
@@ -340,12 +371,10 @@ class _Dead:
 def _pace(problem: Problem, state: Floats) -> Floats:
     """(N, 3) D: the diagonal of the elements' Hessian, one value for each block."""
     diagonal = np.zeros(len(state))
-    for element in problem.elements:
-        count, width = element.blocks.shape
-        hessians = np.zeros((count, 3 * width, 3 * width))
-        element.evaluate(state, np.zeros_like(state), hessians)
-        largest = np.abs(np.einsum("mii->mi", hessians)).reshape(count, width, 3).max(axis=2)
-        np.add.at(diagonal, element.blocks, largest)
+    energies = Potential(problem.elements)
+    for blocks, hessians in zip(energies.blocks, energies.hessians(state), strict=True):
+        largest = np.abs(np.einsum("mii->mi", hessians)).reshape(*blocks.shape, 3).max(axis=2)
+        np.add.at(diagonal, blocks, largest)
     square = problem.unit(len(state))[:, 0] ** 2
     least = 1e-6 * float((diagonal * square).max())
     return np.repeat(np.maximum(diagonal, least / square)[:, None], 3, axis=1)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.bounds import bounds
-from rodshell.model import Assembly, Freedom, Shell
+from rodshell.model import Assembly, Freedom, Potential, Shell
 from rodshell.rods.elements import Elements, Stretch, twist_angles
 from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, product, upper_triangle
 from rodshell.validation import array, finite, function_of, keep, number, vector
@@ -226,14 +226,18 @@ class Problem:
             solver = linear_solver(assembly, free, self.flat_coordinates)
         return Pattern(blocks, free.count, assembly, solver)
 
+    @property
+    def energies(self) -> Potential:
+        """The sum of all energies."""
+        return Potential((*self.elements, self.stretch))
+
     def refreshed(self, state: Floats) -> Self:
         """The same problem with the source frames of its elements at `state` (n, 3)."""
         return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
 
     def potential(self, state: Floats) -> float:
         """Elastic energy at `state` (n, 3) less the work of the load [J]."""
-        unused = np.zeros_like(state)
-        elastic = sum(element.evaluate(state, unused) for element in (*self.elements, self.stretch))
+        elastic = self.energies.energy(state)
         return elastic - (0.0 if self.load is None else float(np.sum(self.load * state)))
 
 

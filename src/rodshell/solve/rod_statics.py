@@ -1,8 +1,6 @@
 """Equilibrium of one rod: its supports and loads, and the steps by which they go from a start to the goal.
 
-Two things set a rod apart from a shell. Lengths and angles are unknowns of one system: the solver sees lengths as
-shares of the rod's own, so that neither the unit nor the size of the rod decides how far a step goes. And the energies
-change along the way, where natural strains are let go bit by bit, so that `follow` does not serve.
+Natural strains are let go bit by bit along the way: of a state to start from, stress comes with the rod's own.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,12 +12,13 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
-from rodshell.model import Freedom
+from rodshell.model import Freedom, Potential
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.rod_line import End
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
-from rodshell.solve.equilibrium import NUDGE, Equilibrium, SolveReport, Status, find_equilibrium
+from rodshell.solve.equilibrium import SolveReport, Status
+from rodshell.solve.path import followed
 from rodshell.solve.problem import Problem, Supports
 from rodshell.validation import array, direction, finite, flag, instance, mapping, number, short, texts, vector, whole
 
@@ -253,8 +252,7 @@ def index_of(given: int, count: int, what: str) -> int:
 
 
 EASY = 6  # a step of no more iterations may be followed by a longer one
-MOST, MOST_DOWN = 40, 320  # iterations of a step; on the way down from a saddle
-SMALLEST_STEP = 1e-3
+MOST = 40  # iterations of a step
 NEUTRAL = 1e-6  # a mode of less than this of EI/L, the rod moving by its length, is one that nothing resists, such as
 # the turn of a round rod's bow about the line of its clamps: round-off chooses its sign
 
@@ -365,39 +363,30 @@ def solve_rod(
         axial = rod.stretch.stiffness * rod.stretch.strains(state)
         held = tuple(_stress_free(element, state) for element in rod.elements)
     before = _gradient(held or rod.elements, rod, state, axial)  # this load makes the start an equilibrium
-    scale = _scale(rod)
-    t, step = 0.0, 1.0 / steps
-    reports = list[SolveReport]()
-    while t < 1.0:
-        there = min(1.0, t + step)
-        if 1.0 - there < 1e-9:
-            there = 1.0
-        pulls = (1 - there) * before + there * load
-        problem = _problem(rod, _released(held, rod.elements, there), path.at(there), pulls)
-        found = _next(problem, rod.bend_energy, state / scale, axial * rod.length, slide=stable)
-        reports.append(found.report)
-        if found.report.converged:
-            t, state, axial = there, found.state * scale, found.forces / rod.length
-            rod = replace(rod, elements=_released(rod.elements, found.elements, 0.0))
-            if found.report.iterations <= EASY:
-                step *= 1.6
-        else:
-            step = 0.4 * min(step, there - t)
-            if step < SMALLEST_STEP:
-                report = replace(found.report, status=Status.STALLED).after(*reports[:-1])
-                raise ConvergenceError(
-                    f"the rod's equilibrium was lost {100 * t:.1f} % of the way from the start to the goal: "
-                    "give more steps, a finer mesh, or a start nearer to the goal; or hold what is free to move",
-                    report,
-                )
-    report = reports[-1].after(*reports[:-1])
+
+    def problem_at(t: float) -> Problem:
+        elements, pulls = _released(held, rod.elements, t), (1 - t) * before + t * load
+        return Problem(elements, rod.stretch, path.at(t), rod.length, load=pulls)
+
+    way = followed(
+        problem_at, state, axial, first_step=1.0 / steps, slide=stable, neutral=NEUTRAL * rod.bend_energy, easy=EASY,
+        most=MOST, most_of_all=None,
+    )  # fmt: skip
+    *earlier, last = way.reports
+    report = last.after(*earlier)
+    if way.t < 1.0:
+        raise ConvergenceError(
+            f"the rod's equilibrium was lost {100 * way.t:.1f} % of the way from the start to the goal: "
+            "give more steps, a finer mesh, or a start nearer to the goal; or hold what is free to move",
+            replace(report, status=Status.STALLED),
+        )
     if stable and not report.stable:
         raise ConvergenceError(
             f"the rod's equilibrium is not stable: {report.negative_modes} negative modes. Start from a shape bent "
             "to the side that it is to take; or pass stable=False to have it as it is",
             report,
         )
-    return _shape(rod, state, axial, load, path.free, report)
+    return _shape(replace(rod, elements=way.found.elements), way.found.state, way.found.forces, load, path.free, report)
 
 
 def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
@@ -417,61 +406,6 @@ def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Fr
     reactions = gradient - free.expand(free.reduce(gradient))
     residual = float(np.abs(gradient[rod.nodes] - reactions[rod.nodes]).max())
     return RodShape(rod, state, axial, load, reactions, replace(report, force_residual=residual))
-
-
-def _scale(rod: ElasticRod) -> Floats:
-    """(N, 1) length of the rod at nodes, 1 at angles."""
-    scale = np.ones((rod.block_count, 1))
-    scale[rod.nodes] = scale[rod.ghosts] = rod.length
-    return scale
-
-
-def _problem(rod: ElasticRod, elements: tuple[Elements, ...], supports: Supports, load: Floats) -> Problem:
-    """In lengths measured by the rod's own; energies stay in joule. Bends and twists know no lengths."""
-    stretch = replace(
-        rod.stretch, rest_lengths=rod.stretch.rest_lengths / rod.length, stiffness=rod.stretch.stiffness * rod.length
-    )
-    scale = _scale(rod)
-    return Problem(
-        elements, stretch, replace(supports, goals=supports.goals / scale[supports.moved]), 1.0, load=load * scale
-    )
-
-
-def _next(problem: Problem, bend_energy: float, state: Floats, axial: Floats, *, slide: bool) -> Equilibrium:
-    """The equilibrium next to `state`; if `slide`, from a saddle on along its mode, to either side in turn.
-
-    As `find_stable`, but a mode that nothing resists makes no saddle.
-    """
-    first = best = find_equilibrium(problem, state, axial, most_iterations=MOST)
-    if _is_neutral(problem, first, bend_energy):
-        first = best = replace(first, mode=None, report=replace(first.report, negative_modes=0))
-    reports = [first.report]
-    for side in (1.0, -1.0) if slide and first.mode is not None else ():
-        assert first.mode is not None
-        nudged = first.state + side * NUDGE * first.mode
-        below = replace(problem, elements=first.elements)
-        found = find_equilibrium(below, nudged, first.forces, descend=True, most_iterations=MOST_DOWN)
-        if _is_neutral(problem, found, bend_energy):
-            found = replace(found, mode=None, report=replace(found.report, negative_modes=0))
-        reports.append(found.report)
-        if found.report.stable:
-            best = found
-            break
-    return replace(best, report=best.report.after(*(report for report in reports if report is not best.report)))
-
-
-def _is_neutral(problem: Problem, found: Equilibrium, bend_energy: float) -> bool:
-    """Whether the one negative mode of an equilibrium is round-off: along it the energy does not fall."""
-    if found.mode is None or found.report.negative_modes != 1:
-        return False
-    curvature = 0.0
-    for part in (*found.elements, problem.stretch.with_forces(found.forces)):
-        width = 3 * part.blocks.shape[1]
-        hessians = np.zeros((len(part.blocks), width, width))
-        part.evaluate(found.state, np.zeros_like(found.state), hessians)
-        along = found.mode[part.blocks].reshape(-1, width)
-        curvature += float(np.einsum("mi,mij,mj->", along, hessians, along))
-    return curvature > -NEUTRAL * bend_energy
 
 
 def _stress_free(element: Elements, state: Floats) -> Elements:
@@ -495,8 +429,6 @@ def _released(held: tuple[Elements, ...], elements: tuple[Elements, ...], t: flo
 
 def _gradient(elements: tuple[Elements, ...], rod: ElasticRod, state: Floats, axial: Floats) -> Floats:
     """(N, 3) of the energy, the edges carrying the axial forces (edges,) [N]."""
-    gradient = np.zeros_like(state)
-    for element in elements:
-        element.evaluate(state, gradient)
+    gradient = Potential(elements).gradient(state)
     rod.stretch.add_axial(state, axial, gradient)
     return gradient

@@ -22,7 +22,6 @@ from scipy.sparse import csc_array, csr_array
 
 from rodshell.arrays import Floats
 from rodshell.model.edge_properties import EA, LENGTH, PROPERTIES, EdgeProperties
-from rodshell.rods.elements import add_product
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.tangent import Modes, Tangent
 
@@ -130,12 +129,7 @@ class Sensitivity:
         return result
 
     def lowest_modes(self, count: int, *, mass: Floats | None = None) -> Modes:
-        """The lowest modes of the tangent, as `Tangent.lowest_modes`.
-
-        Parameters
-        ----------
-        mass : (N, 3) lumped mass of each component [kg, kg m2]; None: the modes of K itself.
-        """
+        """The lowest modes of the tangent, as `Tangent.lowest_modes`."""
         return self.tangent.lowest_modes(count, mass=mass)
 
     def mode_slopes(self, modes: Modes, parameters: Parameters) -> Floats:
@@ -163,8 +157,4 @@ class Sensitivity:
 
     def _product(self, motion: Floats, state: Floats | None = None) -> Floats:
         """(N, 3) product of the Hessian with displacements, held blocks too; at the equilibrium, or another state."""
-        state = self.here.state if state is None else state
-        result = np.zeros_like(state)
-        for element in (*self.edges.shell.elements, self._stretch):
-            add_product(element, state, motion, result)
-        return result
+        return self.edges.shell.energies.product(self.here.state if state is None else state, motion)

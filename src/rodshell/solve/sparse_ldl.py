@@ -10,6 +10,7 @@ eliminated, what remains is the update matrix for its parent (Duff and Reid 1983
 none, by minimum degree; the symbolic phase once per pattern (`symbolic`).
 """
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -22,16 +23,19 @@ from rodshell.kernels import njit
 from rodshell.model import BlockRows
 from rodshell.solve.dense import (
     OVERWRITTEN,
+    PAD,
     add_rows,
     backward,
+    backward_rows,
     eliminate,
     forward,
+    forward_rows,
     padded,
     room,
     subtract_product,
     workspace,
 )
-from rodshell.solve.simd_kernels import matrix_view
+from rodshell.solve.simd_kernels import ROWS, matrix_view
 from rodshell.solve.symbolic import Plan, blocks_of, coupled, plan_of
 from rodshell.threads import in_threads, threads
 
@@ -39,7 +43,7 @@ ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, nee
 SURELY = 1e-14  # and after this small a one, no other is looked at
 
 
-NONE_ABOVE, NOTHING = np.empty(0, dtype=np.int64), np.empty(0)
+NONE_ABOVE = np.empty(0, dtype=np.int64)
 
 
 class SingularError(ArithmeticError):
@@ -55,7 +59,8 @@ class Factors(Protocol):
         ...
 
     def solve(self, right: Floats) -> Floats:
-        """Solution (n,) for a right-hand side (n,), with one step of iterative refinement where it is not accurate.
+        """Solution for a right-hand side (n,), or for each of many (k, n), with one step of iterative refinement where
+        it is not accurate.
 
         Accuracy is a matter of the factors more than of the right-hand side: after an accurate solution no other is
         looked at.
@@ -90,7 +95,7 @@ class _Scratch(NamedTuple):
 
     threads: list[tuple[Floats, Floats]]  # of each thread: a front's pivot rows, and the dense kernels' workspace
     stacks: Floats  # update matrices
-    fronts: list[tuple[Floats, Floats]]  # of each thread: a front's part of a solution, and scratch of it
+    fronts: list[tuple[Floats, Floats]]  # of each thread: a front's part of `ROWS` solutions, and scratch of them
 
 
 class Multifrontal:
@@ -156,7 +161,8 @@ class Multifrontal:
         except IndexError:
             plan, count = self.plan, range(threads())
             eliminated = [(room(plan.largest_panel), workspace(plan.largest_front)) for _ in count]
-            solved = [(room(plan.largest_front), room(2 * plan.largest_front)) for _ in count]
+            largest = plan.largest_front + PAD
+            solved = [(room(ROWS * largest), room(ROWS * largest)) for _ in count]
             return _Scratch(eliminated, room(plan.stack_size), solved)
 
     def give_back(self, scratch: _Scratch) -> None:
@@ -181,32 +187,47 @@ class MultifrontalFactors:
     def solve(self, right: Floats) -> Floats:
         right = np.ascontiguousarray(right, dtype=np.float64)
         x = self._substitute(right)
-        if self._surely:
-            return x
-        residual, left, size = _residual(self._solver.indptr, self._solver.indices, self._data, x, right)
-        if left > ACCURATE * size:
-            x += self._substitute(residual)
-        self._surely = 0.0 < left <= SURELY * size
+        rows = () if self._surely else zip(x.reshape(-1, x.shape[-1]), right.reshape(-1, x.shape[-1]), strict=True)
+        for solution, given in rows:
+            residual, left, size = _residual(self._solver.indptr, self._solver.indices, self._data, solution, given)
+            if left > ACCURATE * size:
+                solution += self._substitute(residual)
+            self._surely = 0.0 < left <= SURELY * size
+            if self._surely:
+                break
         return x
 
     def _substitute(self, right: Floats) -> Floats:
+        """Solutions for a right-hand side (n,) or for many (k, n), `ROWS` of which share the reading of the factors."""
+        if right.ndim == 1:
+            return self._solved(right, _forward, _backward)
+        result, together = np.empty_like(right), len(right) // ROWS * ROWS
+        for k in range(0, together, ROWS):
+            result[k : k + ROWS] = self._solved(right[k : k + ROWS].T, _forward_rows, _backward_rows).T
+        for k in range(together, len(right)):
+            result[k] = self._solved(right[k], _forward, _backward)
+        return result
+
+    def _solved(self, right: Floats, upwards: Callable[..., None], downwards: Callable[..., None]) -> Floats:
+        """(n,) or (n, ROWS), by the kernels for it."""
         assert self._memory is not None, GIVEN_AWAY
         solver, plan, (panels, pivots) = self._solver, self._solver.plan, self._memory
-        x, parts, scratch = right[plan.order], solver.parts, solver.take_scratch()
+        x, parts, scratch = right.take(plan.order, axis=0), solver.parts, solver.take_scratch()
         fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
         memory, (above, place) = scratch.fronts, solver.above
-        sums = np.zeros((last, len(above)))  # each part's own, so that the sum does not depend on the threads
+        # each part's own, so that the sum does not depend on the threads
+        sums = np.zeros((last, len(above), *x.shape[1:]))
 
         def rise(part: int, thread: int) -> None:
-            _forward(parts[part], x, place, sums[part], *fronts, *memory[thread])
+            upwards(parts[part], x, place, sums[part], *fronts, *memory[thread])
 
         def descend(part: int, thread: int) -> None:
-            _backward(parts[part], x, *fronts, pivots, *memory[thread])
+            downwards(parts[part], x, *fronts, pivots, *memory[thread])
 
         if last:
             in_threads(rise, last, most=len(memory))
             x[above] += sums.sum(axis=0)
-        _forward(parts[last], x, NONE_ABOVE, NOTHING, *fronts, *memory[0])
+        upwards(parts[last], x, NONE_ABOVE, np.empty((0, *x.shape[1:])), *fronts, *memory[0])
         descend(last, 0)
         in_threads(descend, last, most=len(memory))
         solver.give_back(scratch)
@@ -378,6 +399,56 @@ def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, loca
         backward(panel, pivots[begin : begin + width], values, aside)
         for i in range(width):
             x[begin + i] = values[i]
+
+
+@njit(error_model="numpy", nogil=True)
+def _forward_rows(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
+    """`_forward` for each column of `x` (n, ROWS), `sums` being (m, ROWS)."""
+    for s in part:
+        begin, at = first[s], row_start[s]
+        size, width = row_start[s + 1] - at, first[s + 1] - begin
+        stride = padded(size)
+        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, ROWS, stride)
+        for i in range(width):
+            for r in range(ROWS):
+                values[r, i] = x[begin + i, r]
+        for r in range(ROWS):
+            for i in range(width, stride):
+                values[r, i] = 0.0
+        forward_rows(panel, values, aside)
+        for i in range(width):
+            for r in range(ROWS):
+                x[begin + i, r] = values[r, i]
+        for i in range(width, size):
+            row = rows[at + i]
+            if len(above) > 0 and above[row] >= 0:
+                for r in range(ROWS):
+                    sums[above[row], r] += values[r, i]
+            else:
+                for r in range(ROWS):
+                    x[row, r] += values[r, i]
+
+
+@njit(error_model="numpy", nogil=True)
+def _backward_rows(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
+    """`_backward` for each column of `x` (n, ROWS)."""
+    for k in range(len(part) - 1, -1, -1):
+        s = part[k]
+        begin, at = first[s], row_start[s]
+        size, width = row_start[s + 1] - at, first[s + 1] - begin
+        stride = padded(size)
+        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, ROWS, stride)
+        for i in range(size):
+            row = rows[at + i]
+            for r in range(ROWS):
+                values[r, i] = x[row, r]
+        for r in range(ROWS):
+            for i in range(size, stride):
+                values[r, i] = 0.0
+        backward_rows(panel, pivots[begin : begin + width], values, aside)
+        for i in range(width):
+            for r in range(ROWS):
+                x[begin + i, r] = values[r, i]
 
 
 LEAF = 12  # blocks that are not divided further

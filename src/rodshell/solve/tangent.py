@@ -16,8 +16,9 @@ from threadpoolctl import threadpool_limits
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.model import Freedom
-from rodshell.rods.elements import Elements, Stressed, Stretch
-from rodshell.solve.problem import Pattern, Problem
+from rodshell.model.potential import product, room_for
+from rodshell.rods.elements import NO_HESSIANS, Elements, Stressed, Stretch, evaluate_all
+from rodshell.solve.problem import NO_CURVATURE, Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
 GUARDS = 4  # vectors of the subspace iteration beyond the modes that are asked for
@@ -81,7 +82,7 @@ class Tangent:
         -------
         Displacements of the same shape [m, rad].
         """
-        return self._each("loads", loads, self.factors.solve)
+        return self._of_fields("loads", loads, self.factors.solve)
 
     def product(self, motions: Floats) -> Floats:
         """Forces K x in the free directions; zero across them.
@@ -90,7 +91,9 @@ class Tangent:
         ----------
         motions : (N, 3) displacements [m, rad], or (k, N, 3) of k cases; their part in the free directions counts.
         """
-        return self._each("displacements", motions, lambda x: self.pattern.product(self.values, x))
+        return self._of_fields(
+            "displacements", motions, lambda rows: np.array([self.pattern.product(self.values, row) for row in rows])
+        )
 
     def lowest_modes(
         self,
@@ -126,25 +129,26 @@ class Tangent:
         count = min(count, int(np.count_nonzero(root)))
         factors, shift = self._positive_definite(weight)
 
-        def inverse(vector: Floats) -> Floats:
-            return root * factors.solve(root * vector)
+        def inverse(rows: Floats) -> Floats:
+            return root * factors.solve(root * rows)
 
         start = np.random.default_rng(0).standard_normal((size, min(count + guards, int(np.count_nonzero(root))))).T
         values, rows, settled = subspace_iteration(
             inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps
         )
-        shapes = np.array([factors.solve(root * row) for row in rows[:count]]).reshape(count, size)
+        shapes = factors.solve(root * rows[:count])
         shapes /= np.sqrt(np.einsum("ki,i,ki->k", shapes, weight, shapes))[:, None]
         expanded = np.array([self.freedom.expand(shape) for shape in shapes]).reshape(count, *self.state.shape)
         return Modes(1.0 / values[:count] - shift, expanded, settled)
 
-    def _each(self, what: str, fields: Floats, apply: Callable[[Floats], Floats]) -> Floats:
-        """A function of reduced vectors applied to one field (N, 3) or to many (k, N, 3)."""
+    def _of_fields(self, what: str, fields: Floats, apply: Callable[[Floats], Floats]) -> Floats:
+        """A function of reduced vectors (k, dofs) applied to one field (N, 3) or to many (k, N, 3)."""
         shape, free = self.state.shape, self.freedom
         if fields.shape[-2:] != shape or fields.ndim not in (2, 3):
             raise InputError(f"the {what} have the shape {fields.shape}: give {shape}, or (k, {shape[0]}, {shape[1]})")
-        results = [free.expand(apply(free.reduce(field))) for field in fields.reshape(-1, *shape)]
-        return np.array(results).reshape(fields.shape)
+        rows = [free.reduce(field) for field in fields.reshape(-1, *shape)]
+        results = apply(np.array(rows).reshape(len(rows), free.size))
+        return np.array([free.expand(row) for row in results]).reshape(fields.shape)
 
     def _checked_mass(self, mass: Floats) -> Floats:
         if mass.shape != self.state.shape:
@@ -169,7 +173,7 @@ class Tangent:
         root = np.sqrt(weight)
         start = np.random.default_rng(0).standard_normal((1, len(weight)))
         value, *_ = subspace_iteration(
-            lambda x: root * factors.solve(root * x),
+            lambda rows: root * factors.solve(root * rows),
             start,
             settled=1,
             tolerance=1e-2,
@@ -187,25 +191,35 @@ class Tangent:
 
 
 class TangentAssembly:
-    """Assembles the tangent stiffness of a problem at one state after another.
+    """The energies of a problem and their tangent stiffness, at one state after another.
 
-    Its buffers serve for all states; what it returns is not touched again. The supports must not be on their way
-    (`Supports` with nodes still to move): prescribed motions do not contribute to K.
+    Its buffers serve for all states; what it returns is not touched again. Where supports are on their way (`Supports`
+    with nodes still to move), what their motion takes is `product`.
 
     Parameters
     ----------
     problem : the structure; its elements may be replaced at each state, on the same blocks.
     state : (N, 3) any state, for the pattern.
+
+    Attributes
+    ----------
+    blocks : (m, k) of each set of energies, of the edges, and of the constraint's curvature.
+    hessians : (m, 3k, 3k) of each of these at the last state; of a constraint that is not `curved` empty.
     """
 
     def __init__(self, problem: Problem, state: Floats) -> None:
         self._problem = problem
-        self._blocks = problem.blocks(len(state))
+        self.blocks = problem.blocks(len(state))
         self.pattern = problem.pattern_at(state)
-        self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
+        self.hessians = [*room_for(self.blocks[:-1]), NO_CURVATURE]
+
+    @property
+    def curved(self) -> bool:
+        """Whether the constraint turns its free directions."""
+        return len(self.hessians[-1]) > 0
 
     def gradient(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Floats:
-        """(N, 3) gradient [N] of the elements and of edges that carry the axial forces (e,) [N]; without loads.
+        """(N, 3) gradient [N] of energy and load, the edges carrying the axial forces (e,) [N].
 
         Parameters
         ----------
@@ -213,34 +227,58 @@ class TangentAssembly:
         state : (N, 3) node positions [m] and twist angles [rad].
         forces : (e,) axial forces of the edges [N].
         """
-        gradient = np.zeros_like(state)
-        for element in elements:
-            element.evaluate(state, gradient)
-        self._problem.stretch.add_axial(state, forces, gradient)
-        return gradient
+        return self._gradient(elements, state, forces, [NO_HESSIANS] * len(elements))[1]
 
-    def values(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
-    ) -> tuple[Freedom, Floats]:
-        """The free directions, and the values (nnz,) of K in the order of the pattern.
+    def linearise(
+        self, elements: Sequence[Elements], state: Floats, forces: Floats, *,
+        multipliers: Floats | None = None, stretch: Stretch | None = None,
+    ) -> Floats:  # fmt: skip
+        """Evaluate all Hessians at a state.
 
         Parameters
         ----------
         elements : with their source frames at, or near, the state.
         state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
+        multipliers : (e,) N0 [N]; None: those of the edges.
         stretch : the edges with other lengths at rest; None: those of the problem.
+
+        Returns
+        -------
+        (N, 3) gradient of energy and load [N], the edges carrying N0 + EA eps.
         """
-        problem, unused = self._problem, np.zeros_like(state)
-        stretch = problem.stretch if stretch is None else stretch
-        gradient = np.zeros_like(state) if problem.load is None else -problem.load
-        for element, hessians in zip(elements, self._hessians, strict=False):
-            element.evaluate(state, gradient, hessians)
-        stretch.add_axial(state, forces, gradient)
-        stretch.with_forces(forces).evaluate(state, unused, self._hessians[-2])
-        curvature = problem.constraint.curvature(state, gradient)
-        self._hessians[-1][:] = curvature if len(curvature) else 0.0
-        free = problem.constraint.freedom(state)
-        return free, self.pattern.assembly.assemble(self._hessians, self._blocks, free)
+        stretch = self._problem.stretch if stretch is None else stretch
+        gradient, by_force = self._gradient(elements, state, forces, self.hessians[:-2], stretch)
+        self.hessians[-1] = self._problem.constraint.curvature(state, by_force)
+        evaluate_all((stretch.with_forces(forces, multipliers=multipliers),), state, gradient, self.hessians[-2:-1])
+        return gradient
+
+    def assembled(self, free: Freedom) -> Floats:
+        """(nnz,) values of K at the last state in the free directions, in the order of the pattern."""
+        return self.pattern.assembly.assemble(self.hessians, self.blocks, free)
+
+    def product(self, motion: Floats) -> Floats:
+        """(N, 3) product of the Hessian at the last state with displacements (N, 3) across the free directions too."""
+        return product(self.hessians[:-1], self.blocks[:-1], motion)
+
+    def values(
+        self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
+    ) -> tuple[Freedom, Floats]:
+        """The free directions, and the values (nnz,) of K in the order of the pattern; parameters as of `linearise`."""
+        self.linearise(elements, state, forces, stretch=stretch)
+        free = self._problem.constraint.freedom(state)
+        return free, self.assembled(free)
+
+    def _gradient(
+        self, elements: Sequence[Elements], state: Floats, forces: Floats, hessians: Sequence[Floats],
+        stretch: Stretch | None = None,
+    ) -> tuple[Floats, Floats]:  # fmt: skip
+        """(N, 3) of the elements and the load, without and with the axial forces."""
+        load, stretch = self._problem.load, self._problem.stretch if stretch is None else stretch
+        gradient = np.zeros_like(state) if load is None else -load
+        evaluate_all(elements, state, gradient, hessians)
+        whole = gradient.copy()
+        stretch.add_axial(state, forces, whole)
+        return gradient, whole
 
     def stress_values(self, elements: Sequence[Elements], state: Floats, change: Floats, motion: Floats) -> Floats:
         """(nnz,) values of the change of K with the internal forces alone, the geometry being frozen.
@@ -252,24 +290,17 @@ class TangentAssembly:
         change : (e,) of the axial forces [N].
         motion : (N, 3) along which moments change, of the elements that are `Stressed` [m, rad].
         """
-        hessians = [np.zeros_like(values) for values in self._hessians]
+        hessians = room_for(self.blocks)
         for element, values in zip(elements, hessians, strict=False):
             if isinstance(element, Stressed):
                 element.stress_stiffness(state, motion, values)
         self._problem.stretch.axial_stiffness(state, change, hessians[-2])
-        return self.pattern.assembly.assemble(hessians, self._blocks, self._problem.constraint.freedom(state))
+        return self.pattern.assembly.assemble(hessians, self.blocks, self._problem.constraint.freedom(state))
 
     def tangent(
         self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
     ) -> Tangent:
-        """The tangent at a state; parameters as for `values`.
-
-        Parameters
-        ----------
-        elements : with their source frames at, or near, the state.
-        state : (N, 3) node positions [m] and twist angles [rad].
-        forces : (e,) axial forces of the edges [N].
-        stretch : the edges with other lengths at rest; None: those of the problem.
+        """The tangent at a state; parameters as of `linearise`.
 
         Raises
         ------
@@ -300,7 +331,7 @@ def subspace_iteration(
 
     Parameters
     ----------
-    apply : the operator, on vectors (n,).
+    apply : the operator, on each of the vectors (m, n).
     start : (m, n) vectors to begin with.
     settled : so many of the largest eigenvalues must have settled.
     tolerance : of the square of these ones' residuals over the eigenvalue, which is about the relative error of the
@@ -314,7 +345,7 @@ def subspace_iteration(
     rows, done = start, False
     for _ in range(most_sweeps):
         rows = orthonormal(rows)
-        images = np.array([apply(row) for row in rows])
+        images = apply(rows)
         values, turn = np.linalg.eigh(np.einsum("ik,jk->ij", rows, images))
         values, turn = values[::-1], turn[:, ::-1]
         before, rows = np.einsum("ji,jk->ik", turn, rows), np.einsum("ji,jk->ik", turn, images)
@@ -336,12 +367,12 @@ def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, toleran
 
     Parameters
     ----------
-    inverse : of the matrix, on vectors (n,).
+    inverse : of the matrix, on a vector (n,) or on each of many (k, n).
     start : (m, n) directions near which it is looked for: it is found at once if it is one of the m softest.
     tolerance : as of `subspace_iteration`.
     """
     values, (row, *_), settled = subspace_iteration(
-        lambda row: -inverse(row), start, settled=1, tolerance=tolerance, most_sweeps=FEW_SWEEPS
+        lambda rows: -inverse(rows), start, settled=1, tolerance=tolerance, most_sweeps=FEW_SWEEPS
     )
     if settled and values[0] > 0:
         return np.asarray(row)
