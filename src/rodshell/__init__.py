@@ -58,12 +58,9 @@ if TYPE_CHECKING:
         Spring,
     )
     from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, Profile, mesh_grid, straight_rods
-    from rodshell.loads.bracing import Cables
-    from rodshell.loads.combinations import Loads, Stability
+    from rodshell.loads.combinations import Loads
     from rodshell.loads.kinds import LineLoad, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
-    from rodshell.loads.laths import Laths
-    from rodshell.loads.locked_joints import LockedJoints
-    from rodshell.loads.strength import Strength
+    from rodshell.loads.settings import Cables, Laths, LockedJoints, Stability, Strength
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -113,12 +110,9 @@ _HOMES = {
     "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
-    "rodshell.loads.bracing": ("Cables",),
-    "rodshell.loads.combinations": ("Loads", "Stability"),
+    "rodshell.loads.combinations": ("Loads",),
+    "rodshell.loads.settings": ("Cables", "Laths", "LockedJoints", "Stability", "Strength"),
     "rodshell.loads.kinds": ("LineLoad", "PointLoad", "SelfWeight", "Settlement", "Snow", "Temperature", "Wind"),
-    "rodshell.loads.laths": ("Laths",),
-    "rodshell.loads.locked_joints": ("LockedJoints",),
-    "rodshell.loads.strength": ("Strength",),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rodshell.case import Case
-from rodshell.case.case import Built, built
+from rodshell.case.case import Built
+from rodshell.case.held import built
 from rodshell.case.rod_ends import RodEnds
 from rodshell.checks.sizing import Fit, require_likely_sizes
 from rodshell.errors import OutOfTimeError
