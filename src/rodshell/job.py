@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from rodshell.case import Case, load_case
 from rodshell.case.from_objects import case_of, case_of_rod_ends
-from rodshell.case.held import built
 from rodshell.case.load import changed_case, flattened, is_described, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
 from rodshell.errors import InputError, OutOfMemoryError
@@ -191,7 +190,7 @@ class Job:
         changes = _changes(overrides, more)
         require_keys_of_rods(changes)
         ends, case = _ends_and_case(source, unit, changes)
-        given = case_of_rod_ends(ends, rod, joint or built(case.joint))
+        given = case_of_rod_ends(ends, rod, joint or case.joint)
         tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
         if not (case.drawings.name or isinstance(source, RodEnds)):
             tables["drawings"] = replace(case.drawings, name=Path(source).resolve().stem)

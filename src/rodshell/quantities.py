@@ -12,8 +12,9 @@ from math import inf
 from numbers import Integral
 from typing import Annotated, Any, Literal, TypeVar
 
+from rodshell.errors import InputError
 from rodshell.units import Kind, read_quantity, require_unit_of_all, shown, si_unit, wanted
-from rodshell.validation import is_auto, not_negative, number, numbers, positive
+from rodshell.validation import described, is_auto, not_negative, number, numbers, positive
 
 Auto = Literal["auto"]
 Reader = Callable[[object], Any]
@@ -174,6 +175,12 @@ def _corners(value: object) -> int:
     raise ValueError("give 2, opposite corners as in the paper, or 4")
 
 
+def _checked_corners(_: str, value: object) -> int:
+    if not isinstance(value, Integral) or value not in (2, 4):
+        raise InputError(f"a joint has linkers in 2 or 4 of its corners, not in {described(value)}")
+    return int(value)
+
+
 def _whole(value: object) -> int:
     """A whole number, not negative."""
     found = int(value) if isinstance(value, str) and value.strip().isdecimal() else value
@@ -273,7 +280,7 @@ IsoDate = Annotated[str, Value(_iso_date)]
 Names = Annotated[tuple[str, ...], Value(_names)]
 Whole = Annotated[int, Value(_whole)]
 Counts = Annotated[tuple[int, int] | Auto, Value(_counts)]
-Corners = Annotated[Literal[2, 4], Value(_corners)]
+Corners = Annotated[Literal[2, 4], Value(_corners, _checked_corners)]
 Unit = Annotated[float, Value(_unit)]
 Ratio = Annotated[float, Value(_ratio)]
 Numbers = Annotated[tuple[float, ...], Value(_numbers)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from rodshell.case.held import Held, built
 from rodshell.case.load_tables import BracingKinds, CombinationRows, LoadRows, NoBracing
-from rodshell.case.rod_tables import Ball, JointKinds, RodTable
+from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import (
     ChecksTable,
     DrapeTable,
@@ -23,7 +23,8 @@ from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
 from rodshell.loads.settings import LockedJoints, Stability, Strength
 from rodshell.progress import Progress, silent
-from rodshell.schema import read, written
+from rodshell.rods.joints import Ball, JointKind
+from rodshell.schema import read, undescribed, written
 from rodshell.units import length_text, shown
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ class Case:
     target: TargetKinds | HeldTarget = field(default_factory=Hemisphere)
     layout: LayoutTable = field(default_factory=LayoutTable)
     rod: RodTable = field(default_factory=RodTable)
-    joint: JointKinds = field(default_factory=Ball)
+    joint: JointKind = field(default_factory=Ball)
     drape: DrapeTable = field(default_factory=DrapeTable)
     pop_up: PopUpTable = field(default_factory=PopUpTable)
     refine: RefineTable = field(default_factory=RefineTable)
@@ -86,8 +87,10 @@ class Case:
     @property
     def held_objects(self) -> dict[str, Held]:
         """Objects that tables were made of and that their keys do not describe, by the name of the table."""
-        held = {each.name: getattr(getattr(self, each.name), "held", None) for each in fields(self)}
-        return {name: found for name, found in held.items() if found is not None}
+        tables = {each.name: getattr(self, each.name) for each in fields(self)}
+        found = {name: table.held for name, table in tables.items() if getattr(table, "held", None) is not None}
+        what = undescribed(self.joint)
+        return found | ({"joint": Held(self.joint, what)} if what else {})
 
     def to_toml(self) -> str:
         """The full input as a case file with SI numbers: loading it from anywhere gives the same case.
@@ -155,7 +158,7 @@ class Case:
         """What a rod that is left to the target has to fit."""
         from rodshell.checks.sizing import Fit
 
-        return Fit.on(target, layout, anchor=anchor, joint=built(self.joint))
+        return Fit.on(target, layout, anchor=anchor, joint=self.joint)
 
     def with_rod(self, rod: "Rod") -> "Case":
         """The same case with this rod spelled out."""
@@ -210,7 +213,7 @@ class Case:
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if self.drape.anchor == "auto" else self.drape.anchor
-        joint, method = built(self.joint), built(self.drape)
+        joint, method = self.joint, built(self.drape)
         target = cut_at(target or built(self.target), [Seam.of(line) for line in self.seams.lines])
         layout = built(self.layout, target).with_edges(method.edges_a_span)
         shortest = min(map(min, (layout.spacing, *(p.spacing for p in self.seams.patches if p.spacing is not None))))

@@ -6,25 +6,29 @@ What the keys of a case do not describe, such as a target that is a Python funct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from math import fmod, tau
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from numpy.typing import ArrayLike
 
 from rodshell.case.case import Case
 from rodshell.case.held import Held
 from rodshell.case.rod_ends import RodEnds
+from rodshell.case.rod_tables import RodTable
+from rodshell.case.stage_tables import PopUpTable
 from rodshell.case.target_tables import HeldTarget
 from rodshell.formfinding import Bound, Fall, Method
 from rodshell.formfinding.patches import PatchLayout
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.search import Objective
-from rodshell.joints import Joint, joint_parameters
+from rodshell.joints import Joint
 from rodshell.layout import GridLayout
 from rodshell.output.options import OutputOptions
+from rodshell.rods.joints import JointKind
 from rodshell.rods.section import Rod
-from rodshell.schema import read
+from rodshell.schema import kind_of, read
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
+from rodshell.validation import either, instance
 
 Auto = Literal["auto"]
 Point = tuple[float, float]
@@ -51,7 +55,6 @@ def case_of(
     given: dict[str, Any] = {
         "layout": _layout_keys(layout, heading),
         "rod": rod.parameters(),
-        "joint": _joint_keys(joint),
         "drape": _drape_keys(method, anchor, objective),
         "pop_up": {"ends": ends[0] if len(ends) == 1 else "both"},
         "seams": {
@@ -67,24 +70,20 @@ def case_of(
     held = {
         "layout": _held_layout(layout, heading),
         "rod": None if case.rod.build() == rod else Held(rod, f"the rod {rod}"),
-        "joint": _held_joint(joint),
         "drape": _held_method(case.drape.build(), method),
         "pop_up": None if ends else Held((), "a grid that is not popped up", writable=True, note=NOT_POPPED_UP),
     }
     tables = {name: replace(getattr(case, name), held=found) for name, found in held.items()}
     if unknown:
         tables["target"] = HeldTarget(kind="python", held=Held(target, unknown, by_value=False))
-    return replace(case, **tables)
+    return replace(case, joint=_of_a_kind(joint), **tables)
 
 
 def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint) -> Case:
     """The case of rods that a table gives by where their ends lie flat and in the end."""
-    given: dict[str, Any] = {"joint": _joint_keys(joint), "pop_up": {"ends": "pinned"}}
-    if rod is not None:
-        given["rod"] = rod.parameters()
-    case = read(Case, given)
     target = HeldTarget(kind="table", held=Held(ends, f"a table of {len(ends.final)} rods"))
-    return replace(case, target=target, joint=replace(case.joint, held=_held_joint(joint)))
+    table = RodTable() if rod is None else read(RodTable, rod.parameters())
+    return Case(target=target, rod=table, joint=_of_a_kind(joint), pop_up=PopUpTable(ends="pinned"))
 
 
 def tables_of(options: OutputOptions) -> dict[str, Any]:
@@ -93,17 +92,10 @@ def tables_of(options: OutputOptions) -> dict[str, Any]:
     return {name: getattr(case, name) for name in given}
 
 
-def _joint_keys(joint: Joint) -> dict[str, object]:
-    """[joint] without the rod of linkers, which no key describes."""
-    keys = joint_parameters(joint)
-    keys.pop("rod", None)
-    return keys
-
-
-def _held_joint(joint: Joint) -> Held | None:
-    """Linkers of a rod of their own."""
-    described = getattr(joint, "rod", None) is None
-    return None if described else Held(joint, "joints with linkers of another rod")
+def _of_a_kind(joint: Joint) -> JointKind:
+    """The joint, if it is of a kind that cases have."""
+    instance("joint", joint, JointKind, f"of kind {either([kind_of(kind) for kind in get_args(JointKind)])}")
+    return joint  # type: ignore[return-value]
 
 
 def _without_keys(shape: Mapping[str, object]) -> str:

@@ -1,4 +1,4 @@
-"""The tables of rods, whose section or material may be left to the target, and of joints, one for each kind."""
+"""The table of rods, whose section or material may be left to the target."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from rodshell.case.held import Holding
 from rodshell.errors import InputError
-from rodshell.quantities import Angle, Corners, Distance, Length, LengthOrAuto, Mass, Stiffness
+from rodshell.quantities import Length, LengthOrAuto
 from rodshell.rods import section as sections
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Ellipse, GivenSection, RectangularSection, Rod
-from rodshell.schema import written
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
-    from rodshell.joints import Joint
 UNSIZED = 1.0  # m, in place of a radius that is still to be found
 
 
@@ -107,52 +105,3 @@ class RodTable(Holding):
         section = self._section
         round_one = isinstance(section, sections.Circle | sections.Tube) and self.section.kind != "auto"
         return section if round_one else None  # type: ignore[return-value]
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointTable(Holding):
-    """Keys of every joint; its class has the same name."""
-
-    kind: ClassVar[str]
-    mass: Annotated[Mass, "mass of one joint: its bolt, coupler or clamp"] = 0.0
-
-    def build(self) -> "Joint":
-        """The joint."""
-        from rodshell import joints
-
-        keys = {name: getattr(self, name) for name in written(self) if name != "kind"}
-        joint: Joint = getattr(joints, type(self).__name__)(**keys)
-        return joint
-
-
-class Ball(JointTable):
-    kind = "ball"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Pin(JointTable):
-    kind = "pin"
-    eccentricity: Annotated[Distance, "distance between the two rods' centre lines at a joint"] = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rigid(Pin):
-    kind = "rigid"
-    rest_angle: Annotated[Angle | None, "angle between the rods at rest; default: as in the flat grid"] = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Spring(Rigid):
-    kind = "spring"
-    shear: Annotated[Stiffness, "stiffness of the joint about its normal"] = 0.0
-    out_of_plane: Annotated[Stiffness, "stiffness of a corner across its bisector"] = 0.0
-    twist: Annotated[Stiffness, "stiffness of a corner about its bisector"] = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Linker(JointTable):
-    kind = "linker"
-    corners: Annotated[Corners, "corners of a crossing that have a linker: 2 as in the paper, or 4"] = 2
-
-
-JointKinds = Ball | Pin | Spring | Linker | Rigid

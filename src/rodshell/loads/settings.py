@@ -1,18 +1,16 @@
 """What decides a check under loads, except the loads: bracing, locked joints, stability, strength."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from rodshell.errors import InputError
 from rodshell.quantities import Distance, Factor, Force, Share, SlipMoment, Stiffness, Stress, Value, Whole
 from rodshell.rods.design_strength import DURATIONS, Duration
+from rodshell.rods.joints import Joint, Pin
 from rodshell.rods.section import Rod
 from rodshell.schema import Inline, checked
 from rodshell.units import read_quantity, shown
 from rodshell.validation import brief, instance, positive, whole
-
-if TYPE_CHECKING:
-    from rodshell.joints import Joint
 
 AcrossOpenings = Literal["refuse", "leave out"]
 
@@ -117,9 +115,9 @@ class LockedJoints:
         if self.shear == 0:
             raise InputError("locked joints without shear stiffness are free: give one, or leave locked_joints out")
 
-    def require_pins(self, joint: "Joint") -> None:
+    def require_pins(self, joint: Joint) -> None:
         """Raise InputError where joints of a kind cannot be locked."""
-        if joint.name != "pin":
+        if not isinstance(joint, Pin):
             raise InputError(
                 f"locked_joints: {joint.name} joints cannot be locked: pins are free about their normal until they are "
                 'tightened: set joint.kind = "pin", or leave locked_joints out'
