@@ -25,7 +25,8 @@ if TYPE_CHECKING:
         RodshellError,
         StabilityError,
     )
-    from rodshell.fabrication import Fabrication, fabricate
+    from rodshell.fabrication.fabricate import fabricate
+    from rodshell.fabrication.settings import Fabrication
     from rodshell.form import Form, check_loads
     from rodshell.formfinding import (
         Agreement,
@@ -97,7 +98,8 @@ _HOMES = {
         "ConvergenceError", "InputError", "NetLimitError", "OutOfTimeError", "OutputError", "RodshellError",
         "StabilityError",
     ),
-    "rodshell.fabrication": ("Fabrication", "fabricate"),
+    "rodshell.fabrication.fabricate": ("fabricate",),
+    "rodshell.fabrication.settings": ("Fabrication",),
     "rodshell.form": ("Form", "check_loads"),
     "rodshell.formfinding": (
         "Agreement", "Bound", "Boundary", "Draped", "Fall", "Footprint", "Gravity", "PopUp", "Trimmed", "agreement",

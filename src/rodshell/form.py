@@ -17,7 +17,7 @@ from rodshell.checks import Checks, check
 from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
 from rodshell.errors import ConvergenceError, InputError
-from rodshell.fabrication import Fabricated, fabricate
+from rodshell.fabrication.fabricate import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
 from rodshell.formfinding.patches import MergedPopUp, PatchedForm
 from rodshell.formfinding.popup import Ends

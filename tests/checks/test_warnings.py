@@ -8,7 +8,8 @@ import pytest
 import rodshell as rs
 from rodshell.checks import Bending, Checks, bending
 from rodshell.checks.deployment import Deployment
-from rodshell.fabrication import Fabrication, fabricate
+from rodshell.fabrication.fabricate import fabricate
+from rodshell.fabrication.settings import Fabrication
 from rodshell.results import Results
 from rodshell.results.from_checks import checked_results
 from rodshell.results.records import PopUp, Rod

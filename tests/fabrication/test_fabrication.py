@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rodshell as rs
-from rodshell.fabrication import Fabrication, fabricate, nest, splices
+from rodshell.fabrication.cutting import nest, splices
+from rodshell.fabrication.fabricate import fabricate
+from rodshell.fabrication.settings import Fabrication
 from rodshell.layout import FlatGrid, Profile, mesh_grid, straight_rods
 from rodshell.layout.flatgrid import layers
 from rodshell.layout.gridlayout import GridLayout

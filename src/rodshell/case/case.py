@@ -13,7 +13,6 @@ from rodshell.case.stage_tables import (
     ChecksTable,
     DrapeTable,
     DrawingsTable,
-    FabricationTable,
     LayoutTable,
     PopUpTable,
     RefineTable,
@@ -21,6 +20,7 @@ from rodshell.case.stage_tables import (
 )
 from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
+from rodshell.fabrication.settings import Fabrication
 from rodshell.loads.settings import LockedJoints, Stability, Strength
 from rodshell.progress import Progress, silent
 from rodshell.rods.joints import Ball, JointKind
@@ -75,7 +75,7 @@ class Case:
     refine: RefineTable = field(default_factory=RefineTable)
     seams: SeamsTable = field(default_factory=SeamsTable)
     checks: ChecksTable = field(default_factory=ChecksTable)
-    fabrication: FabricationTable = field(default_factory=FabricationTable)
+    fabrication: Fabrication = field(default_factory=Fabrication)
     drawings: DrawingsTable = field(default_factory=DrawingsTable)
     loads: LoadRows = ()
     combinations: CombinationRows = ()
@@ -315,7 +315,6 @@ class Case:
         ------
         InputError : a value cannot be used.
         """
-        from rodshell.fabrication import Fabrication
         from rodshell.output.options import DrawingStyle, OutputOptions
 
         style = written(self.drawings)
@@ -323,7 +322,7 @@ class Case:
         return OutputOptions(
             self.checks.strength,
             self.checks.stages,
-            Fabrication(**written(self.fabrication)),
+            self.fabrication,
             DrawingStyle(**style),
             rod_chosen=self.rod.left_open,
             shear_strength=self.checks.shear_strength,

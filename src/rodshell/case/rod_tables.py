@@ -9,7 +9,7 @@ from rodshell.errors import InputError
 from rodshell.quantities import Length, LengthOrAuto
 from rodshell.rods import section as sections
 from rodshell.rods.materials import Material
-from rodshell.rods.section import Ellipse, GivenSection, RectangularSection, Rod
+from rodshell.rods.section import GivenSection, Rod, Sized
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
@@ -39,16 +39,11 @@ class Tube:
     thickness: Annotated[Length, "thickness of the tube's wall"]
 
 
-SectionKinds = AutoSection | Circle | Tube | Ellipse | RectangularSection | GivenSection
-
-
 @dataclass(frozen=True, kw_only=True)
 class RodTable(Holding):
     """Section and material; what is left out, or "auto", is chosen to fit the target."""
 
-    section: AutoSection | Circle | Tube | Ellipse | RectangularSection | GivenSection = field(
-        default_factory=AutoSection
-    )
+    section: AutoSection | Circle | Tube | Sized | GivenSection = field(default_factory=AutoSection)
     material: Material | None = None
 
     @classmethod
@@ -94,7 +89,7 @@ class RodTable(Holding):
     def _section(self) -> sections.Section | GivenSection:
         """The section; one whose radius is still to be found has `UNSIZED`."""
         section = self.section
-        if isinstance(section, Ellipse | RectangularSection | GivenSection):
+        if isinstance(section, Sized | GivenSection):
             return section
         radius = UNSIZED if isinstance(section.radius, str) else section.radius
         return sections.Tube(radius, section.thickness) if isinstance(section, Tube) else sections.Circle(radius)

@@ -1,4 +1,4 @@
-"""The tables of a case's stages: layout, drape, pop-up, seams, checks, fabrication and drawings."""
+"""The tables of a case's stages: layout, drape, pop-up, seams, checks and drawings."""
 
 from dataclasses import dataclass, field, fields
 from math import pi
@@ -12,7 +12,6 @@ from rodshell.quantities import (
     Angle,
     AngleOrAuto,
     AngleStiffness,
-    Coordinate,
     Counts,
     Duration,
     FileToRead,
@@ -230,13 +229,6 @@ class ChecksTable:
     shear_strength: Annotated[Stress | None, "shear strength along the fibres; default: a preset's, or von Mises"] = (
         None
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class FabricationTable:
-    end_allowance: Annotated[Coordinate, "length added to each end of a rod, for its support"] = 0.0
-    stock_length: Annotated[Length | None, "length of the bars that rods are cut from; default: no limit"] = None
-    kerf: Annotated[Coordinate, "width of a saw cut; needs stock_length"] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rodshell.checks.bending import VON_MISES, require_known_stress
 from rodshell.checks.check import MOST_STAGES
 from rodshell.errors import InputError
-from rodshell.fabrication import Fabrication
+from rodshell.fabrication.settings import Fabrication
 from rodshell.joints import Joint
 from rodshell.loads.strength import Limits
 from rodshell.output.drawing import FORBIDDEN, LAYERS

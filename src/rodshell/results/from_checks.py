@@ -13,7 +13,7 @@ from rodshell.checks import Contact as ContactCheck
 from rodshell.checks import OtherShape as FoundShape
 from rodshell.checks import OtherShapes as ShapeSearch
 from rodshell.checks import Reactions as SupportReactions
-from rodshell.fabrication import Fabricated
+from rodshell.fabrication.fabricate import Fabricated
 from rodshell.layout import GridMesh
 from rodshell.loads.strength import Limits
 from rodshell.results.laths import lath_name

@@ -215,7 +215,8 @@ class GivenSection:
         checked(self)
 
 
-Section = Circle | Tube | Ellipse | RectangularSection
+Sized = Ellipse | RectangularSection
+Section = Circle | Tube | Sized
 SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 
 
