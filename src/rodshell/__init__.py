@@ -45,7 +45,6 @@ if TYPE_CHECKING:
         trim,
     )
     from rodshell.formfinding.dynamic_pop_up import DynamicPopUp, DynamicPopUpSettings, dynamic_pop_up
-    from rodshell.formfinding.patches import PatchLayout
     from rodshell.formfinding.search import search
     from rodshell.job import Job, find_form, pop_up_table, refine
     from rodshell.joints import (
@@ -90,6 +89,7 @@ if TYPE_CHECKING:
         heights_from,
         surface_from,
     )
+    from rodshell.targets.patch_layout import PatchLayout
     from rodshell.version import __version__
 
 _HOMES = {
@@ -106,7 +106,6 @@ _HOMES = {
         "drape", "map_back", "pop_up", "trim",
     ),
     "rodshell.formfinding.dynamic_pop_up": ("DynamicPopUp", "DynamicPopUpSettings", "dynamic_pop_up"),
-    "rodshell.formfinding.patches": ("PatchLayout",),
     "rodshell.progress": ("bar",),
     "rodshell.formfinding.search": ("search",),
     "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
@@ -132,6 +131,7 @@ _HOMES = {
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
     ),
+    "rodshell.targets.patch_layout": ("PatchLayout",),
     "rodshell.version": ("__version__",),
 }  # fmt: skip
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

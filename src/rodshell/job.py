@@ -21,7 +21,6 @@ from rodshell.errors import InputError, OutOfMemoryError
 from rodshell.form import Form
 from rodshell.formfinding import Bound, Method
 from rodshell.formfinding.methods import require_method
-from rodshell.formfinding.patches import PatchLayout
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
@@ -32,6 +31,7 @@ from rodshell.results.folder import reading
 from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run, inputs_of
 from rodshell.targets import Target
+from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import length_text, shown
 from rodshell.validation import (
     array,

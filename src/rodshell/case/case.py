@@ -216,7 +216,8 @@ class Case:
         joint, method = self.joint, built(self.drape)
         target = cut_at(target or built(self.target), [Seam.of(line) for line in self.seams.lines])
         layout = built(self.layout, target).with_edges(method.edges_a_span)
-        shortest = min(map(min, (layout.spacing, *(p.spacing for p in self.seams.patches if p.spacing is not None))))
+        spacings = [row.layout.spacing for row in self.seams.patches if row.layout.spacing is not None]
+        shortest = min(map(min, (layout.spacing, *spacings)))
         self._require_stock(shortest)
         self._require_allowance(target)
         loads = self.built_loads()

@@ -4,7 +4,7 @@ What the keys of a case do not describe, such as a target that is a Python funct
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from math import fmod, tau
 from typing import Any, Literal, get_args
 
@@ -17,7 +17,6 @@ from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import PopUpTable
 from rodshell.case.target_tables import HeldTarget
 from rodshell.formfinding import Bound, Fall, Method
-from rodshell.formfinding.patches import PatchLayout
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Joint
@@ -25,9 +24,10 @@ from rodshell.layout import GridLayout
 from rodshell.output.options import OutputOptions
 from rodshell.rods.joints import JointKind
 from rodshell.rods.section import Rod
-from rodshell.schema import kind_of, read
+from rodshell.schema import kind_of, read, written
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
+from rodshell.targets.patch_layout import PatchLayout
 from rodshell.validation import either, instance
 
 Auto = Literal["auto"]
@@ -59,7 +59,7 @@ def case_of(
         "pop_up": {"ends": ends[0] if len(ends) == 1 else "both"},
         "seams": {
             "lines": [Seam.of(line).points.tolist() for line in seams],
-            "patches": [{"name": name, **_given(patch)} for name, patch in patches.items()],
+            "patches": [{"name": name, **written(patch)} for name, patch in patches.items()],
         },
         **options.parameters(),
     }
@@ -147,10 +147,6 @@ def _held_method(described: Method, method: Method) -> Held | None:
     if replace(described, stream=method.stream, every=method.every) == method:
         return Held(method, "a fall whose frames are kept in a folder", writable=True)
     return Held(method, "a fall with options that only Python has")
-
-
-def _given(patch: PatchLayout) -> dict[str, object]:
-    return {key: value for key, value in asdict(patch).items() if value is not None}
 
 
 def _within_a_turn(angle: float) -> float:

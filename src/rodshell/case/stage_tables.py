@@ -19,7 +19,6 @@ from rodshell.quantities import (
     IsoDate,
     Length,
     LengthOrAuto,
-    Lengths,
     LengthsOrAuto,
     Names,
     NodeStiffness,
@@ -34,12 +33,12 @@ from rodshell.quantities import (
     Whole,
     words,
 )
-from rodshell.schema import Rows
+from rodshell.schema import Inline, Rows
+from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import rounded_down, shown
 
 if TYPE_CHECKING:
     from rodshell.formfinding.methods import Method
-    from rodshell.formfinding.patches import PatchLayout
     from rodshell.layout import GridLayout
     from rodshell.refining.variables import Family
     from rodshell.targets import Target
@@ -177,18 +176,9 @@ class RefineTable:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PatchTable:
-    """What a patch has of its own."""
-
+class NamedPatch:
     name: Annotated[str, "name of the patch: A, B, ... from left to right"]
-    anchor: Annotated[Point | None, "point x,y where its axes cross; default: its middle"] = None
-    rotate: Annotated[Angle | None, "angle of its grid, seen from above; default: that of the whole grid"] = None
-    spacing: Annotated[Lengths | None, "distance between neighbouring rods: one length, or u,v"] = None
-
-    def build(self) -> "PatchLayout":
-        from rodshell.formfinding.patches import PatchLayout
-
-        return PatchLayout(self.anchor, self.rotate, self.spacing)
+    layout: Annotated[PatchLayout, Inline]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +187,7 @@ class SeamsTable:
     file: Annotated[FileToRead | None, "OBJ, DXF or 3dm file with such lines"] = None
     unit: Annotated[Unit, "unit of that file, such as mm; a 3dm file states its own"] = 1.0
     patches: Annotated[
-        tuple[PatchTable, ...],
+        tuple[NamedPatch, ...],
         Rows("patch", '[{ name = "B", rotate = "10 deg" }]'),
         "overrides for patches, by name; in a case file only",
     ] = ()
@@ -208,7 +198,7 @@ class SeamsTable:
         if self.patches and not self.lines:
             raise InputError("seams.patches needs seams: give seams.lines or seams.file, or leave it out")
 
-    def patch_layouts(self) -> "dict[str, PatchLayout]":
+    def patch_layouts(self) -> dict[str, PatchLayout]:
         """What patches have of their own, by name.
 
         Raises
@@ -219,7 +209,7 @@ class SeamsTable:
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"seams.patches has patch {shown(name)} twice: put all that it has in one table")
-        return {patch.name: patch.build() for patch in self.patches}
+        return {patch.name: patch.layout for patch in self.patches}
 
 
 @dataclass(frozen=True, kw_only=True)
