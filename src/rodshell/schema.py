@@ -115,6 +115,11 @@ class Field:
         """The classes by their kinds, where there are several."""
         return {kind_of(table): table for table in self.tables} if len(self.tables) > 1 else {}
 
+    @property
+    def wanted(self) -> str:
+        """What the key of a table, or of tables in a row, must hold."""
+        return f"give tables in a case file, such as {self.rows.example}" if self.rows else "must be a table"
+
     def chosen(self, given: Any) -> type | None:
         """The class that a table becomes; None: none has its kind."""
         kind = given.get("kind") if self.by_kind and isinstance(given, Mapping) else None
@@ -321,8 +326,10 @@ def _value(field: Field, given: Any, place: Place, files: Files | None) -> Any:
     name = place.name(field.name)
     if given is None and field.optional:
         return None
+    if field.rows and not isinstance(given, list | tuple):
+        raise InputError(f"{name} = {shown(given)}: {field.wanted}")
     if field.rows:
-        return tuple(_row_of(field, inside, within, files) for within, inside in _rows(field, given, name, place))
+        return tuple(_one_table(field, inside, within, files) for within, inside in _tables_in(field, given, place))
     if field.tables:
         left_out = field.optional and isinstance(given, Mapping) and not _says_something(given)
         return None if left_out else _one_table(field, given, place.inside(field.name), files)
@@ -346,7 +353,7 @@ def _value(field: Field, given: Any, place: Place, files: Files | None) -> Any:
 
 def _one_table(field: Field, given: Any, place: Place, files: Files | None) -> Any:
     if not isinstance(given, Mapping):
-        raise InputError(f"{place.name()} = {shown(given)}: must be a table")
+        raise InputError(f"{place.name()} = {shown(given)}: {field.wanted}")
     chosen = field.chosen(given)
     if chosen is None:
         name = place.name("kind")
@@ -354,20 +361,6 @@ def _one_table(field: Field, given: Any, place: Place, files: Files | None) -> A
             raise InputError(f"{name} is missing: give {either(list(field.by_kind))}")
         raise InputError(not_a_choice(name, given["kind"], list(field.by_kind)))
     return _read(chosen, given, place, files)
-
-
-def _rows(field: Field, given: Any, name: str, place: Place) -> Iterable[tuple[Place, Any]]:
-    assert field.rows is not None
-    if not isinstance(given, list | tuple):
-        raise InputError(f"{name} = {shown(given)}: give tables in a case file, such as {field.rows.example}")
-    return _tables_in(field, given, place)
-
-
-def _row_of(field: Field, given: Any, place: Place, files: Files | None) -> Any:
-    assert field.rows is not None
-    if not isinstance(given, Mapping):
-        raise InputError(f"{place.name()} = {shown(given)}: give tables in a case file, such as {field.rows.example}")
-    return _one_table(field, given, place, files)
 
 
 def read_value(hint: Any, given: object) -> Any:

@@ -266,15 +266,21 @@ def _read_seams(table: Raw, files: Callable[[object], str] | None) -> None:
         return
     from rodshell.targets.curve_files import read_lines  # here, as most cases have no such file
 
+    unit = _value_of(Unit, "seams.unit", table.pop("unit", 1.0))
+    given = _value_of(Polylines, "seams.lines", table.get("lines", ()))
     try:
-        path = file_path("the file", name if files is None else files(name))
-        drawn = read_lines(path, read_value(Unit, table.get("unit", 1.0)))
-        given = read_value(Polylines, table.get("lines", ()))
-    except ValueError as reason:
+        drawn = read_lines(file_path("the file", name if files is None else files(name)), unit)
+    except InputError as reason:
         raise InputError(f"seams.file = {shown(name)}: {reason}") from None
     del table["file"]
-    table.pop("unit", None)
     table["lines"] = [*given, *(line[:, :2].tolist() for line in drawn)]
+
+
+def _value_of(hint: Any, key: str, given: object) -> Any:
+    try:
+        return read_value(hint, given)
+    except ValueError as reason:
+        raise InputError(f"{key} = {shown(given)}: {reason}") from None
 
 
 def _found_table(raw: Raw, path: str) -> Raw:

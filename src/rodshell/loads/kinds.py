@@ -70,11 +70,9 @@ class Snow:
 
     Parameters
     ----------
-    value : of the plan [N/m2].
     distribution : "uniform"; "half": on the half of the plan that lies towards `direction`, none on the other;
         "drifted": on both halves a triangle, from 0 at the edge and the middle to the value at the quarter towards
         `direction`, to half of it at the other quarter, as the drifted load of cylindrical roofs [EN 1991-1-3, 5.3.5].
-    direction : towards which the snow lies or is blown, in plan from the x axis [rad].
     """
 
     kind: ClassVar = "snow"
@@ -120,10 +118,8 @@ class Wind:
 
     Parameters
     ----------
-    value : velocity pressure [N/m2].
     coefficient : pressure coefficient, positive towards the surface from above: a number, or a formula in x along the
         wind and y across it, from the middle of the plan's extent in both [m], such as "-1.2 + 0.1*x".
-    direction : in which it blows, in plan from the x axis [rad].
     """
 
     kind: ClassVar = "wind"

@@ -68,9 +68,8 @@ class Laths:
     Parameters
     ----------
     rod : section and material; None: those of the grid's rods.
-    pattern : "one" diagonal of every cell, "both", or "every = n": lines of both through every n-th joint.
-    eccentricity : distance of their centre lines from those of the outer rods [m]; 0: they share the joints' nodes.
-    across_openings : as of `Cables`.
+    pattern, across_openings : as of `Cables`.
+    eccentricity : 0: they share the joints' nodes.
     """
 
     kind: ClassVar = "laths"
@@ -100,9 +99,6 @@ class LockedJoints:
     slip : moment about the normal that it transfers before it slips [N m]; None: not known. With `Strength.slip` both
         count together.
 
-    Raises
-    ------
-    InputError : a value is not positive.
     """
 
     shear: Annotated[Stiffness, "stiffness about the normal of pins tightened after erection"]
@@ -189,9 +185,7 @@ class Strength:
     permanent, long, medium, short, instantaneous : design strength in bending for loads that act so long [Pa]. Given
         ones stand in place of all of the preset's; one that is missing is that of the next longer duration.
     erection : the same while the shell is erected [Pa]; None: the short one.
-    service_class : of timber: 1 inside, 2 covered, 3 in the weather; None: 2.
-    slip : axial force that a joint can transfer between its rods [N]; None: not known.
-    effective_length : of a span between joints, over its length, for its Euler load [-].
+    effective_length : for the Euler load of a span.
     """
 
     permanent: Annotated[Stress | None, "design strength under permanent loads; default: a preset's"] = None
