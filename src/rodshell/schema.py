@@ -146,13 +146,6 @@ def _fields_of(table: Any) -> tuple[Field, ...]:
 fields_of: Callable[[Any], tuple[Field, ...]] = cache(_fields_of)
 
 
-def without_keys(table: Any) -> dict[str, tuple[NoKey, Any]]:
-    """The fields of a class that Python alone can give, with their defaults."""
-    hints = get_type_hints(table, include_extras=True)
-    marks = {each: [mark for mark in _flat(hints[each.name])[1] if isinstance(mark, NoKey)] for each in fields(table)}
-    return {each.name: (found[0], _default(each)) for each, found in marks.items() if found}
-
-
 def _default(field: Any) -> Any:
     return field.default_factory() if field.default_factory is not MISSING else field.default
 
@@ -393,7 +386,9 @@ def written(record: Any, *, changed: bool = False) -> dict[str, Any]:
 
 def undescribed(record: Any) -> str:
     """What an object is that no keys describe; "" where they do."""
-    for name, (mark, default) in without_keys(type(record)).items():
-        if getattr(record, name) != default:
-            return mark.what
+    hints = get_type_hints(type(record), include_extras=True)
+    for each in fields(record):
+        marks = [mark for mark in _flat(hints[each.name])[1] if isinstance(mark, NoKey)]
+        if marks and getattr(record, each.name) != _default(each):
+            return marks[0].what
     return ""
