@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from rodshell.case.held import Holding
 from rodshell.errors import InputError
 from rodshell.quantities import Length, LengthOrAuto
-from rodshell.rods import section as sections
 from rodshell.rods.materials import Material
-from rodshell.rods.section import GivenSection, Rod, Sized
+from rodshell.rods.section import Circle, GivenSection, Rod, Section, Sized, Tube
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
@@ -25,7 +24,9 @@ class AutoSection:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Circle:
+class OpenCircle:
+    """A circle whose radius may be left to the target."""
+
     kind: ClassVar = "circle"
     radius: Annotated[
         LengthOrAuto, 'radius (of a tube: outer), or "auto": from the bends on the target'
@@ -33,7 +34,9 @@ class Circle:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tube:
+class OpenTube:
+    """A tube whose radius may be left to the target."""
+
     kind: ClassVar = "tube"
     radius: Annotated[LengthOrAuto, "outer radius"] = "auto"
     thickness: Annotated[Length, "thickness of the tube's wall"]
@@ -43,7 +46,7 @@ class Tube:
 class RodTable(Holding):
     """Section and material; what is left out, or "auto", is chosen to fit the target."""
 
-    section: AutoSection | Circle | Tube | Sized | GivenSection = field(default_factory=AutoSection)
+    section: AutoSection | OpenCircle | OpenTube | Sized | GivenSection = field(default_factory=AutoSection)
     material: Material | None = None
 
     @classmethod
@@ -86,17 +89,17 @@ class RodTable(Holding):
         return Rod(room.section(material, strength=withstood, shape=self.shape), material)
 
     @property
-    def _section(self) -> sections.Section | GivenSection:
+    def _section(self) -> Section | GivenSection:
         """The section; one whose radius is still to be found has `UNSIZED`."""
         section = self.section
         if isinstance(section, Sized | GivenSection):
             return section
         radius = UNSIZED if isinstance(section.radius, str) else section.radius
-        return sections.Tube(radius, section.thickness) if isinstance(section, Tube) else sections.Circle(radius)
+        return Tube(radius, section.thickness) if isinstance(section, OpenTube) else Circle(radius)
 
     @property
-    def shape(self) -> "sections.Circle | sections.Tube | None":
+    def shape(self) -> "Circle | Tube | None":
         """The circle or tube of which only the radius is looked for; None: of any shape that is sold."""
         section = self._section
-        round_one = isinstance(section, sections.Circle | sections.Tube) and self.section.kind != "auto"
+        round_one = isinstance(section, Circle | Tube) and self.section.kind != "auto"
         return section if round_one else None  # type: ignore[return-value]
