@@ -25,7 +25,8 @@ if TYPE_CHECKING:
         RodshellError,
         StabilityError,
     )
-    from rodshell.fabrication import Fabrication, fabricate
+    from rodshell.fabrication.fabricate import fabricate
+    from rodshell.fabrication.settings import Fabrication
     from rodshell.form import Form, check_loads
     from rodshell.formfinding import (
         Agreement,
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
         trim,
     )
     from rodshell.formfinding.dynamic_pop_up import DynamicPopUp, DynamicPopUpSettings, dynamic_pop_up
-    from rodshell.formfinding.patches import PatchLayout
     from rodshell.formfinding.search import search
     from rodshell.formfinding.settle import settle
     from rodshell.job import Job, find_form, pop_up_table, refine
@@ -59,12 +59,9 @@ if TYPE_CHECKING:
         Spring,
     )
     from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, Profile, mesh_grid, straight_rods
-    from rodshell.loads.bracing import Cables
-    from rodshell.loads.combinations import Loads, Stability
+    from rodshell.loads.combinations import Loads
     from rodshell.loads.kinds import LineLoad, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
-    from rodshell.loads.laths import Laths
-    from rodshell.loads.locked_joints import LockedJoints
-    from rodshell.loads.strength import Strength
+    from rodshell.loads.settings import Cables, Laths, LockedJoints, Stability, Strength
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -94,6 +91,7 @@ if TYPE_CHECKING:
         heights_from,
         surface_from,
     )
+    from rodshell.targets.patch_layout import PatchLayout
     from rodshell.version import __version__
 
 _HOMES = {
@@ -102,26 +100,23 @@ _HOMES = {
         "ConvergenceError", "InputError", "NetLimitError", "OutOfTimeError", "OutputError", "RodshellError",
         "StabilityError",
     ),
-    "rodshell.fabrication": ("Fabrication", "fabricate"),
+    "rodshell.fabrication.fabricate": ("fabricate",),
+    "rodshell.fabrication.settings": ("Fabrication",),
     "rodshell.form": ("Form", "check_loads"),
     "rodshell.formfinding": (
         "Agreement", "Bound", "Boundary", "Draped", "Fall", "Footprint", "Gravity", "PopUp", "Trimmed", "agreement",
         "drape", "map_back", "pop_up", "trim",
     ),
     "rodshell.formfinding.dynamic_pop_up": ("DynamicPopUp", "DynamicPopUpSettings", "dynamic_pop_up"),
-    "rodshell.formfinding.patches": ("PatchLayout",),
     "rodshell.progress": ("bar",),
     "rodshell.formfinding.search": ("search",),
     "rodshell.formfinding.settle": ("settle",),
     "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
-    "rodshell.loads.bracing": ("Cables",),
-    "rodshell.loads.combinations": ("Loads", "Stability"),
+    "rodshell.loads.combinations": ("Loads",),
+    "rodshell.loads.settings": ("Cables", "Laths", "LockedJoints", "Stability", "Strength"),
     "rodshell.loads.kinds": ("LineLoad", "PointLoad", "SelfWeight", "Settlement", "Snow", "Temperature", "Wind"),
-    "rodshell.loads.laths": ("Laths",),
-    "rodshell.loads.locked_joints": ("LockedJoints",),
-    "rodshell.loads.strength": ("Strength",),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
@@ -140,6 +135,7 @@ _HOMES = {
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
     ),
+    "rodshell.targets.patch_layout": ("PatchLayout",),
     "rodshell.version": ("__version__",),
 }  # fmt: skip
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -12,11 +12,12 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.case import Case
+from rodshell.case.from_objects import tables_of
 from rodshell.checks import Checks, check
 from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
 from rodshell.errors import ConvergenceError, InputError
-from rodshell.fabrication import Fabricated, fabricate
+from rodshell.fabrication.fabricate import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
 from rodshell.formfinding.patches import MergedPopUp, PatchedForm
 from rodshell.formfinding.popup import Ends
@@ -255,9 +256,7 @@ class Form:
         instance("options", options, OutputOptions)
         same = options.stages == self.options.stages and self._weight(options) == self._weight(self.options)
         known = self.known_checks if same else None
-        asked = Case.model_validate(options.parameters())
-        tables = {name: getattr(asked, name) for name in ("checks", "fabrication", "drawings")}
-        case = self.case.model_copy(update=tables)
+        case = replace(self.case, **tables_of(options))
         loaded = self.known_loaded if same and options.strength == self.options.strength else None
         return replace(
             self, case=case, options=options, _known_checks=known, _known_fabrication=None, _known_loaded=loaded
@@ -405,7 +404,7 @@ class Form:
         results = self.results()
         if isinstance(self.stages, PatchedForm):
             results = with_seam_forces(results, self.stages, checks)
-        mesh, asked = self.footprint.mesh, self.case.strength.build()
+        mesh, asked = self.footprint.mesh, self.case.strength
         results = checked_results(
             results, mesh, checks, self.fabrication,
             limits=self.options.limits(self.rod, asked), net=net_factors(mesh, self.rod.section, asked.hole),

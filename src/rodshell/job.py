@@ -5,6 +5,7 @@ The command line, a studio, a sweep or a script load or make a `Job`, change it,
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Literal, Self, get_args
@@ -13,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.case import Case, load_case
-from rodshell.case.case import built
 from rodshell.case.from_objects import case_of, case_of_rod_ends
 from rodshell.case.load import changed_case, flattened, is_described, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
@@ -21,7 +21,6 @@ from rodshell.errors import InputError, OutOfMemoryError
 from rodshell.form import Form
 from rodshell.formfinding import Bound, Method
 from rodshell.formfinding.methods import require_method
-from rodshell.formfinding.patches import PatchLayout
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
@@ -32,6 +31,7 @@ from rodshell.results.folder import reading
 from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run, inputs_of
 from rodshell.targets import Target
+from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import length_text, shown
 from rodshell.validation import (
     array,
@@ -190,11 +190,11 @@ class Job:
         changes = _changes(overrides, more)
         require_keys_of_rods(changes)
         ends, case = _ends_and_case(source, unit, changes)
-        given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
+        given = case_of_rod_ends(ends, rod, joint or case.joint)
         tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
         if not (case.drawings.name or isinstance(source, RodEnds)):
-            tables["drawings"] = case.drawings.model_copy(update={"name": Path(source).resolve().stem})
-        return cls.of_case(given.model_copy(update=tables | ({} if rod is not None else {"rod": case.rod})))
+            tables["drawings"] = replace(case.drawings, name=Path(source).resolve().stem)
+        return cls.of_case(replace(given, **tables, rod=case.rod if rod is None else given.rod))
 
     def changed(self, overrides: Mapping[str, object] | None = None, /, **more: object) -> Self:
         """The same job with some keys changed: `job.changed(layout__rotate="10 deg")`; arguments as of `load`.

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rodshell.case import Case
-from rodshell.case.case import Built, built
+from rodshell.case.case import Built
+from rodshell.case.held import built
 from rodshell.case.rod_ends import RodEnds
 from rodshell.checks.sizing import Fit, require_likely_sizes
 from rodshell.errors import OutOfTimeError
@@ -180,7 +181,7 @@ class Run:
         stages = earlier.stages if earlier is not None else None
         if isinstance(stages, PatchForm) and "pop-up" in self._unchanged(case) and stages.finished_pop_ups(stages.ends):
             return stages
-        joint = built(case.joint)
+        joint = case.joint
         return pop_up_stages(ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress)
 
     def _stages(self, case: Case, found: Built, rod: Rod) -> Stages:

@@ -276,6 +276,11 @@ def _mistyped(unit: str, names: Iterable[str]) -> list[str]:
     return [name for name in alike if sum(a != b for a, b in zip(name, unit, strict=True)) == 1]
 
 
+def si_unit(kind: Kind) -> str:
+    """The SI unit of a kind as messages show it, such as "N m"; "" of a plain number."""
+    return re.sub("^(N|kg)m", r"\1 m", _KINDS[kind].si)
+
+
 def wanted(kind: Kind) -> str:
     """The input that is accepted for this kind: 'a length such as "200 mm", or a plain number in m'."""
     return _KINDS[kind].wanted

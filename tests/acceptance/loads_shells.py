@@ -14,9 +14,8 @@ import numpy as np
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.loads.check import _load, _locked, tributary_of
-from rodshell.loads.kinds import LoadedNodes
 from rodshell.loads.structure import Structure
-from rodshell.loads.tributary import tributary_areas
+from rodshell.loads.tributary import LoadedNodes, tributary_areas
 from rodshell.rods.cable import CableStretch
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.imperfection import imperfect

@@ -20,6 +20,7 @@ import pytest
 import rodshell as rs
 from rodshell.case import case_keys
 from rodshell.case.keys import keys_of_kinds
+from rodshell.schema import written
 
 pytestmark = pytest.mark.attack
 
@@ -159,7 +160,7 @@ def test_wrong_values_are_refused_in_a_sentence() -> None:
 def test_numbers_of_any_size_give_a_form_or_a_sentence() -> None:
     """From 1e-30 to 1e18, one or two at a time, on a grid of five rods each way."""
     chance, tries = random.Random(2), 12 * FACTOR
-    numeric = [key for key in keys_of_kinds(rs.Job.load("hemisphere").case.model_dump()) if _takes_numbers(key)]
+    numeric = [key for key in keys_of_kinds(written(rs.Job.load("hemisphere").case)) if _takes_numbers(key)]
     assert len(numeric) > 25
     for _ in range(tries):
         sizes = {key: f"{10 ** chance.uniform(-9, 6):.3g}" for key in chance.sample(numeric, chance.choice([1, 2]))}

@@ -5,7 +5,8 @@ import pytest
 
 from rodshell.checks.bending import bending
 from rodshell.checks.contact import contact
-from rodshell.fabrication import Fabrication, fabricate
+from rodshell.fabrication.fabricate import fabricate
+from rodshell.fabrication.settings import Fabrication
 from rodshell.layout import FlatGrid, FlatRod, Profile, mesh_grid
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, RectangularSection, Rod

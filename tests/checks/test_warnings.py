@@ -9,7 +9,8 @@ import rodshell as rs
 from rodshell.checks import Bending, Checks, bending
 from rodshell.checks.check import staged
 from rodshell.checks.deployment import Deployment
-from rodshell.fabrication import Fabrication, fabricate
+from rodshell.fabrication.fabricate import fabricate
+from rodshell.fabrication.settings import Fabrication
 from rodshell.figures.form import PopUp, Rod
 from rodshell.results import Results
 from rodshell.results.from_checks import checked_results

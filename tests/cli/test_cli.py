@@ -29,6 +29,7 @@ from rodshell.output.options import OutputOptions
 from rodshell.results import Results, read
 from rodshell.results import folder as folder_module
 from rodshell.results.folder import ResultFolder
+from rodshell.schema import written
 
 CROSS = [
     [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
@@ -179,7 +180,7 @@ def test_each_option_reaches_its_key(key: str, finder: FakeFinder, capsys: pytes
 @pytest.mark.parametrize("key", WORDS)
 def test_any_words_reach_their_key(key: str, finder: FakeFinder) -> None:
     assert main(["form", "hemisphere", f"--{key}", "some words", "--method", "paper", "--out", "dome"]) == 0
-    value: Any = load_case("dome/case.toml").model_dump()
+    value: Any = written(load_case("dome/case.toml"))
     for name in key.split("."):
         value = value[name]
     assert value == "some words"

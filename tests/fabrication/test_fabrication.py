@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rodshell as rs
-from rodshell.fabrication import Fabricated, Fabrication, fabricate, nest, splices
+from rodshell.fabrication.cutting import nest, splices
+from rodshell.fabrication.fabricate import Fabricated, fabricate
+from rodshell.fabrication.settings import Fabrication
 from rodshell.figures.fabrication import Piece
 from rodshell.layout import FlatGrid, Profile, mesh_grid, straight_rods
 from rodshell.layout.flatgrid import layers

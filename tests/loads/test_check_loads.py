@@ -14,12 +14,12 @@ from rodshell.checks import self_weight
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.formfinding.popup import Ends
 from rodshell.layout.cells import diagonals
-from rodshell.loads.bracing import outer_nodes
+from rodshell.loads.bracing import outer_nodes, stressed
 from rodshell.loads.check import LoadedShell, _load, mechanism, tributary_of
-from rodshell.loads.kinds import LoadedNodes
+from rodshell.loads.laths import laid
 from rodshell.loads.strength import area_of, preset_limits
 from rodshell.loads.structure import Structure
-from rodshell.loads.tributary import Tributary
+from rodshell.loads.tributary import LoadedNodes, Tributary
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load_path import load_path
 from rodshell.solve.modes import linear_buckling
@@ -261,7 +261,7 @@ def test_cables_to_the_supports_are_anchored_there(pattern: str) -> None:
     assert at_supports.sum() > 0
     assert np.abs(shells.reaction_sum + shells.load_sum).max() < 1e-9 * np.linalg.norm(shells.load_sum)
     structure = Structure.erected(form.popped["pinned"], form.rod)
-    braced = reach.brace(structure, form.target)
+    braced = stressed(reach, structure, form.target)
     places = np.vstack(
         [structure.positions(structure.equilibrium)[form.footprint.mesh.joint_nodes], form.boundary.points]
     )
@@ -473,7 +473,7 @@ def test_frequencies_of_a_shell_are_those_of_its_stiffness_and_mass(laths: rs.La
     linear shape functions; that of a third layer too lies along its laths."""
     form = shell("tubes")
     structure = Structure.erected(form.popped["pinned"], form.rod)
-    structure = structure if laths is None else laths.brace(structure, form.target)
+    structure = structure if laths is None else laid(laths, structure, form.target)
     tangent = structure.equilibrium.tangent
     upper = tangent.pattern.upper(tangent.values).toarray()
     stiffness = upper + upper.T - np.diag(upper.diagonal())
@@ -497,7 +497,7 @@ def test_frequencies_of_a_shell_are_those_of_its_stiffness_and_mass(laths: rs.La
 def test_the_weight_of_each_span_of_a_lath_goes_to_the_joints_at_its_ends() -> None:
     form = shell("tubes")
     structure = Structure.erected(form.popped["pinned"], form.rod)
-    braced = rs.Laths(rod=TUBE).brace(structure, form.target)
+    braced = laid(rs.Laths(rod=TUBE), structure, form.target)
     nodes, halves = outer_nodes(braced.mesh)[braced.braced], np.zeros(structure.shell.node_count)
     chords = np.linalg.norm(np.diff(structure.positions(structure.equilibrium)[nodes], axis=1)[:, 0], axis=1)
     np.add.at(halves, nodes, 0.5 * TUBE.mass_per_length * chords[:, None])

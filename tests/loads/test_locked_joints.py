@@ -10,6 +10,7 @@ import pytest
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.loads.check import mechanism
+from rodshell.loads.locked_joints import locked as lock
 from rodshell.loads.strength import Limits, utilisation
 from rodshell.loads.structure import Structure
 from rodshell.model import Shell
@@ -56,7 +57,7 @@ def test_a_square_of_rods_with_locked_corners_resists_shear_by_four_times_k_thet
     """Rods 1e5 times as stiff as the joints: F L cos(a) = 4 k theta, at any angle a at which they were locked."""
     k, force = 30.0, 0.02
     bare, load = frame(given(1e5 * k, 1e4), turned)
-    locked = rs.LockedJoints(shear=k).lock(bare)
+    locked = lock(rs.LockedJoints(shear=k), bare)
     assert np.abs(locked.locked_moments(locked.equilibrium)).max() < 1e-9 * k
     moved = locked.equilibrium.tangent.solve(force * load)
     theta = np.linalg.norm(moved[:, :2], axis=1).max() / (SIDE + STUB)  # of the upright rods' free ends
@@ -82,7 +83,7 @@ def test_locked_corners_of_rods_that_bend_follow_slope_deflection_to_second_orde
     off = []
     for edges in (4, 8, 16):
         bare, load = frame(given(stiffness, 1e7), 0.0, SIDE / edges)
-        locked = rs.LockedJoints(shear=k).lock(bare)
+        locked = lock(rs.LockedJoints(shear=k), bare)
         moved = locked.equilibrium.tangent.solve(load)
         off.append(float(np.sum(load * moved)) * exact - 1)
     assert off[-1] < 3e-3
@@ -95,13 +96,13 @@ def test_a_square_of_rods_on_pins_is_a_mechanism_until_they_are_locked() -> None
     said = mechanism(bare)
     assert said is not None
     assert "largest near" in said
-    assert mechanism(rs.LockedJoints(shear=1.0).lock(bare)) is None
+    assert mechanism(lock(rs.LockedJoints(shear=1.0), bare)) is None
 
 
 def test_locking_changes_no_force_of_the_erected_shell() -> None:
     form = shell("laths")
     bare = Structure.erected(form.popped["pinned"], form.rod)
-    locked = rs.LockedJoints(shear=1e4).lock(bare)
+    locked = lock(rs.LockedJoints(shear=1e4), bare)
     again = find_equilibrium(locked.equilibrium.problem, locked.equilibrium.state, locked.equilibrium.forces)
     assert np.abs(again.state - bare.equilibrium.state).max() < 1e-9
     assert np.abs(locked.locked_moments(again)).max() < 1e-6
@@ -113,7 +114,7 @@ def test_a_locked_shell_is_one_built_with_springs_at_the_angles_at_which_it_was_
     """A second way: the model assembled again with a spring at each crossing, its rest angle the present one."""
     form, k = shell("laths"), 5e3
     bare = Structure.erected(form.popped["pinned"], form.rod)
-    locked = rs.LockedJoints(shear=k).lock(bare)
+    locked = lock(rs.LockedJoints(shear=k), bare)
     pins, state = bare.shell, bare.equilibrium.state
     angle = np.zeros(len(pins.mesh.grid.crossings))
     for crossings, element in zip(locked.locked, pins.elements[-len(locked.locked) :], strict=True):
@@ -144,7 +145,7 @@ def test_the_stress_at_a_locked_joint_is_that_of_the_whole_moment_of_the_corner(
     section, k, strength = TUBE.section, 5e3, 1e8
     assert isinstance(section, rs.Tube)
     bare, load = frame(TUBE, 0.0, SIDE / 16)
-    locked = rs.LockedJoints(shear=k).lock(bare)
+    locked = lock(rs.LockedJoints(shear=k), bare)
     end = load_path(locked.equilibrium, load, most=1.0).at(1.0)
     assert end is not None
     found = utilisation(

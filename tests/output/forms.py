@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import rodshell as rs
-from rodshell.fabrication import Fabrication
+from rodshell.fabrication.settings import Fabrication
 from rodshell.output import save
 from rodshell.output.options import DrawingStyle, OutputOptions
 from rodshell.results import Archive

@@ -4,14 +4,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_type_hints
 
 import pytest
 
 from rodshell.case.case import Case
 from rodshell.case.load import FILE_KEYS
-from rodshell.case.values import FileToRead, FolderToWrite, Table
 from rodshell.errors import InputError
+from rodshell.schema import fields_of
 from rodshell.studio.worker import Order, job_of
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -29,15 +29,15 @@ WORDS = {  # names, titles and formulas: nothing opens a file of this name
 READ = [f"{table}.{key}" for table, keys in FILE_KEYS.items() for key in keys]
 
 
-def texts(model: type[Table], path: str = "") -> Iterator[tuple[str, Any]]:
-    """All fields of a table, and of the tables in it, that may hold any text, with their types."""
-    for name, field in model.model_fields.items():
-        place = f"{path}.{name}".lstrip(".")
-        models = {kind for kind in _parts(field.annotation) if isinstance(kind, type) and issubclass(kind, Table)}
-        for inner in models:
+def texts(table: type, path: str = "") -> Iterator[tuple[str, str]]:
+    """All keys of a table, and of the tables in it, that may hold any text, with what that is."""
+    hints = get_type_hints(table, include_extras=True)
+    for field in fields_of(table):
+        place = path if field.inline else f"{path}.{field.name}".lstrip(".")
+        for inner in field.tables:
             yield from texts(inner, place)
-        if str in _parts(field.annotation):
-            yield place, (*field.metadata, *_parts(field.annotation))
+        if not field.tables and str in _parts(hints[field.attribute]):
+            yield place, field.value.role if field.value else ""
 
 
 def _parts(annotation: Any) -> list[Any]:
@@ -48,10 +48,9 @@ def _parts(annotation: Any) -> list[Any]:
 
 
 def test_each_key_that_holds_text_is_a_file_or_known_to_be_none() -> None:
-    files, folders = (get_args(kind)[1] for kind in (FileToRead, FolderToWrite))
     found = dict(texts(Case))
-    reads = {path for path, kind in found.items() if files in kind}
-    writes = {path for path, kind in found.items() if folders in kind}
+    reads = {path for path, role in found.items() if role == "file"}
+    writes = {path for path, role in found.items() if role == "folder"}
     assert reads == set(READ) >= {"target.file", "target.boundary", "seams.file"}
     assert writes == {"drape.frames"}
     assert found.keys() - reads - writes == WORDS  # a new one: is it a FileToRead?

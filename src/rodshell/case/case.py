@@ -2,36 +2,29 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from pydantic import Field
-
-from rodshell.case.load_tables import (
-    BracingKinds,
-    CombinationTable,
-    LoadKinds,
-    LockedJointsTable,
-    NoBracingTable,
-    StabilityTable,
-    StrengthTable,
-)
-from rodshell.case.rod_tables import BallTable, JointKinds, RodTable
+from rodshell.case.held import Held, built
+from rodshell.case.load_tables import BracingKinds, CombinationRows, LoadRows, NoBracing
+from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import (
     ChecksTable,
     DrapeTable,
     DrawingsTable,
-    FabricationTable,
     LayoutTable,
     PopUpTable,
     RefineTable,
     SeamsTable,
 )
-from rodshell.case.target_tables import HemisphereTable, TargetTable
-from rodshell.case.values import Held, Table
+from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
+from rodshell.fabrication.settings import Fabrication
+from rodshell.loads.settings import LockedJoints, Stability, Strength
 from rodshell.progress import Progress, silent
+from rodshell.rods.joints import Ball, JointKind
+from rodshell.schema import read, undescribed, written
 from rodshell.units import length_text, shown
 
 if TYPE_CHECKING:
@@ -69,38 +62,35 @@ class Built(NamedTuple):
     ends: "tuple[Ends, ...]"
 
 
-class Case(Table):
+@dataclass(frozen=True, kw_only=True)
+class Case:
     """Everything that decides one job, complete and in SI. Make one with `load_case`."""
 
-    target: TargetTable = Field(default_factory=HemisphereTable, discriminator="kind")
-    layout: LayoutTable = Field(default_factory=LayoutTable)
-    rod: RodTable = Field(default_factory=RodTable)
-    joint: JointKinds = Field(default_factory=BallTable, discriminator="kind")
-    drape: DrapeTable = Field(default_factory=DrapeTable)
-    pop_up: PopUpTable = Field(default_factory=PopUpTable)
-    refine: RefineTable = Field(default_factory=RefineTable)
-    seams: SeamsTable = Field(default_factory=SeamsTable)
-    checks: ChecksTable = Field(default_factory=ChecksTable)
-    fabrication: FabricationTable = Field(default_factory=FabricationTable)
-    drawings: DrawingsTable = Field(default_factory=DrawingsTable)
-    loads: tuple[LoadKinds, ...] = Field(
-        default=(), description="file with [[loads]] and their [[combinations]]; in a case file tables"
-    )
-    combinations: tuple[CombinationTable, ...] = Field(
-        default=(), description="combinations of loads; in a case file only"
-    )
-    bracing: BracingKinds = Field(default_factory=NoBracingTable, discriminator="kind")
-    locked_joints: LockedJointsTable = Field(default_factory=LockedJointsTable)
-    stability: StabilityTable = Field(default_factory=StabilityTable)
-    strength: StrengthTable = Field(default_factory=StrengthTable)
+    target: TargetKinds | HeldTarget = field(default_factory=Hemisphere)
+    layout: LayoutTable = field(default_factory=LayoutTable)
+    rod: RodTable = field(default_factory=RodTable)
+    joint: JointKind = field(default_factory=Ball)
+    drape: DrapeTable = field(default_factory=DrapeTable)
+    pop_up: PopUpTable = field(default_factory=PopUpTable)
+    refine: RefineTable = field(default_factory=RefineTable)
+    seams: SeamsTable = field(default_factory=SeamsTable)
+    checks: ChecksTable = field(default_factory=ChecksTable)
+    fabrication: Fabrication = field(default_factory=Fabrication)
+    drawings: DrawingsTable = field(default_factory=DrawingsTable)
+    loads: LoadRows = ()
+    combinations: CombinationRows = ()
+    bracing: BracingKinds = field(default_factory=NoBracing)
+    locked_joints: LockedJoints | None = None
+    stability: Stability = field(default_factory=Stability)
+    strength: Strength = field(default_factory=Strength)
 
     @property
     def held_objects(self) -> dict[str, Held]:
         """Objects that tables were made of and that their keys do not describe, by the name of the table."""
-        tables = {name: getattr(self, name) for name in type(self).model_fields}
-        return {
-            name: table.held for name, table in tables.items() if isinstance(table, Table) and table.held is not None
-        }
+        tables = {each.name: getattr(self, each.name) for each in fields(self)}
+        found = {name: table.held for name, table in tables.items() if getattr(table, "held", None) is not None}
+        what = undescribed(self.joint)
+        return found | ({"joint": Held(self.joint, what)} if what else {})
 
     def to_toml(self) -> str:
         """The full input as a case file with SI numbers: loading it from anywhere gives the same case.
@@ -118,9 +108,10 @@ class Case(Table):
             notes += [f"# {held.note}\n"] if held.note else []
         idle = {"bracing"} if self.bracing.kind == "none" else set[str]()
         if not self.loads:
-            unset = {"locked_joints": LockedJointsTable(), "stability": StabilityTable(), "strength": StrengthTable()}
+            unset = {"stability": Stability(), "strength": Strength()}
             idle |= {name for name, table in unset.items() if getattr(self, name) == table}
-        return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True, exclude=idle))
+        tables = {name: table for name, table in written(self.absolute()).items() if name not in idle}
+        return "".join(notes) + toml_text(tables)
 
     def text(self) -> str:
         """As `to_toml`, or a text that is refused as a case and says why no case file can give the same again."""
@@ -134,10 +125,8 @@ class Case(Table):
     def absolute(self) -> Self:
         """The same case, whose files are named from the root."""
         paths = {key: getattr(self.target, key, None) for key in ("file", "boundary")}
-        rooted = {key: str(Path(path).absolute()) for key, path in paths.items() if path is not None}
-        if all(paths[key] == path for key, path in rooted.items()):
-            return self
-        return self.model_copy(update={"target": self.target.model_copy(update=rooted)})
+        rooted: dict[str, Any] = {key: str(Path(path).absolute()) for key, path in paths.items() if path is not None}
+        return replace(self, target=replace(self.target, **rooted)) if rooted else self
 
     @property
     def of_table(self) -> bool:
@@ -169,13 +158,13 @@ class Case(Table):
         """What a rod that is left to the target has to fit."""
         from rodshell.checks.sizing import Fit
 
-        return Fit.on(target, layout, anchor=anchor, joint=built(self.joint))
+        return Fit.on(target, layout, anchor=anchor, joint=self.joint)
 
     def with_rod(self, rod: "Rod") -> "Case":
         """The same case with this rod spelled out."""
         if self.rod.held is not None or not self.rod.left_open:
             return self
-        return self.model_copy(update={"rod": RodTable.model_validate(rod.parameters())})
+        return replace(self, rod=read(RodTable, rod.parameters()))
 
     @property
     def undecided(self) -> bool:
@@ -184,16 +173,13 @@ class Case(Table):
 
     def decided(self, anchor: tuple[float, float], rotate: float) -> "Case":
         """The same case with its anchor [m] and heading [rad]: nothing is left to an objective."""
-        drape = self.drape.model_copy(update={"anchor": anchor, "objective": "shear"})
-        return self.headed(rotate).model_copy(update={"drape": drape})
+        return replace(self.headed(rotate), drape=replace(self.drape, anchor=anchor, objective="shear"))
 
     def headed(self, rotate: float) -> "Case":
         """The same case with its heading [rad]."""
-        layout = self.layout.model_copy(update={"rotate": rotate})
-        if layout.held is not None:
-            held = layout.held
-            layout = layout.holding(replace(held, value=replace(held.value, rotate=rotate)))
-        return self.model_copy(update={"layout": layout})
+        held = self.layout.held
+        turned = None if held is None else replace(held, value=replace(held.value, rotate=rotate))
+        return replace(self, layout=replace(self.layout, rotate=rotate, held=turned))
 
     @property
     def ends(self) -> "tuple[Ends, ...]":
@@ -227,13 +213,13 @@ class Case(Table):
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if self.drape.anchor == "auto" else self.drape.anchor
-        joint, method = built(self.joint), built(self.drape)
+        joint, method = self.joint, built(self.drape)
         target = cut_at(target or built(self.target), [Seam.of(line) for line in self.seams.lines])
         layout = built(self.layout, target).with_edges(method.edges_a_span)
-        shortest = min(map(min, (layout.spacing, *(p.spacing for p in self.seams.patches if p.spacing is not None))))
+        spacings = [row.layout.spacing for row in self.seams.patches if row.layout.spacing is not None]
+        shortest = min(map(min, (layout.spacing, *spacings)))
         self._require_stock(shortest)
         self._require_allowance(target)
-        self.bracing.build()
         loads = self.built_loads()
         if loads is not None and loads.locked_joints is not None:
             loads.locked_joints.require_pins(joint)
@@ -253,13 +239,12 @@ class Case(Table):
         """InputError where what is said of the strength does not suit the rod, such as bolts as wide as it."""
         options = self.output_options()
         options.require_known_stress(rod, joint)
-        if self.strength != StrengthTable():
+        if self.strength != Strength():
             from rodshell.loads.strength import net_section
 
-            strength = self.strength.build()
-            options.limits(rod, strength)
-            if strength.hole:
-                net_section(rod.section, strength.hole)
+            options.limits(rod, self.strength)
+            if self.strength.hole:
+                net_section(rod.section, self.strength.hole)
 
     def _require_allowance(self, target: "Target") -> None:
         """InputError where rods are cut longer by more than the shell is wide: of no support."""
@@ -315,13 +300,13 @@ class Case(Table):
                 if names.count(name) > 1:
                     raise InputError(f"{tables} has {shown(name)} twice: give each a name of its own")
         return Loads(
-            loads={load.name: load.build() for load in self.loads},
+            loads={row.name: row.load for row in self.loads},
             combinations={row.name: dict(row.factors) for row in self.combinations},
-            bracing=self.bracing.build(),
-            locked_joints=self.locked_joints.build(),
-            stability=self.stability.build(),
-            strength=self.strength.build(),
-            durations={load.name: load.duration for load in self.loads if load.duration is not None},
+            bracing=None if isinstance(self.bracing, NoBracing) else self.bracing,
+            locked_joints=self.locked_joints,
+            stability=self.stability,
+            strength=self.strength,
+            durations={row.name: row.duration for row in self.loads if row.duration is not None},
         )
 
     def output_options(self) -> "OutputOptions":
@@ -331,25 +316,18 @@ class Case(Table):
         ------
         InputError : a value cannot be used.
         """
-        from rodshell.fabrication import Fabrication
         from rodshell.output.options import DrawingStyle, OutputOptions
 
-        style = self.drawings.model_dump(exclude={"layers"})
-        layers = self.drawings.layers.model_dump(exclude_none=True)
-        style["layers"] = {name.upper().replace("_", "-"): shown for name, shown in layers.items()}
+        style = written(self.drawings)
+        style["layers"] = {name.upper().replace("_", "-"): new for name, new in style["layers"].items()}
         return OutputOptions(
             self.checks.strength,
             self.checks.stages,
-            Fabrication(**self.fabrication.model_dump()),
+            self.fabrication,
             DrawingStyle(**style),
             rod_chosen=self.rod.left_open,
             shear_strength=self.checks.shear_strength,
         )
-
-
-def built(table: Table, *arguments: object) -> Any:
-    """The object that a table describes, or the one that it holds."""
-    return table.held.value if table.held is not None else table.build(*arguments)  # type: ignore[attr-defined]
 
 
 def toml_text(case: Mapping[str, Any]) -> str:

@@ -4,31 +4,35 @@ What the keys of a case do not describe, such as a target that is a Python funct
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from math import fmod, tau
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from numpy.typing import ArrayLike
 
 from rodshell.case.case import Case
+from rodshell.case.held import Held
 from rodshell.case.rod_ends import RodEnds
-from rodshell.case.rod_tables import JointTable, RodTable
-from rodshell.case.stage_tables import DrapeTable, LayoutTable, PopUpTable
+from rodshell.case.rod_tables import RodTable
+from rodshell.case.stage_tables import PopUpTable
 from rodshell.case.target_tables import HeldTarget
-from rodshell.case.values import Held, Table
 from rodshell.formfinding import Bound, Fall, Method
-from rodshell.formfinding.patches import PatchLayout
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.search import Objective
-from rodshell.joints import Joint, joint_parameters
+from rodshell.joints import Joint
 from rodshell.layout import GridLayout
 from rodshell.output.options import OutputOptions
+from rodshell.rods.joints import JointKind
 from rodshell.rods.section import Rod
+from rodshell.schema import kind_of, read, written
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
+from rodshell.targets.patch_layout import PatchLayout
+from rodshell.validation import either, instance
 
 Auto = Literal["auto"]
 Point = tuple[float, float]
+NOT_POPPED_UP = "the grid was not popped up; a case file always asks for a pop-up"
 
 
 def case_of(
@@ -51,60 +55,47 @@ def case_of(
     given: dict[str, Any] = {
         "layout": _layout_keys(layout, heading),
         "rod": rod.parameters(),
-        "joint": _joint_keys(joint),
         "drape": _drape_keys(method, anchor, objective),
         "pop_up": {"ends": ends[0] if len(ends) == 1 else "both"},
         "seams": {
             "lines": [Seam.of(line).points.tolist() for line in seams],
-            "patches": [{"name": name, **_given(patch)} for name, patch in patches.items()],
+            "patches": [{"name": name, **written(patch)} for name, patch in patches.items()],
         },
         **options.parameters(),
     }
     unknown = _without_keys(shape)
     if not unknown:
         given["target"] = _target_keys(shape)
-    case = Case.model_validate(given)
-    tables: dict[str, Table] = {
-        "layout": _layout_table(case.layout, layout, heading),
-        "rod": _rod_table(case.rod, rod),
-        "joint": _joint_table(case.joint, joint),
-        "drape": _drape_table(case.drape, method),
-        "pop_up": _pop_up_table(case.pop_up, ends),
+    case = read(Case, given)
+    held = {
+        "layout": _held_layout(layout, heading),
+        "rod": None if case.rod.build() == rod else Held(rod, f"the rod {rod}"),
+        "drape": _held_method(case.drape.build(), method),
+        "pop_up": None if ends else Held((), "a grid that is not popped up", writable=True, note=NOT_POPPED_UP),
     }
+    tables = {name: replace(getattr(case, name), held=found) for name, found in held.items()}
     if unknown:
-        tables["target"] = HeldTarget(kind="python").holding(Held(target, unknown, by_value=False))
-    return case.model_copy(update=tables)
+        tables["target"] = HeldTarget(kind="python", held=Held(target, unknown, by_value=False))
+    return replace(case, joint=_of_a_kind(joint), **tables)
 
 
-def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint, options: OutputOptions) -> Case:
+def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint) -> Case:
     """The case of rods that a table gives by where their ends lie flat and in the end."""
-    given: dict[str, Any] = {"joint": _joint_keys(joint), "pop_up": {"ends": "pinned"}, **options.parameters()}
-    if rod is not None:
-        given["rod"] = rod.parameters()
-    case = Case.model_validate(given)
-    target = HeldTarget(kind="table").holding(Held(ends, f"a table of {len(ends.final)} rods"))
-    tables: dict[str, Table] = {"target": target, "joint": _joint_table(case.joint, joint)}
-    if rod is not None:
-        tables["rod"] = _rod_table(case.rod, rod)
-    return case.model_copy(update=tables)
+    target = HeldTarget(kind="table", held=Held(ends, f"a table of {len(ends.final)} rods"))
+    table = RodTable() if rod is None else read(RodTable, rod.parameters())
+    return Case(target=target, rod=table, joint=_of_a_kind(joint), pop_up=PopUpTable(ends="pinned"))
 
 
-def _rod_table(table: RodTable, rod: Rod) -> RodTable:
-    """[rod] with section and material spelled out, or held."""
-    return table if table.build() == rod else table.holding(Held(rod, f"the rod {rod}"))
+def tables_of(options: OutputOptions) -> dict[str, Any]:
+    """The tables of checks, fabrication and drawings."""
+    case, given = read(Case, options.parameters()), options.parameters()
+    return {name: getattr(case, name) for name in given}
 
 
-def _joint_keys(joint: Joint) -> dict[str, object]:
-    """[joint] without the rod of linkers, which no key describes."""
-    keys = joint_parameters(joint)
-    keys.pop("rod", None)
-    return keys
-
-
-def _joint_table(table: JointTable, joint: Joint) -> JointTable:
-    """[joint] of any joint; linkers of a rod of their own are held."""
-    described = getattr(joint, "rod", None) is None
-    return table if described else table.holding(Held(joint, "joints with linkers of another rod"))
+def _of_a_kind(joint: Joint) -> JointKind:
+    """The joint, if it is of a kind that cases have."""
+    instance("joint", joint, JointKind, f"of kind {either([kind_of(kind) for kind in get_args(JointKind)])}")
+    return joint  # type: ignore[return-value]
 
 
 def _without_keys(shape: Mapping[str, object]) -> str:
@@ -124,12 +115,12 @@ def _layout_keys(layout: GridLayout, heading: float | Auto) -> dict[str, object]
     return {**layout.parameters(), "edge": edge, "rotate": rotate, "left_out": layout.left_out}
 
 
-def _layout_table(table: LayoutTable, layout: GridLayout, rotate: float | Auto) -> LayoutTable:
-    """[layout]; one with lines at unequal spacing is held, with its heading."""
+def _held_layout(layout: GridLayout, rotate: float | Auto) -> Held | None:
+    """A layout with lines at unequal spacing, with its heading."""
     if not any(layout.lines):
-        return table
+        return None
     turned = layout if rotate == "auto" else replace(layout, rotate=rotate)
-    return table.holding(Held(turned, "a layout with lines at unequal spacing"))
+    return Held(turned, "a layout with lines at unequal spacing")
 
 
 def _drape_keys(method: Method, anchor: Point | Auto | None, objective: Objective) -> dict[str, Any]:
@@ -147,27 +138,15 @@ def _drape_keys(method: Method, anchor: Point | Auto | None, objective: Objectiv
     return given
 
 
-def _drape_table(table: DrapeTable, method: Method) -> DrapeTable:
-    """[drape]; the folder of a fall's frames, which may be none of the next result's, is held."""
-    described = table.build()
+def _held_method(described: Method, method: Method) -> Held | None:
+    """A fall with options that no key describes; the folder of its frames may be none of the next result's."""
     if described == method:
-        return table
+        return None
     assert isinstance(method, Fall)
     assert isinstance(described, Fall)
     if replace(described, stream=method.stream, every=method.every) == method:
-        return table.holding(Held(method, "a fall whose frames are kept in a folder", writable=True))
-    return table.holding(Held(method, "a fall with options that only Python has"))
-
-
-def _pop_up_table(table: PopUpTable, ends: Sequence[Ends]) -> PopUpTable:
-    if ends:
-        return table
-    note = "the grid was not popped up; a case file always asks for a pop-up"
-    return table.holding(Held((), "a grid that is not popped up", writable=True, note=note))
-
-
-def _given(patch: PatchLayout) -> dict[str, object]:
-    return {key: value for key, value in asdict(patch).items() if value is not None}
+        return Held(method, "a fall whose frames are kept in a folder", writable=True)
+    return Held(method, "a fall with options that only Python has")
 
 
 def _within_a_turn(angle: float) -> float:

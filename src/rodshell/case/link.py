@@ -10,6 +10,7 @@ from typing import Any
 from rodshell.case.case import Case
 from rodshell.case.load import BY_SUFFIX, FILE_KEYS
 from rodshell.errors import InputError
+from rodshell.schema import written
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised
 from rodshell.validation import instance
@@ -68,8 +69,7 @@ def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
         if not held.writable:
             raise InputError(f"the studio cannot hold {held.what} ({name}): it opens what a case file can describe")
     rooted = case.absolute()
-    full, short = (rooted.model_dump(mode="json", exclude_none=True, exclude_defaults=only) for only in (False, True))
-    tables: dict[str, Any] = _with_kinds({"target": {}} | short, full)
+    tables: dict[str, Any] = {"target": {"kind": rooted.target.kind}} | written(rooted, changed=True)
     paths = dict[str, Path]()
     for table, keys in FILE_KEYS.items():
         for key in keys:
@@ -101,13 +101,3 @@ def upload_name(name: str) -> str:
     if suffix not in UPLOADS or not Path(plain).stem:
         raise InputError(f"{shown(name)}: the studio reads {', '.join(UPLOADS)}")
     return plain
-
-
-def _with_kinds(short: Any, full: Any) -> Any:
-    """A dump without defaults, its tables with their kinds: these decide what the other keys are."""
-    if isinstance(short, dict):
-        kind = {"kind": full["kind"]} if "kind" in full else {}
-        return kind | {name: _with_kinds(value, full[name]) for name, value in short.items()}
-    if isinstance(short, list):
-        return [_with_kinds(*pair) for pair in zip(short, full, strict=True)]
-    return short

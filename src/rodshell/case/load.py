@@ -5,17 +5,28 @@ import tomllib
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
+from dataclasses import replace
 from difflib import get_close_matches
+from functools import partial
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from rodshell.case.case import UNDESCRIBED, Case
-from rodshell.case.keys import BY_KIND, case_keys, case_tables, file_keys, not_a_table, sentence, unknown_key
+from rodshell.case.keys import (
+    BY_KIND,
+    case_keys,
+    case_tables,
+    file_keys,
+    not_a_table,
+    unknown_key,
+    unknown_path,
+)
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
+from rodshell.quantities import Polylines, Unit
+from rodshell.schema import read, read_value, written
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import file_path, instance
@@ -147,9 +158,9 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
                 f"{path} cannot be changed: it is {held[table].what}, which no key describes: make a new job of "
                 "another object"
             )
-    tables = case.model_dump(exclude_none=True, exclude=set(held))
+    tables = {name: _plain(table) for name, table in written(case).items() if name not in held}
     changed = _validated(tables, _plain(dict(overrides)))
-    return changed.model_copy(update={name: getattr(case, name) for name in held})
+    return replace(changed, **{name: getattr(case, name) for name in held})
 
 
 def require_keys_of_rods(changes: Mapping[str, object]) -> None:
@@ -200,13 +211,12 @@ def _validated(raw: Raw, overrides: dict[str, object], files: Callable[[object],
         if path in case_tables():
             raise InputError(not_a_table(path, value))
         if path not in case_keys():
-            raise InputError(unknown_key(path, value, raw))
+            raise InputError(unknown_path(path, value, raw))
         table, _, key = path.rpartition(".")
         _table(raw, table)[key] = value
-    try:
-        return Case.model_validate(raw, context=files)
-    except ValidationError as error:
-        raise InputError(sentence(error, raw)) from None
+    raw["bracing"] = {key: value for key, value in raw["bracing"].items() if value is not None and value != {}}
+    _read_seams(raw["seams"], files)
+    return read(Case, raw, unknown=partial(unknown_key, raw), files=files)
 
 
 def _rename(raw: Raw, overrides: dict[str, object]) -> None:
@@ -247,6 +257,30 @@ def _read_loads(raw: Raw, overrides: dict[str, object]) -> None:
     for key in LOAD_TABLES:
         raw.pop(key, None)
     raw |= given
+
+
+def _read_seams(table: Raw, files: Callable[[object], str] | None) -> None:
+    """Put the lines of the file of seams into the case, which then needs the file no longer."""
+    name = table.get("file")
+    if name is None:
+        return
+    from rodshell.targets.curve_files import read_lines  # here, as most cases have no such file
+
+    unit = _value_of(Unit, "seams.unit", table.pop("unit", 1.0))
+    given = _value_of(Polylines, "seams.lines", table.get("lines", ()))
+    try:
+        drawn = read_lines(file_path("the file", name if files is None else files(name)), unit)
+    except InputError as reason:
+        raise InputError(f"seams.file = {shown(name)}: {reason}") from None
+    del table["file"]
+    table["lines"] = [*given, *(line[:, :2].tolist() for line in drawn)]
+
+
+def _value_of(hint: Any, key: str, given: object) -> Any:
+    try:
+        return read_value(hint, given)
+    except ValueError as reason:
+        raise InputError(f"{key} = {shown(given)}: {reason}") from None
 
 
 def _found_table(raw: Raw, path: str) -> Raw:
@@ -374,6 +408,8 @@ def _plain(value: Any, depth: int = 0) -> Any:
         raise InputError(TOO_DEEP)
     if hasattr(value, "dtype") and not isinstance(value, type):
         value = value.tolist()
+    if isinstance(value, Iterator):
+        value = tuple(islice(value, MOST_KEYS + 1))
     if isinstance(value, list | tuple):
         items = (_plain(item, depth + 1) for item in value)
         return tuple(items) if isinstance(value, tuple) else [*items]

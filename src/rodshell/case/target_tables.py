@@ -1,107 +1,105 @@
 """The target's tables, one for each kind."""
 
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
-
-from rodshell.case.values import Angles, Coordinate, Factor, FileToRead, Length, Point3, Size, Table, Unit
+from rodshell.case.held import Holding
+from rodshell.errors import InputError
+from rodshell.quantities import Angles, Coordinate, Factor, FileToRead, Length, Point3, Size, Unit
+from rodshell.schema import written
 
 if TYPE_CHECKING:
     from rodshell.targets import Target
 
 
-class HemisphereTable(Table):
-    kind: Literal["hemisphere"] = "hemisphere"
-    radius: Length = Field(default=0.2, description="radius")
+class TargetTable(Holding):
+    """Keys of a target whose class has the same name."""
+
+    kind: ClassVar[str]
 
     def build(self) -> "Target":
-        from rodshell.targets import Hemisphere
+        """The target."""
+        from rodshell import targets
 
-        return Hemisphere(radius=self.radius)
-
-
-class CapTable(Table):
-    kind: Literal["cap"] = "cap"
-    radius: Length = Field(default=0.25, description="radius")
-    base: Coordinate = Field(
-        default=0.1, description="z of the plane at which the shell ends; of a cap: from its centre"
-    )
-
-    def build(self) -> "Target":
-        from rodshell.targets import Cap
-
-        return Cap(radius=self.radius, base=self.base)
+        keys = written(self)
+        del keys["kind"]
+        made: Target = getattr(targets, type(self).__name__)(**keys)
+        return made
 
 
-class ParaboloidTable(Table):
-    kind: Literal["paraboloid"] = "paraboloid"
-    radius: Length = Field(default=0.2, description="radius")
-    height: Length = Field(default=0.12, description="height of the top; of a CSV: of its unit; of an image: of white")
-
-    def build(self) -> "Target":
-        from rodshell.targets import Paraboloid
-
-        return Paraboloid(radius=self.radius, height=self.height)
+@dataclass(frozen=True, kw_only=True)
+class Hemisphere(TargetTable):
+    kind: ClassVar = "hemisphere"
+    radius: Annotated[Length, "radius"] = 0.2
 
 
-class EllipsoidTable(Table):
-    kind: Literal["ellipsoid"] = "ellipsoid"
-    a: Length = Field(default=0.2, description="half-axis along x")
-    b: Length = Field(default=0.15, description="half-axis along y")
-    c: Length = Field(default=0.12, description="half-axis along z")
-
-    def build(self) -> "Target":
-        from rodshell.targets import Ellipsoid
-
-        return Ellipsoid(a=self.a, b=self.b, c=self.c)
+@dataclass(frozen=True, kw_only=True)
+class Cap(TargetTable):
+    kind: ClassVar = "cap"
+    radius: Annotated[Length, "radius"] = 0.25
+    base: Annotated[Coordinate, "z of the plane at which the shell ends; of a cap: from its centre"] = 0.1
 
 
-class HeightFieldTable(Table):
-    kind: Literal["heightfield"] = "heightfield"
-    formula: str = Field(description='height z = f(x, y) in metres, such as "0.1 - 2*x**2 - y**2"')
-    domain: Literal["disc", "rectangle"] = Field(
-        default="disc", description="plan of the target, centred on the origin"
-    )
-    radius: Length | None = Field(default=None, description="radius of the disc")
-    size: Size | None = Field(default=None, description="width along x and depth along y of a rectangle")
+@dataclass(frozen=True, kw_only=True)
+class Paraboloid(TargetTable):
+    kind: ClassVar = "paraboloid"
+    radius: Annotated[Length, "radius"] = 0.2
+    height: Annotated[Length, "height of the top; of a CSV: of its unit; of an image: of white"] = 0.12
 
-    @model_validator(mode="before")
+
+@dataclass(frozen=True, kw_only=True)
+class Ellipsoid(TargetTable):
+    kind: ClassVar = "ellipsoid"
+    a: Annotated[Length, "half-axis along x"] = 0.2
+    b: Annotated[Length, "half-axis along y"] = 0.15
+    c: Annotated[Length, "half-axis along z"] = 0.12
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeightField(TargetTable):
+    kind: ClassVar = "heightfield"
+    formula: Annotated[str, 'height z = f(x, y) in metres, such as "0.1 - 2*x**2 - y**2"']
+    domain: Annotated[Literal["disc", "rectangle"], "plan of the target, centred on the origin"] = "disc"
+    radius: Annotated[Length | None, "radius of the disc"] = None
+    size: Annotated[Size | None, "width along x and depth along y of a rectangle"] = None
+
     @classmethod
-    def _domain_decides(cls, given: dict[str, Any]) -> dict[str, Any]:
+    def completed(cls, given: Mapping[str, Any], path: str) -> Mapping[str, Any]:
+        """With the radius of a disc."""
         domain = given.get("domain", "disc")
         if domain == "disc":
             if "size" in given:
-                raise ValueError('target.size is for domain "rectangle": leave it out, or set target.domain')
+                raise InputError(f'{path}.size is for domain "rectangle": leave it out, or set {path}.domain')
             return {"radius": 0.2, **given}
         if domain == "rectangle":
             if "radius" in given:
-                raise ValueError('target.radius is for domain "disc": leave it out, or set target.domain')
+                raise InputError(f'{path}.radius is for domain "disc": leave it out, or set {path}.domain')
             if "size" not in given:
-                raise ValueError('target.size is missing: give width and depth, such as ["400 mm", "300 mm"]')
+                raise InputError(f'{path}.size is missing: give width and depth, such as ["400 mm", "300 mm"]')
         return given
 
     def build(self) -> "Target":
-        from rodshell.targets import Disc, HeightField, Rectangle
+        from rodshell import targets
 
         if self.radius is not None:
-            return HeightField(formula=self.formula, domain=Disc(self.radius))
+            return targets.HeightField(formula=self.formula, domain=targets.Disc(self.radius))
         assert self.size is not None
-        return HeightField(formula=self.formula, domain=Rectangle(self.size))
+        return targets.HeightField(formula=self.formula, domain=targets.Rectangle(self.size))
 
 
-class PlacedTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class Placed(Holding):
     """Keys of every target that comes from a file."""
 
-    file: FileToRead = Field(description="path of the file; in a case file from the case file's folder")
-    base: Coordinate | None = Field(default=None, description="z of the plane at which the shell ends")
-    boundary: FileToRead | None = Field(
-        default=None, description="OBJ, DXF or 3dm file with closed curves: the shell's edge, openings"
-    )
-    scale: Factor = Field(default=1.0, description="factor by which it is scaled about the origin")
-    turn: Angles = Field(
-        default=(0.0, 0.0, 0.0), description="angles by which it is turned about x, y, z, in that order"
-    )
-    move: Point3 = Field(default=(0.0, 0.0, 0.0), description="shift along x, y, z")
+    file: Annotated[FileToRead, "path of the file; in a case file from the case file's folder"]
+    base: Annotated[Coordinate | None, "z of the plane at which the shell ends"] = None
+    boundary: Annotated[
+        FileToRead | None, "OBJ, DXF or 3dm file with closed curves: the shell's edge, openings"
+    ] = None  # fmt: skip
+    scale: Annotated[Factor, "factor by which it is scaled about the origin"] = 1.0
+    turn: Annotated[Angles, "angles by which it is turned about x, y, z, in that order"] = (0.0, 0.0, 0.0)
+    move: Annotated[Point3, "shift along x, y, z"] = (0.0, 0.0, 0.0)
 
     def options(self) -> dict[str, Any]:
         """Keyword arguments that all files have."""
@@ -111,14 +109,13 @@ class PlacedTable(Table):
         return {"base": self.base, "boundary": self.boundary, "placement": placement}
 
 
-class SurfaceTable(PlacedTable):
-    unit: Unit | None = Field(default=None, description="the file's unit, such as mm")
-    object: str | None = Field(
-        default=None, description="name of an object or layer; of a STEP face: its name or number"
-    )
-    up: Literal["z", "y"] | None = Field(
-        default=None, description="axis of the file that points upwards; default: y of glTF, z of others"
-    )
+@dataclass(frozen=True, kw_only=True)
+class Surface(Placed):
+    unit: Annotated[Unit | None, "the file's unit, such as mm"] = None
+    object: Annotated[str | None, "name of an object or layer; of a STEP face: its name or number"] = None
+    up: Annotated[
+        Literal["z", "y"] | None, "axis of the file that points upwards; default: y of glTF, z of others"
+    ] = None  # fmt: skip
 
     def build(self) -> "Target":
         from rodshell.targets import surface_from
@@ -126,18 +123,19 @@ class SurfaceTable(PlacedTable):
         return surface_from(self.file, unit=self.unit, name=self.object, **self.options())
 
 
-class MeshTable(SurfaceTable):
-    kind: Literal["mesh"] = "mesh"
+class Mesh(Surface):
+    kind: ClassVar = "mesh"
 
 
-class NurbsTable(SurfaceTable):
-    kind: Literal["nurbs"] = "nurbs"
+class Nurbs(Surface):
+    kind: ClassVar = "nurbs"
 
 
-class HeightsTable(PlacedTable):
-    kind: Literal["heights"] = "heights"
-    size: Size = Field(description="width along x and depth along y of a rectangle")
-    height: Length | None = Field(default=None, description="height of a CSV's unit; of an image: of white")
+@dataclass(frozen=True, kw_only=True)
+class Heights(Placed):
+    kind: ClassVar = "heights"
+    size: Annotated[Size, "width along x and depth along y of a rectangle"]
+    height: Annotated[Length | None, "height of a CSV's unit; of an image: of white"] = None
 
     def build(self) -> "Target":
         from rodshell.targets import heights_from
@@ -145,19 +143,11 @@ class HeightsTable(PlacedTable):
         return heights_from(self.file, size=self.size, height=self.height, **self.options())
 
 
-class HeldTarget(Table):
+@dataclass(frozen=True, kw_only=True)
+class HeldTarget(Holding):
     """In place of a target that no key describes: a Python function, a mesh made in Python, a table of rods."""
 
     kind: Literal["python", "table"]
 
 
-TargetTable = (
-    HemisphereTable
-    | CapTable
-    | ParaboloidTable
-    | EllipsoidTable
-    | HeightFieldTable
-    | MeshTable
-    | NurbsTable
-    | HeightsTable
-)
+TargetKinds = Hemisphere | Cap | Paraboloid | Ellipsoid | HeightField | Mesh | Nurbs | Heights

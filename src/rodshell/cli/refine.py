@@ -1,5 +1,6 @@
 """`rodshell refine`: a form that is brought nearer to its target. Its options are those of `rodshell form`."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,7 +67,7 @@ def _design(folder: Path, case: "Case") -> dict[str, object]:
     from rodshell.results.archive import read
 
     kept = read(folder)
-    same = load_case(str(folder / "case.toml")).refine.model_dump(exclude={"start", "offer"})
-    if "design" not in kept.states or same != case.refine.model_dump(exclude={"start", "offer"}):
+    same = replace(load_case(str(folder / "case.toml")).refine, start=None, offer="on")
+    if "design" not in kept.states or same != replace(case.refine, start=None, offer="on"):
         return {}
     return {"refine.start": kept.states["design"].tolist()}

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from rodshell.arrays import Floats, Ints
-from rodshell.errors import InputError
 from rodshell.fabrication.cutting import nest, splices
+from rodshell.fabrication.settings import Fabrication
 from rodshell.figures import fabrication as figures
 from rodshell.figures.fabrication import Brace, Piece
 from rodshell.figures.findings import Said, said
@@ -21,38 +21,9 @@ from rodshell.layout.flatgrid import layers
 from rodshell.rods.section import Rod
 from rodshell.rods.varied import varied
 from rodshell.units import length_text
-from rodshell.validation import array, flag, instance, keep, not_negative, number, positive
+from rodshell.validation import array, flag, instance, number
 
 SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
-
-
-@dataclass(frozen=True)
-class Fabrication:
-    """Lengths that decide the cutting.
-
-    Parameters
-    ----------
-    end_allowance : added to a rod at each end [m], to be held by the support.
-    stock_length : of the bars that rods are cut from [m]; None if every rod comes in one piece.
-    kerf : lost at each saw cut of that stock [m].
-    """
-
-    end_allowance: float = 0.0
-    stock_length: float | None = None
-    kerf: float = 0.0
-
-    def __post_init__(self) -> None:
-        keep(self, not_negative, "m", "end_allowance", what="the end allowance")
-        keep(self, not_negative, "m", "kerf", what="the {}")
-        keep(self, positive, "m", "stock_length", what="the stock length")
-        if self.stock_length is None and self.kerf > 0:
-            raise InputError(
-                f"the kerf of {self.kerf} m is lost where stock is cut: give its stock_length, or leave the kerf out"
-            )
-        if self.stock_length is not None and not self.stock_length > self.kerf:
-            raise InputError(
-                f"stock of {self.stock_length} m cannot be cut with a kerf of {self.kerf} m: give longer bars"
-            )
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
-from rodshell.formfinding.end_matching import Point
 from rodshell.formfinding.finite_sections import flat_warnings
 from rodshell.formfinding.methods import Draped
 from rodshell.formfinding.pipeline import Agreement, PatchForm, find_stages
@@ -26,37 +25,13 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
+from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import shown
-from rodshell.validation import choices_of, keep, number, numbers, point, positive
+from rodshell.validation import choices_of
 
 MANY = 0.1  # of the rods: a larger share left out gives a warning
 ASTRAY = 0.005  # of the size: rod ends that are moved further give a warning
 GAP = 2.0  # spacings between the flat grids of neighbouring patches
-
-
-@dataclass(frozen=True)
-class PatchLayout:
-    """Settings of one patch that replace those of the layout; None: as in the layout.
-
-    Parameters
-    ----------
-    anchor : x, y of the point where its axes cross [m]; default: its middle.
-    rotate : angle of family u against x at the anchor, seen from above [rad]; default: the layout's heading at
-        the target's summit, transported to the anchor.
-    spacing : between its rods, of families u and v [m].
-    """
-
-    anchor: Point | None = None
-    rotate: float | None = None
-    spacing: tuple[float, float] | None = None
-
-    def __post_init__(self) -> None:
-        if self.anchor is not None:
-            object.__setattr__(self, "anchor", point("a patch's anchor", self.anchor))
-        keep(self, number, "rad", "rotate", what="a patch's {}")
-        if self.spacing is not None:
-            given = numbers("a patch's spacing", self.spacing, "two lengths in m", 2, "m")
-            object.__setattr__(self, "spacing", tuple(positive("a patch's spacing", each, "m") for each in given))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,6 @@
 """Bracing of an erected shell: cables along the diagonals of its cells, stressed when they are put in."""
 
-from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,100 +8,66 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.layout import GridMesh
 from rodshell.layout.cells import Pattern, diagonals, rim_diagonals
+from rodshell.loads.settings import AcrossOpenings, Cables
 from rodshell.loads.structure import Structure
 from rodshell.rods.cable import CableStretch
-from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.targets import Target
 from rodshell.units import percent_text
-from rodshell.validation import brief, choice, instance, keep, not_negative
 
-AcrossOpenings = Literal["refuse", "leave out"]
-EndsAt = Literal["joints", "supports"]
 SHARES = (0.25, 0.5, 0.75)  # of a diagonal, where it is looked whether the shell is under it
 STEPS = 8  # in which a prestress is applied that is too much for one
 
 
-@dataclass(frozen=True, kw_only=True)
-class Cables:
-    """Cables that carry tension alone, straight from joint to joint, in the outer layer of rods.
+def stressed(cables: Cables, structure: Structure, target: Target) -> Structure:
+    """The structure with its cables stressed, in the equilibrium that it then finds.
 
     Parameters
     ----------
-    rod : section and material of the cables; of their stiffnesses EA counts.
-    pattern : "both" diagonals of every cell, "one", or "every = n": lines of both through every n-th joint.
-    prestrain : by which the erected shell's cables are shorter, free of stress, than where they go [-]. Slack cables
-        brace nothing: factors without prestress are small.
-    ends_at : where lines of cables end: at the outermost "joints", so that the fields at the rim are not braced, or at
-        the "supports" beyond.
-    across_openings : what becomes of diagonals that leave the shell, across an opening: the bracing is refused, or they
-        are left out.
+    target : whose openings the cables must not cross.
+
+    Raises
+    ------
+    InputError : a cable crosses an opening; the shell does not withstand the prestress.
     """
+    mesh, before = structure.mesh, structure.equilibrium
+    pairs = braced_diagonals(
+        mesh,
+        structure.positions(before),
+        target,
+        cables.pattern,
+        cables.across_openings,
+        to_supports=cables.ends_at == "supports",
+    )
+    blocks = np.append(outer_nodes(mesh), structure.shell.ends)[pairs]
+    lengths = np.linalg.norm(before.state[blocks[:, 1]] - before.state[blocks[:, 0]], axis=1)
+    stiffness = np.full(len(blocks), cables.rod.stretch_stiffness)
 
-    rod: Rod
-    pattern: str = "both"
-    prestrain: float = 0.0
-    ends_at: EndsAt = "joints"
-    across_openings: AcrossOpenings = "refuse"
+    def members_of(prestrain: float) -> CableStretch:
+        return CableStretch(blocks, lengths / (1.0 + prestrain), stiffness)
 
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        instance("the bracing's rod", self.rod, Rod)
-        Pattern.of(self.pattern)
-        keep(self, not_negative, "", "prestrain", what="the {}")
-        choice("ends_at", self.ends_at, get_args(EndsAt))
-        choice("across_openings", self.across_openings, get_args(AcrossOpenings))
-
-    def brace(self, structure: Structure, target: Target) -> Structure:
-        """The structure with its cables stressed, in the equilibrium that it then finds.
-
-        Parameters
-        ----------
-        target : whose openings the cables must not cross.
-
-        Raises
-        ------
-        InputError : a cable crosses an opening; the shell does not withstand the prestress.
-        """
-        mesh, before = structure.mesh, structure.equilibrium
-        pairs = braced_diagonals(
-            mesh,
-            structure.positions(before),
-            target,
-            self.pattern,
-            self.across_openings,
-            to_supports=self.ends_at == "supports",
-        )
-        blocks = np.append(outer_nodes(mesh), structure.shell.ends)[pairs]
-        lengths = np.linalg.norm(before.state[blocks[:, 1]] - before.state[blocks[:, 0]], axis=1)
-        stiffness = np.full(len(blocks), self.rod.stretch_stiffness)
-
-        def stressed(prestrain: float) -> CableStretch:
-            return CableStretch(blocks, lengths / (1.0 + prestrain), stiffness)
-
+    found = before
+    for count in (1, STEPS):
         found = before
-        for count in (1, STEPS):
-            found = before
-            for step in range(1, count + 1):
-                members = stressed(self.prestrain * step / count)
-                elements = (*found.elements[: len(structure.shell.elements)], members)
-                problem = replace(before.problem, elements=elements, pattern=found.problem.pattern)
-                found = find_equilibrium(problem, found.state, found.forces)
-                if not found.report.stable:
-                    break
-            if found.report.stable:
+        for step in range(1, count + 1):
+            members = members_of(cables.prestrain * step / count)
+            elements = (*found.elements[: len(structure.shell.elements)], members)
+            problem = replace(before.problem, elements=elements, pattern=found.problem.pattern)
+            found = find_equilibrium(problem, found.state, found.forces)
+            if not found.report.stable:
                 break
-        if not found.report.stable:
-            raise InputError(
-                f"the bracing pulls the shell out of its shape: with a prestrain of {percent_text(self.prestrain)} no "
-                "stable equilibrium was found; stress it less (bracing.prestrain), or use thinner cables"
-            )
-        mass = np.zeros(structure.shell.node_count)
-        for side in range(2):
-            np.add.at(mass, blocks[:, side], 0.5 * lengths * self.rod.mass_per_length)
-        shell = structure.shell.with_elements(found.elements[: len(structure.shell.elements)])
-        return replace(structure, shell=shell, equilibrium=found, braced=pairs, bracing_mass=mass, cables=members)
+        if found.report.stable:
+            break
+    if not found.report.stable:
+        raise InputError(
+            f"the bracing pulls the shell out of its shape: with a prestrain of {percent_text(cables.prestrain)} no "
+            "stable equilibrium was found; stress it less (bracing.prestrain), or use thinner cables"
+        )
+    mass = np.zeros(structure.shell.node_count)
+    for side in range(2):
+        np.add.at(mass, blocks[:, side], 0.5 * lengths * cables.rod.mass_per_length)
+    shell = structure.shell.with_elements(found.elements[: len(structure.shell.elements)])
+    return replace(structure, shell=shell, equilibrium=found, braced=pairs, bracing_mass=mass, cables=members)
 
 
 def braced_diagonals(

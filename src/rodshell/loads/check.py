@@ -28,13 +28,15 @@ from rodshell.formfinding import PatchForm, PopUp, pop_up
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
 from rodshell.layout import GridMesh
-from rodshell.loads.bracing import Cables
+from rodshell.loads.bracing import stressed
 from rodshell.loads.combinations import Loads
-from rodshell.loads.kinds import Forces, LoadedNodes, Settlement, Temperature
-from rodshell.loads.laths import Laths
+from rodshell.loads.kinds import Forces, Settlement, Temperature
+from rodshell.loads.laths import laid
+from rodshell.loads.locked_joints import locked
+from rodshell.loads.settings import Cables, Laths
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
 from rodshell.loads.structure import Structure
-from rodshell.loads.tributary import Tributary, tributary_areas
+from rodshell.loads.tributary import LoadedNodes, Tributary, tributary_areas
 from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import Duration
 from rodshell.solve.equilibrium import Equilibrium
@@ -43,6 +45,9 @@ from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.modes import LinearBuckling, linear_buckling, softest_motion
 from rodshell.units import shown
+
+BRACED: dict[type, Callable[..., Structure]] = {Cables: stressed, Laths: laid}
+"""How each kind of bracing is put into a shell."""
 
 PERMANENT: Duration = "permanent"
 ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
@@ -233,9 +238,9 @@ def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm | Patched
     structure, bracing = Structure.erected(popped, stages.rod), loads.bracing
     if bracing is not None:
         fitted = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
-        structure = fitted.brace(structure, stages.target)
+        structure = BRACED[type(fitted)](fitted, structure, stages.target)
     if loads.locked_joints is not None:
-        structure = loads.locked_joints.lock(structure)
+        structure = locked(loads.locked_joints, structure)
     if (reason := mechanism(structure)) is not None:
         raise InputError(f"with {ends} ends {reason}")
     return structure

@@ -3,57 +3,11 @@
 from dataclasses import dataclass, field
 
 from rodshell.errors import InputError
-from rodshell.loads.bracing import Cables
-from rodshell.loads.kinds import LineLoad, Load, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
-from rodshell.loads.laths import Laths
-from rodshell.loads.locked_joints import LockedJoints
-from rodshell.loads.strength import Strength
+from rodshell.loads.kinds import Load
+from rodshell.loads.settings import Bracing, LockedJoints, Stability, Strength
 from rodshell.rods.design_strength import DURATIONS, Duration
 from rodshell.units import shown
-from rodshell.validation import brief, choice, described, instance, mapping, not_negative, positive, whole
-
-Bracing = Cables | Laths
-LASTING: dict[type, Duration] = {
-    SelfWeight: "permanent", Settlement: "permanent", Snow: "short", Wind: "short",
-    PointLoad: "medium", LineLoad: "medium", Temperature: "medium",
-}  # fmt: skip
-"""How long a load acts where that is not given [EN 1995-1-1, table 2.2; imposed loads: medium]. Codes of some countries
-count snow as medium."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stability:
-    """How stability is looked at.
-
-    Parameters
-    ----------
-    imperfection : largest displacement of the geometry with imperfections [m], or a part of the span such as
-        "span/500"; None: the perfect geometry alone.
-    modes : lowest buckling modes that are looked for; an imperfection in each of them is tried, with either sign.
-    """
-
-    imperfection: float | str | None = None
-    modes: int = 3
-
-    def __post_init__(self) -> None:
-        if self.imperfection is not None:
-            self.amplitude(1.0)
-        whole("the number of modes", self.modes, 1, 1000)
-
-    def amplitude(self, span: float) -> float | None:
-        """Largest displacement of the geometry with imperfections [m]; None: the perfect geometry alone.
-
-        Parameters
-        ----------
-        span : of the shell [m].
-        """
-        given = self.imperfection
-        if not isinstance(given, str):
-            return None if given is None else positive("the imperfection", given, "m")
-        before, _, part = given.partition("/")
-        if before.strip() != "span" or not part.strip().replace(".", "", 1).isdecimal() or not float(part) > 0:
-            raise InputError(f'the imperfection must be a length in m, or "span/500", not {shown(given)}')
-        return span / float(part)
+from rodshell.validation import brief, choice, described, instance, mapping, not_negative
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +21,7 @@ class Loads:
     locked_joints : how pins are tightened after that, before the loads act; None: they stay free.
     stability : how stability is looked at.
     strength : what rods and joints withstand.
-    durations : by a load's name, how long it acts; default: by its kind, see `LASTING`.
+    durations : by a load's name, how long it acts; default: by its kind, see `loads.kinds`.
 
     Raises
     ------
@@ -87,7 +41,7 @@ class Loads:
     def duration(self, combination: str) -> Duration:
         """How long a combination acts: as long as the load in it that acts for the shortest time."""
         acting = [name for name, factor in self.combinations[combination].items() if factor > 0]
-        each = [self.durations.get(name, LASTING[type(self.loads[name])]) for name in acting]
+        each = [self.durations.get(name, self.loads[name].lasting) for name in acting]
         return max(each, key=DURATIONS.index, default="permanent")
 
     def __post_init__(self) -> None:

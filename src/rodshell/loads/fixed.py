@@ -9,7 +9,8 @@ from rodshell.formfinding.pipeline import PatchForm
 from rodshell.formfinding.popup import Ends
 from rodshell.loads.check import tributary_of
 from rodshell.loads.combinations import Loads
-from rodshell.loads.kinds import Forces, LoadedNodes, SelfWeight
+from rodshell.loads.kinds import Forces, SelfWeight
+from rodshell.loads.tributary import LoadedNodes
 from rodshell.units import shown
 
 

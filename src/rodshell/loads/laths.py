@@ -17,78 +17,51 @@ from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import joint_normals
 from rodshell.joints.standoff import Standoffs
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
-from rodshell.layout.cells import Pattern, flat_joints, lines
+from rodshell.layout.cells import flat_joints, lines
 from rodshell.layout.flatgrid import Crossings
-from rodshell.loads.bracing import AcrossOpenings, braced_diagonals, outer_nodes
+from rodshell.loads.bracing import braced_diagonals, outer_nodes
+from rodshell.loads.settings import Laths
 from rodshell.loads.structure import LathLayer, Structure
 from rodshell.model import Freedom, Shell
 from rodshell.model.shell import OFFSET_STIFFNESS
 from rodshell.rods.elements import Elements, Stretch
-from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_stable
 from rodshell.solve.problem import Supports
 from rodshell.targets import Target
-from rodshell.validation import brief, choice, instance, keep, not_negative
 
 FINEST = 8  # edges from joint to joint, at most as many as the grid's rods have
 SAMPLES = 32  # of a lath's curve from joint to joint, for its length
 
 
-@dataclass(frozen=True, kw_only=True)
-class Laths:
-    """A third layer of laths.
+def laid(laths: Laths, structure: Structure, target: Target) -> Structure:
+    """The structure with its laths laid, in the equilibrium that both find.
 
     Parameters
     ----------
-    rod : section and material; None: those of the grid's rods.
-    pattern : "one" diagonal of every cell, "both", or "every = n": lines of both through every n-th joint.
-    eccentricity : distance of their centre lines from those of the outer rods [m]; 0: they share the joints' nodes.
-    across_openings : as of `Cables`.
+    target : whose openings the laths must not cross.
+
+    Raises
+    ------
+    InputError : a lath crosses an opening; no stable equilibrium of both is found; the laths have no rod.
     """
-
-    rod: Rod | None = None
-    pattern: str = "one"
-    eccentricity: float = 0.0
-    across_openings: AcrossOpenings = "refuse"
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        if self.rod is not None:
-            instance("the bracing's rod", self.rod, Rod)
-        Pattern.of(self.pattern)
-        keep(self, not_negative, "m", "eccentricity", what="the bracing's {}")
-        choice("across_openings", self.across_openings, ("refuse", "leave out"))
-
-    def brace(self, structure: Structure, target: Target) -> Structure:
-        """The structure with its laths laid, in the equilibrium that both find.
-
-        Parameters
-        ----------
-        target : whose openings the laths must not cross.
-
-        Raises
-        ------
-        InputError : a lath crosses an opening; no stable equilibrium of both is found; the laths have no rod.
-        """
-        mesh, before = structure.mesh, structure.equilibrium
-        if self.rod is None:
-            raise InputError("these laths have no rod of their own: give one, such as that of the grid")
-        pairs = braced_diagonals(mesh, structure.positions(before), target, self.pattern, self.across_openings)
-        rows = lines(pairs, flat_joints(mesh.grid))
-        normals = joint_normals(mesh, structure.positions(before))
-        over = before.state[outer_nodes(mesh)] + self.eccentricity * normals
-        laid = _Laid.over(rows, over, normals, np.median(mesh.edge_lengths))
-        shell = Shell.of(laid.mesh, self.rod)
-        blocks = structure.size + np.arange(len(shell.like))
-        if not self.eccentricity:
-            joints = laid.mesh.rod_nodes[laid.entries]
-            blocks[joints] = outer_nodes(mesh)[laid.crossings]
-            kept = np.setdiff1d(np.arange(len(blocks)), joints)
-            blocks[kept] = structure.size + np.arange(len(kept))
-        layer = LathLayer(shell, blocks, self.rod, tuple(tuple(row) for row in rows), laid.entries)
-        ties = _ties(structure, layer, laid.crossings, self.eccentricity) if self.eccentricity else ()
-        return _joined(structure, layer, laid, ties)
+    mesh, before = structure.mesh, structure.equilibrium
+    if laths.rod is None:
+        raise InputError("these laths have no rod of their own: give one, such as that of the grid")
+    pairs = braced_diagonals(mesh, structure.positions(before), target, laths.pattern, laths.across_openings)
+    rows = lines(pairs, flat_joints(mesh.grid))
+    normals = joint_normals(mesh, structure.positions(before))
+    over = before.state[outer_nodes(mesh)] + laths.eccentricity * normals
+    over_joints = _Laid.over(rows, over, normals, np.median(mesh.edge_lengths))
+    shell = Shell.of(over_joints.mesh, laths.rod)
+    blocks = structure.size + np.arange(len(shell.like))
+    if not laths.eccentricity:
+        joints = over_joints.mesh.rod_nodes[over_joints.entries]
+        blocks[joints] = outer_nodes(mesh)[over_joints.crossings]
+        kept = np.setdiff1d(np.arange(len(blocks)), joints)
+        blocks[kept] = structure.size + np.arange(len(kept))
+    layer = LathLayer(shell, blocks, laths.rod, tuple(tuple(row) for row in rows), over_joints.entries)
+    ties = _ties(structure, layer, over_joints.crossings, laths.eccentricity) if laths.eccentricity else ()
+    return _joined(structure, layer, over_joints, ties)
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,53 +35,14 @@ from rodshell.figures.loads import DesignStrength
 from rodshell.figures.records import Found
 from rodshell.geometry.frames import dot, unit
 from rodshell.layout import GridMesh
+from rodshell.loads.settings import Strength
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.rods.design_strength import DESIGN, DURATIONS, Duration
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Section, Tube
-from rodshell.validation import brief, keep, not_negative, positive, whole
+from rodshell.validation import brief
 
 By = Literal["bending", "shear", "slip", "permanent", "slip_unloaded"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Strength:
-    """What rods and joints withstand, where it is not that of the material's preset.
-
-    Parameters
-    ----------
-    permanent, long, medium, short, instantaneous : design strength in bending for loads that act so long [Pa]. Given
-        ones stand in place of all of the preset's; one that is missing is that of the next longer duration.
-    erection : the same while the shell is erected [Pa]; None: the short one.
-    service_class : of timber: 1 inside, 2 covered, 3 in the weather; None: 2.
-    hole : diameter of the bolts' holes through the rods at joints [m].
-    slip : axial force that a joint can transfer between its rods [N]; None: not known.
-    effective_length : of a span between joints, over its length, for its Euler load [-].
-    """
-
-    permanent: float | None = None
-    long: float | None = None
-    medium: float | None = None
-    short: float | None = None
-    instantaneous: float | None = None
-    erection: float | None = None
-    service_class: int | None = None
-    hole: float = 0.0
-    slip: float | None = None
-    effective_length: float = 1.0
-
-    def __post_init__(self) -> None:
-        keep(self, positive, "Pa", *DURATIONS, "erection", what="the strength ({})")
-        keep(self, positive, "N", "slip", what="the strength ({})")
-        if self.service_class is not None:
-            whole("the service class", self.service_class, 1, 3)
-        keep(self, not_negative, "m", "hole", what="the diameter of holes")
-        keep(self, positive, "", "effective_length", what="the effective length")
-
-    @property
-    def given(self) -> dict[Duration, float]:
-        """The given strengths by duration [Pa]."""
-        return {name: getattr(self, name) for name in DURATIONS if getattr(self, name) is not None}
 
 
 class Limits(DesignStrength):

@@ -33,7 +33,7 @@ from rodshell.joints import (
     require_joint,
 )
 from rodshell.joints.crossings import Corners, LinkerBend, RodNodes
-from rodshell.joints.joint import Elastic, elastic_joints, refuse_mixtures
+from rodshell.joints.joint import elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
@@ -42,6 +42,7 @@ from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, Stretch, turned, with_frames
 from rodshell.rods.isotropic import IsotropicBend
+from rodshell.rods.joints import Elastic
 from rodshell.rods.section import Rod
 from rodshell.validation import flag, instance
 

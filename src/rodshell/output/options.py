@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rodshell.checks.bending import VON_MISES, require_known_stress
 from rodshell.checks.check import MOST_STAGES
 from rodshell.errors import InputError
-from rodshell.fabrication import Fabrication
+from rodshell.fabrication.settings import Fabrication
 from rodshell.joints import Joint
 from rodshell.loads.strength import Limits
 from rodshell.output.drawing import FORBIDDEN, LAYERS
@@ -17,7 +17,7 @@ from rodshell.units import shown
 from rodshell.validation import choice, instance, keep, listed, positive, whole
 
 if TYPE_CHECKING:
-    from rodshell.loads.strength import Limits, Strength
+    from rodshell.loads.settings import Strength
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 

@@ -16,7 +16,6 @@ from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
 from rodshell.formfinding.popup import Ends, PopUp
 from rodshell.formfinding.trim import Footprint
-from rodshell.joints.joint import Elastic
 from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
@@ -27,6 +26,7 @@ from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
 from rodshell.refining.structure import Point, Structure, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
+from rodshell.rods.joints import Elastic
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.units import percent_text

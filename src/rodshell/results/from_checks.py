@@ -10,7 +10,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.checks import Bending as BendingCheck
 from rodshell.checks import Checks
 from rodshell.checks.bending import worst
-from rodshell.fabrication import Fabricated
+from rodshell.fabrication.fabricate import Fabricated
 from rodshell.figures.checks import Bending, Contact, WorstBent
 from rodshell.figures.form import Bent, Rod
 from rodshell.figures.records import Ends

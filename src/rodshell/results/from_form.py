@@ -48,11 +48,11 @@ from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.seams import End
 from rodshell.formfinding.trim import ends_past_net
 from rodshell.joints import joint_parameters
-from rodshell.joints.joint import Joint as JointModel
 from rodshell.kernels import description
 from rodshell.layout import FlatGrid, Profile
 from rodshell.nets import ChebyshevNet
 from rodshell.results.results import Results
+from rodshell.rods.joints import Joint as JointModel
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod as RodModel
 from rodshell.rods.varied import sizes

@@ -18,6 +18,7 @@ from rodshell.results.sizes_sold import half_sides, sizes_sold
 from rodshell.results.strength_used import THIN, bent_of, holds_while_erected, strength_name
 from rodshell.results.wording import FORM_AGAIN, part_of_weight, percent, rounded, rounded_down, shown_factor
 from rodshell.rods.section import Section, size_text
+from rodshell.schema import written
 
 WITHOUT_STIFFNESS = ("ball", "pin", "rigid")  # joints
 NOT_KNOWN = ("not followed", "no mass", None)  # limits of which no factor follows
@@ -212,11 +213,9 @@ def _again(results: Results, section: Section) -> tuple[str, ...]:
         return ()
     now = results.rod.section.kind if results.rod and results.rod.section else None
     lengths = {
-        key: f'"{rounded(1e3 * value, 4)} mm"'
-        for key, value in section.parameters().items()
-        if isinstance(value, float)
+        key: f'"{rounded(1e3 * value, 4)} mm"' for key, value in written(section).items() if isinstance(value, float)
     }
-    kind = {} if section.parameters()["kind"] == now else {"kind": section.parameters()["kind"]}
+    kind = {} if written(section)["kind"] == now else {"kind": written(section)["kind"]}
     words = " ".join(f"--rod.section.{key} {value}" for key, value in (kind | lengths).items())
     return (f"{FORM_AGAIN} {words}",)
 
@@ -232,7 +231,7 @@ def _gain(rod: RodType, section: Section) -> float:
 
 def _sharper(rod: RodType, section: Section) -> float:
     """How many times as much the same bends strain this section, at most."""
-    other = half_sides(RodSection.model_validate(section.parameters()))
+    other = half_sides(RodSection.model_validate(written(section)))
     now = half_sides(rod.section) if rod.section else ()
     return max((new / old for new, old in zip(other, now, strict=False)), default=inf)
 

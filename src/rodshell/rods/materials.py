@@ -5,11 +5,13 @@ What building codes make of them for duration of load, moisture and safety is in
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from rodshell.errors import InputError
+from rodshell.quantities import Density, PoissonRatio, Stress
+from rodshell.schema import Key, Missing, Table, checked, written
 from rodshell.units import shown
-from rodshell.validation import brief, keep, number, positive
+from rodshell.validation import brief
 
 _REPLACEABLE = ("youngs_modulus", "density", "shear", "poisson_ratio")
 PresetName = Literal["larch", "spruce", "oak", "bamboo", "gfrp", "plywood", "petg", "spring-steel", "rubber"]
@@ -127,8 +129,6 @@ class Material:
 
     Parameters
     ----------
-    youngs_modulus : [Pa].
-    density : [kg/m3].
     poisson_ratio : [-], above -1 and up to 0.5, which is incompressible.
     shear : shear modulus [Pa] in place of Poisson's ratio, as for timber, which is not isotropic.
     name : of the preset, which has the strengths; set by `Material.preset`.
@@ -138,25 +138,37 @@ class Material:
     InputError : a value is out of range; Poisson's ratio and a shear modulus are both given; no such preset.
     """
 
-    youngs_modulus: float
-    density: float
-    poisson_ratio: float = 0.5
-    shear: float | None = None
-    name: PresetName | None = None
+    youngs_modulus: Annotated[
+        Stress, "Young's modulus", Missing(f"give it, or a preset ({', '.join(get_args(PresetName))})")
+    ]  # fmt: skip
+    density: Annotated[Density, "density"]
+    poisson_ratio: Annotated[PoissonRatio, "Poisson's ratio; default 0.5"] = 0.5
+    shear: Annotated[Stress | None, "shear modulus, in place of Poisson's ratio, as for timber"] = None
+    name: Annotated[
+        PresetName | None, Key("preset", first=True), "a named material; other keys of its table replace its values"
+    ] = None  # fmt: skip
 
     __repr__ = brief
 
+    @classmethod
+    def completed(cls, given: Table, path: str) -> Table:
+        """What a preset says of the keys that are left out; a density of 1000 kg/m3 without."""
+        given = {key: value for key, value in given.items() if value is not None}
+        if "shear" in given and "poisson_ratio" in given:
+            raise InputError(f"{path}.shear stands in place of poisson_ratio: leave one of them out")
+        if isinstance(name := given.get("preset"), str) and name in get_args(PresetName):
+            given = preset_values(name, given)
+        return {"density": 1000.0, **given}
+
     def __post_init__(self) -> None:
-        keep(self, positive, "Pa", "youngs_modulus", what="Young's modulus")
-        keep(self, positive, "kg/m3", "density")
-        keep(self, number, "", "poisson_ratio", what="Poisson's ratio")
-        keep(self, positive, "Pa", "shear", what="shear modulus")
+        if self.name is not None:
+            preset_named(self.name)
+        names = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio", "shear": "shear modulus"}
+        checked(self, names)
         if not -1 < self.poisson_ratio <= 0.5:
             raise InputError(f"Poisson's ratio must lie above -1 and not above 0.5, not {self.poisson_ratio}")
         if self.shear is not None and self.poisson_ratio != 0.5:
             raise InputError(f"give Poisson's ratio ({self.poisson_ratio}) or a shear modulus, not both")
-        if self.name is not None:
-            preset_named(self.name)
 
     @classmethod
     def preset(cls, name: PresetName, **changed: float) -> Self:
@@ -193,10 +205,11 @@ class Material:
 
     def parameters(self) -> dict[str, object]:
         """The values in SI as they stand in a case file; with the preset's name, if it has one."""
-        values: dict[str, object] = dict(vars(self))
-        del values["poisson_ratio" if self.shear is not None else "shear"]
-        name = values.pop("name")
-        return values if name is None else {"preset": name, **values}
+        return written(self)
+
+    def as_written(self, keys: dict[str, Any]) -> dict[str, Any]:
+        """Without Poisson's ratio where the shear modulus stands in its place."""
+        return {key: value for key, value in keys.items() if key != "poisson_ratio" or self.shear is None}
 
 
 def preset_named(name: str) -> Preset:

@@ -4,14 +4,27 @@ A section has two axes, those of the material directors m1 and m2. The second mo
 *towards* m1 and m2: I1 is the integral of the square of the coordinate along m1.
 """
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from math import pi, tanh
+from typing import Annotated, ClassVar
 
 from rodshell.errors import InputError
+from rodshell.quantities import (
+    BendingStiffness,
+    Force,
+    InertiaPerLength,
+    Length,
+    Lengths,
+    MassPerLength,
+    SectionModulus,
+    Stress,
+)
 from rodshell.rods.materials import Material as Material
 from rodshell.rods.materials import PresetName
-from rodshell.validation import brief, instance, keep, not_negative, numbers, positive
+from rodshell.schema import Table, checked, written
+from rodshell.validation import brief, instance
 
 MM = 1e-3
 
@@ -47,21 +60,13 @@ class _Round:
 
 @dataclass(frozen=True)
 class Circle(_Round):
-    """Solid circular section.
+    """Solid circular section."""
 
-    Parameters
-    ----------
-    radius : [m].
-
-    Raises
-    ------
-    InputError : the radius is not a positive number.
-    """
-
-    radius: float
+    kind: ClassVar = "circle"
+    radius: Annotated[Length, "radius (of a tube: outer)"]
 
     def __post_init__(self) -> None:
-        keep(self, positive, "m", "radius", what="section {}")
+        checked(self, "section {}")
 
     @property
     def outer_radius(self) -> float:
@@ -78,30 +83,17 @@ class Circle(_Round):
         """Second moment of area about any diameter [m4]."""
         return pi * self.radius**4 / 4
 
-    def parameters(self) -> dict[str, object]:
-        """The section's kind and numbers in SI, as they stand in a case file."""
-        return {"kind": "circle", "radius": self.radius}
-
 
 @dataclass(frozen=True)
 class Tube(_Round):
-    """Circular tube.
+    """Circular tube, whose wall is not thicker than its radius."""
 
-    Parameters
-    ----------
-    radius : outer radius [m].
-    thickness : of the wall [m].
-
-    Raises
-    ------
-    InputError : one of them is not a positive number; the wall is thicker than the radius.
-    """
-
-    radius: float
-    thickness: float
+    kind: ClassVar = "tube"
+    radius: Annotated[Length, "outer radius"]
+    thickness: Annotated[Length, "thickness of the tube's wall"]
 
     def __post_init__(self) -> None:
-        keep(self, positive, "m", "radius", "thickness", what="section {}")
+        checked(self, "section {}")
         if self.thickness > self.radius:
             raise InputError(f"tube thickness {self.thickness} m is larger than its radius {self.radius} m")
 
@@ -125,29 +117,17 @@ class Tube(_Round):
         """Second moment of area about any diameter [m4]."""
         return pi * (self.radius**4 - self.inner_radius**4) / 4
 
-    def parameters(self) -> dict[str, object]:
-        """The section's kind and numbers in SI, as they stand in a case file."""
-        return {"kind": "tube", "radius": self.radius, "thickness": self.thickness}
-
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Solid ellipse.
+    """Solid ellipse with half-axes along m1 and m2."""
 
-    Parameters
-    ----------
-    a, b : half-axes along m1 and m2 [m].
-
-    Raises
-    ------
-    InputError : one of them is not a positive number.
-    """
-
-    a: float
-    b: float
+    kind: ClassVar = "ellipse"
+    a: Annotated[Length, "half-axis along the grid's normal"]
+    b: Annotated[Length, "half-axis within the grid"]
 
     def __post_init__(self) -> None:
-        keep(self, positive, "m", "a", "b", what="half-axis {}")
+        checked(self, "half-axis {}")
 
     @property
     def area(self) -> float:
@@ -169,29 +149,17 @@ class Ellipse:
         """The longer axis [m]."""
         return 2 * max(self.a, self.b)
 
-    def parameters(self) -> dict[str, object]:
-        """The section's kind and numbers in SI, as they stand in a case file."""
-        return {"kind": "ellipse", "a": self.a, "b": self.b}
-
 
 @dataclass(frozen=True)
 class RectangularSection:
-    """Solid rectangle. (`rodshell.Rectangle` is a target's domain.)
+    """Solid rectangle with sides along m1 and m2. (`rodshell.Rectangle` is a target's domain.)"""
 
-    Parameters
-    ----------
-    width, height : sides along m1 and m2 [m].
-
-    Raises
-    ------
-    InputError : one of them is not a positive number.
-    """
-
-    width: float
-    height: float
+    kind: ClassVar = "rectangle"
+    width: Annotated[Length, "side along the grid's normal: of a flat lath its thickness"]
+    height: Annotated[Length, "side within the grid: of a flat lath its breadth"]
 
     def __post_init__(self) -> None:
-        keep(self, positive, "m", "width", "height", what="section {}")
+        checked(self, "section {}")
 
     @property
     def area(self) -> float:
@@ -216,63 +184,39 @@ class RectangularSection:
         """The longer side [m]."""
         return max(self.width, self.height)
 
-    def parameters(self) -> dict[str, object]:
-        """The section's kind and numbers in SI, as they stand in a case file."""
-        return {"kind": "rectangle", "width": self.width, "height": self.height}
-
 
 @dataclass(frozen=True)
 class GivenSection:
     """Stiffnesses and masses as they are, of a composite or a measured rod; such a rod takes no material.
 
-    Parameters
-    ----------
-    EA : stretch stiffness [N].
-    EI1, EI2 : stiffnesses against bends towards m1 and m2 [N m2].
-    GJ : twist stiffness [N m2].
-    mass : per length [kg/m].
-    rotary_inertia : about the tangent, per length [kg m]; needed only for dynamics with twist.
-    fibre_distances : of the outermost fibres from the axis, along m1 and m2 [m]. With this and the next two its stress
-        is known, which a check of strength needs.
-    fibre_modulus : Young's modulus of the outermost fibres [Pa].
-    torsion_modulus : twisting moment over the largest shear stress that it causes [m3]; needed if rods are twisted.
-
-    Raises
-    ------
-    InputError : a stiffness or a fibre value is not a positive number, or a mass is negative.
+    EI1 and EI2 are against bends towards m1 and m2. The rotary inertia is needed only for dynamics with twist. With the
+    fibres' distances along m1 and m2 and their modulus the stress is known, which a check of strength needs; of twisted
+    rods also with the torsion modulus.
     """
 
-    EA: float
-    EI1: float
-    EI2: float
-    GJ: float
-    mass: float = 0.0
-    rotary_inertia: float = 0.0
-    fibre_distances: tuple[float, float] | None = None
-    fibre_modulus: float | None = None
-    torsion_modulus: float | None = None
+    kind: ClassVar = "given"
+    EA: Annotated[Force, "axial stiffness"]
+    EI1: Annotated[BendingStiffness, "bending stiffness out of the grid"]
+    EI2: Annotated[BendingStiffness, "bending stiffness within the grid"]
+    GJ: Annotated[BendingStiffness, "torsional stiffness"]
+    mass: Annotated[MassPerLength, "mass per length"] = 0.0
+    rotary_inertia: Annotated[InertiaPerLength, "rotary inertia about the rod's axis, per length"] = 0.0
+    fibre_distances: Annotated[
+        Lengths | None, "distances of the outermost fibres, across the grid and within it"
+    ] = None  # fmt: skip
+    fibre_modulus: Annotated[Stress | None, "Young's modulus of the outermost fibres"] = None
+    torsion_modulus: Annotated[
+        SectionModulus | None, "torsional section modulus: torque over the largest shear stress"
+    ] = None  # fmt: skip
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        keep(self, positive, "N", "EA")
-        keep(self, positive, "N m2", "EI1", "EI2", "GJ")
-        keep(self, positive, "Pa", "fibre_modulus")
-        keep(self, positive, "m3", "torsion_modulus")
-        keep(self, not_negative, "kg/m", "mass")
-        keep(self, not_negative, "kg m", "rotary_inertia")
-        if self.fibre_distances is not None:
-            given = numbers("fibre_distances", self.fibre_distances, "two lengths along m1 and m2 in m", 2, "m")
-            distances = tuple(positive("fibre distance", distance, "m") for distance in given)
-            object.__setattr__(self, "fibre_distances", distances)
-
-    def parameters(self) -> dict[str, object]:
-        """The section's kind and numbers in SI, as they stand in a case file."""
-        known = {name: value for name, value in asdict(self).items() if value is not None}
-        return {"kind": "given", **known}
+        checked(self)
 
 
-Section = Circle | Tube | Ellipse | RectangularSection
+Sized = Ellipse | RectangularSection
+Section = Circle | Tube | Sized
 SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 
 
@@ -290,10 +234,18 @@ class Rod:
     InputError : section or material are something else, or exclude each other.
     """
 
-    section: Section | GivenSection
+    section: Annotated[Section | GivenSection, "section and material"]
     material: Material | None = None
 
     __repr__ = brief
+
+    @classmethod
+    def completed(cls, given: Table, path: str) -> Table:
+        """As it is, with a material or a section that needs none."""
+        section = given.get("section")
+        if isinstance(section, Mapping) and section.get("kind") != GivenSection.kind and not given.get("material"):
+            raise InputError(f"{path}.material is missing: give the material")
+        return given
 
     def __post_init__(self) -> None:
         instance("section", self.section, Section | GivenSection, SECTIONS)
@@ -363,8 +315,7 @@ class Rod:
 
     def parameters(self) -> dict[str, dict[str, object]]:
         """Section and material in SI, as they stand in a case file."""
-        material = {} if self.material is None else {"material": self.material.parameters()}
-        return {"section": self.section.parameters(), **material}
+        return written(self)
 
 
 def scaled(section: Section, factor: float) -> Section:

@@ -147,7 +147,7 @@ def handles(form: "Form") -> Mapping[str, Any] | None:
     anchor = form.case.drape.anchor or form.target.summit
     place = form.target.lift(np.array([anchor], dtype=float))[0]
     found = {"anchor": place.tolist(), "heading": form.layout.rotate, "size": form.target.size}
-    if "base" in type(form.case.target).model_fields:  # its plane can be moved
+    if hasattr(form.case.target, "base"):  # its plane can be moved
         ends = form.boundary.points
         found["base"] = ends[int(ends[:, 0].argmax())].tolist()
     return found

@@ -6,6 +6,7 @@ from rodshell.output.viewer import scene_of
 from rodshell.results import wording
 from rodshell.results.verdict import facts as facts_of
 from rodshell.results.wording import rounding_of
+from rodshell.schema import written
 from rodshell.studio.preview import Figures, figures, handles, plan
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def checked(form: "Form", job: "Job") -> tuple[dict[str, Any], bytes]:
 
 def _resolved(form: "Form") -> dict[str, Any]:
     """The case with the values that were chosen where it says "auto"."""
-    tables = form.case.model_dump(mode="json", exclude_none=True)
+    tables = written(form.case)
     chosen = form.layout.parameters()
     tables["layout"] = {name: chosen.get(name, now) if now == "auto" else now for name, now in tables["layout"].items()}
     return tables

@@ -12,6 +12,7 @@ from typing import Any
 from rodshell.case.load import FILE_KEYS
 from rodshell.errors import InputError
 from rodshell.job import Job
+from rodshell.schema import written
 from rodshell.targets.gltf import gltf_parts
 from rodshell.targets.mesh_files import file_bytes
 from rodshell.units import shown
@@ -32,7 +33,7 @@ def job_identity(job: Job, until: str) -> str:
     ------
     InputError : a file of the case cannot be read.
     """
-    tables: dict[str, Any] = job.case.model_dump(exclude_none=True)
+    tables: dict[str, Any] = written(job.case)
     for table, keys in FILE_KEYS.items():
         for key in keys:
             if key in tables.get(table, ()):

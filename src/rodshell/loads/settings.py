@@ -1,0 +1,214 @@
+"""What decides a check under loads, except the loads: bracing, locked joints, stability, strength."""
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from rodshell.errors import InputError
+from rodshell.quantities import Distance, Factor, Force, Share, SlipMoment, Stiffness, Stress, Value, Whole
+from rodshell.rods.design_strength import DURATIONS, Duration
+from rodshell.rods.joints import Joint, Pin
+from rodshell.rods.section import Rod
+from rodshell.schema import Inline, checked
+from rodshell.units import read_quantity, shown
+from rodshell.validation import brief, instance, positive, whole
+
+AcrossOpenings = Literal["refuse", "leave out"]
+
+
+def _pattern(value: str) -> str:
+    """ "both", "one" or "every = n"."""
+    from rodshell.layout.cells import Pattern  # here, as it needs NumPy
+
+    Pattern.of(value)
+    return value
+
+
+Diagonals = Annotated[
+    str, Value(_pattern, lambda _, value: _pattern(value)), 'diagonals: "both" of a cell, "one", or "every = n"'
+]  # fmt: skip
+OnOpenings = Annotated[AcrossOpenings, "what becomes of diagonals across an opening"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cables:
+    """Cables that carry tension alone, straight from joint to joint, in the outer layer of rods.
+
+    Parameters
+    ----------
+    rod : section and material of the cables; of their stiffnesses EA counts.
+    pattern : "both" diagonals of every cell, "one", or "every = n": lines of both through every n-th joint.
+    prestrain : by which the erected shell's cables are shorter, free of stress, than where they go [-]. Slack cables
+        brace nothing: factors without prestress are small.
+    ends_at : where lines of cables end: at the outermost "joints", so that the fields at the rim are not braced, or at
+        the "supports" beyond.
+    across_openings : what becomes of diagonals that leave the shell, across an opening: the bracing is refused, or they
+        are left out.
+    """
+
+    kind: ClassVar = "cables"
+    pattern: Diagonals = "both"
+    prestrain: Annotated[Share, "strain by which cables are shortened when they are put in"] = 0.0
+    ends_at: Annotated[
+        Literal["joints", "supports"], "where cables end: at the outermost joints, or at the supports"
+    ] = "joints"  # fmt: skip
+    across_openings: OnOpenings = "refuse"
+    rod: Annotated[Rod, Inline]
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        instance("the bracing's rod", self.rod, Rod)
+        checked(self, {"prestrain": "the {}"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Laths:
+    """A third layer of laths.
+
+    Parameters
+    ----------
+    rod : section and material; None: those of the grid's rods.
+    pattern, across_openings : as of `Cables`.
+    eccentricity : 0: they share the joints' nodes.
+    """
+
+    kind: ClassVar = "laths"
+    pattern: Diagonals = "one"
+    eccentricity: Annotated[Distance, "distance of the laths' centre lines from the outer rods'"] = 0.0
+    across_openings: OnOpenings = "refuse"
+    rod: Annotated[Rod | None, Inline] = None
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        if self.rod is not None:
+            instance("the bracing's rod", self.rod, Rod)
+        checked(self, {"eccentricity": "the bracing's {}"})
+
+
+Bracing = Cables | Laths
+
+
+@dataclass(frozen=True, kw_only=True)
+class LockedJoints:
+    """Pins that are tightened before loads act.
+
+    Parameters
+    ----------
+    shear : stiffness of a tightened joint about its normal [N m/rad]; `inf` is rigid.
+    slip : moment about the normal that it transfers before it slips [N m]; None: not known. With `Strength.slip` both
+        count together.
+
+    """
+
+    shear: Annotated[Stiffness, "stiffness about the normal of pins tightened after erection"]
+    slip: Annotated[SlipMoment | None, "moment at which they slip; default: not checked"] = None
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        checked(self, {"shear": "the {} stiffness of locked joints", "slip": "the moment at which locked joints {}"})
+        if self.shear == 0:
+            raise InputError("locked joints without shear stiffness are free: give one, or leave locked_joints out")
+
+    def require_pins(self, joint: Joint) -> None:
+        """Raise InputError where joints of a kind cannot be locked."""
+        if not isinstance(joint, Pin):
+            raise InputError(
+                f"locked_joints: {joint.name} joints cannot be locked: pins are free about their normal until they are "
+                'tightened: set joint.kind = "pin", or leave locked_joints out'
+            )
+
+
+def _imperfection(value: object) -> str | float:
+    """A length, or a part of the span as "span/500"."""
+    before, _, part = value.partition("/") if isinstance(value, str) else ("", "", "")
+    try:
+        if before.strip() != "span":
+            return read_quantity(value, "length", size=True)
+        return f"span/{read_quantity(part, 'number', size=True):g}"
+    except ValueError as reason:
+        raise ValueError(f'{reason}, or a part of the span such as "span/500"') from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stability:
+    """How stability is looked at.
+
+    Parameters
+    ----------
+    imperfection : largest displacement of the geometry with imperfections [m], or a part of the span such as
+        "span/500"; None: the perfect geometry alone.
+    modes : lowest buckling modes that are looked for; an imperfection in each of them is tried, with either sign.
+    """
+
+    imperfection: Annotated[
+        float | str | None, Value(_imperfection), 'largest imperfection: a length, or "span/500"; default: none'
+    ] = None  # fmt: skip
+    modes: Annotated[Whole, "number of buckling modes, each of which is tried as imperfection"] = 3
+
+    def __post_init__(self) -> None:
+        if self.imperfection is not None:
+            self.amplitude(1.0)
+        whole("the number of modes", self.modes, 1, 1000)
+
+    def amplitude(self, span: float) -> float | None:
+        """Largest displacement of the geometry with imperfections [m]; None: the perfect geometry alone.
+
+        Parameters
+        ----------
+        span : of the shell [m].
+        """
+        given = self.imperfection
+        if not isinstance(given, str):
+            return None if given is None else positive("the imperfection", given, "m")
+        before, _, part = given.partition("/")
+        if before.strip() != "span" or not part.strip().replace(".", "", 1).isdecimal() or not float(part) > 0:
+            raise InputError(f'the imperfection must be a length in m, or "span/500", not {shown(given)}')
+        return span / float(part)
+
+
+def _service_class(value: object) -> int:
+    """1, 2 or 3."""
+    found = read_quantity(value, "number")
+    if found not in (1, 2, 3):
+        raise ValueError("must be 1 (inside), 2 (covered) or 3 (in the weather)")
+    return int(found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strength:
+    """What rods and joints withstand, where it is not that of the material's preset.
+
+    Parameters
+    ----------
+    permanent, long, medium, short, instantaneous : design strength in bending for loads that act so long [Pa]. Given
+        ones stand in place of all of the preset's; one that is missing is that of the next longer duration.
+    erection : the same while the shell is erected [Pa]; None: the short one.
+    effective_length : for the Euler load of a span.
+    """
+
+    permanent: Annotated[Stress | None, "design strength under permanent loads; default: a preset's"] = None
+    long: Annotated[Stress | None, "under loads of months; default: permanent"] = None
+    medium: Annotated[Stress | None, "the same under loads of weeks; default: the long one"] = None
+    short: Annotated[Stress | None, "the same under loads of days; default: the medium one"] = None
+    instantaneous: Annotated[Stress | None, "the same under gusts; default: the short one"] = None
+    erection: Annotated[Stress | None, "the same during deployment; default: the short one"] = None
+    service_class: Annotated[
+        int | None,
+        Value(_service_class, lambda name, value: whole(name, value, 1, 3)),
+        "of timber: 1 inside, 2 covered (default), 3 in the weather",
+    ] = None
+    hole: Annotated[Distance, "diameter of the bolts' holes through the rods at joints"] = 0.0
+    slip: Annotated[Force | None, "axial force that a joint transfers before it slips"] = None
+    effective_length: Annotated[Factor, "effective length of a span between joints, over its length"] = 1.0
+
+    def __post_init__(self) -> None:
+        others = {"hole": "the diameter of holes", "effective_length": "the effective length",
+                  "service_class": "the service class"}  # fmt: skip
+        checked(self, dict.fromkeys((*DURATIONS, "erection", "slip"), "the strength ({})") | others)
+
+    @property
+    def given(self) -> dict[Duration, float]:
+        """The given strengths by duration [Pa]."""
+        return {name: getattr(self, name) for name in DURATIONS if getattr(self, name) is not None}

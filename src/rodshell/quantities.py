@@ -1,0 +1,329 @@
+"""Types of the values that a user gives, for fields of dataclasses: `pressure: Pressure`.
+
+Each says how a value is read from a case file or an option, with its unit, and what is accepted from Python.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import date
+from difflib import get_close_matches
+from math import inf
+from numbers import Integral
+from typing import Annotated, Any, Literal, TypeVar
+
+from rodshell.errors import InputError
+from rodshell.units import Kind, read_quantity, require_unit_of_all, shown, si_unit, wanted
+from rodshell.validation import described, is_auto, not_negative, number, numbers, positive
+
+Auto = Literal["auto"]
+Reader = Callable[[object], Any]
+Sign = Callable[..., float]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Value:
+    """How a value is given.
+
+    Parameters
+    ----------
+    read : from a case file or an option, to SI. A ValueError says what is wrong, without the key.
+    check : as read(name, value) of what Python gives; None: it is checked elsewhere.
+    words : that it may also be.
+    role : "name": it is text that is not empty; "file": the path of a file to be read; "folder": of one to be written.
+    """
+
+    read: Reader
+    check: Callable[[str, Any], Any] | None = None
+    words: tuple[str, ...] = ()
+    role: Literal["", "name", "file", "folder"] = ""
+
+
+def quantity(kind: Kind, sign: Sign = number, unit: str | None = None) -> Value:
+    """A number with a unit.
+
+    Parameters
+    ----------
+    sign : `number`, `positive` or `not_negative` of `validation`.
+    unit : in messages of Python; None: the SI unit of the kind.
+    """
+    si = si_unit(kind) if unit is None else unit
+
+    def read(value: object) -> float:
+        found = read_quantity(value, kind, size=sign is positive)
+        if sign is not_negative and found < 0:
+            raise ValueError(f"must not be negative; give {wanted(kind)}")
+        return found
+
+    return Value(read, lambda name, value: sign(name, value, si))
+
+
+def or_auto(value: Value) -> Value:
+    def read(given: object) -> object:
+        if is_auto(given.strip() if isinstance(given, str) else given):
+            return "auto"
+        try:
+            return value.read(given)
+        except ValueError as reason:
+            raise ValueError(f'{reason}, or "auto"') from None
+
+    return Value(read)
+
+
+def pair(value: Value, words: str, *, one_for_both: bool = False) -> Value:
+    """[a, b] or "a, b"; a single value may stand for both.
+
+    Parameters
+    ----------
+    words : what Python has to give.
+    """
+
+    def read(given: object) -> tuple[float, float]:
+        items = _parted(given)
+        if not isinstance(items, list | tuple):
+            items = [items]
+        if len(items) == 1 and one_for_both:
+            return value.read(items[0]), value.read(items[0])
+        if len(items) != 2:
+            needs = "one or two values" if one_for_both else "two values"
+            raise ValueError(f'needs {needs}, such as ["30 mm", "40 mm"] or "30 mm, 40 mm"')
+        return _named("first", value, items[0]), _named("second", value, items[1])
+
+    return Value(read, _each(value, words, 2))
+
+
+def triple(kind: Kind) -> Value:
+    """[a, b, c] or "a, b, c"."""
+    value = quantity(kind)
+
+    def read(given: object) -> tuple[float, ...]:
+        items = _parted(given)
+        if not isinstance(items, list | tuple) or len(items) != 3:
+            raise ValueError(f"needs three values, along or about x, y and z; each is {wanted(kind)}")
+        return tuple(_named(ordinal, value, item) for ordinal, item in zip(_ORDER, items, strict=True))
+
+    return Value(read, _each(value, f"three finite numbers in {si_unit(kind)}", 3))
+
+
+_ORDER = ("first", "second", "third")
+
+
+def _each(value: Value, words: str, count: int) -> Callable[[str, Any], tuple[float, ...]]:
+    """So many numbers from Python, each as a value."""
+    assert value.check is not None
+    check = value.check
+    return lambda name, given: tuple(check(name, item) for item in numbers(name, given, words, count))
+
+
+def _parted(value: object) -> object:
+    """The values of a text "a, b", which all have a unit or none has; anything else as it is."""
+    if not isinstance(value, str):
+        return value
+    items = value.split(",")
+    require_unit_of_all(items)
+    return items
+
+
+def _named(ordinal: str, value: Value, item: object) -> float:
+    try:
+        return float(value.read(item))
+    except ValueError as reason:
+        raise ValueError(f"{ordinal} value: {reason}") from None
+
+
+def _unit(value: object) -> float:
+    """A unit of length: "mm", or its length "25.4 mm"."""
+    if isinstance(value, str) and value.strip().isalpha():
+        value = f"1 {value.strip()}"
+    return read_quantity(value, "length", size=True)
+
+
+def _counts(value: object) -> tuple[int, int] | str:
+    """Numbers of rods: [17, 17], "17x17", "17,17" or "auto"."""
+    if isinstance(value, str) and value.strip() == "auto":
+        return "auto"
+    items = value
+    if isinstance(value, str):
+        items = [int(n) if n.strip().isdecimal() else n for n in re.split("[x×,]", value)]
+    if (
+        isinstance(items, list | tuple)
+        and len(items) == 2
+        and all(isinstance(n, Integral) and int(n) >= 2 for n in items)
+    ):
+        return int(items[0]), int(items[1])
+    raise ValueError('give two counts of at least 2, such as [17, 17] or "17x17", or "auto"')
+
+
+def _stiffness(value: object) -> float:
+    """Of a joint [N m/rad], 0 or more, or "rigid"."""
+    if isinstance(value, str) and value.strip() == "rigid":
+        return inf
+    try:
+        found = read_quantity(value, "rotational stiffness")
+    except ValueError as reason:
+        raise ValueError(f'{reason}, or "rigid"') from None
+    if found < 0:
+        raise ValueError(f'must not be negative; give {wanted("rotational stiffness")}, or "rigid"')
+    return found
+
+
+def _corners(value: object) -> int:
+    """Of a crossing: 2 or 4."""
+    if value in (2, 4) or (isinstance(value, str) and value.strip() in ("2", "4")):
+        return int(value)
+    raise ValueError("give 2, opposite corners as in the paper, or 4")
+
+
+def _checked_corners(_: str, value: object) -> int:
+    if not isinstance(value, Integral) or value not in (2, 4):
+        raise InputError(f"a joint has linkers in 2 or 4 of its corners, not in {described(value)}")
+    return int(value)
+
+
+def _whole(value: object) -> int:
+    """A whole number, not negative."""
+    found = int(value) if isinstance(value, str) and value.strip().isdecimal() else value
+    if isinstance(found, bool) or not isinstance(found, Integral) or found < 0:
+        raise ValueError("give a whole number of at least 0, such as 8")
+    return int(found)
+
+
+def _poisson_ratio(value: object) -> float:
+    found = read_quantity(value, "number")
+    if not -1 < found <= 0.5:
+        raise ValueError("must lie above -1 and not above 0.5; give 0.5 for an incompressible material")
+    return found
+
+
+def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """Rows of points of the plan: [[[x, y], [x, y]], ...], or "x, y; x, y | x, y; x, y"."""
+    rows = value
+    if isinstance(value, str):
+        rows = [row.split(";") for row in value.split("|")]
+        require_unit_of_all(re.split("[|;,]", value))
+    if not isinstance(rows, list | tuple) or not all(isinstance(row, list | tuple) and len(row) > 1 for row in rows):
+        raise ValueError('give rows of two points or more, such as [[[-1, 0], [1, 0]]] or "-1, 0; 1, 0 | 0, -1; 0, 1"')
+    return tuple(tuple(_POINT.read(point) for point in row) for row in rows)
+
+
+def _line(value: object) -> tuple[tuple[float, float], ...]:
+    """Points of one line: [[x, y], [x, y]], or "x, y; x, y"."""
+    rows = polylines(value if isinstance(value, str) else [value])
+    if len(rows) != 1:
+        raise ValueError('give one line of two points or more, such as "-1, 0; 1, 0"')
+    return rows[0]
+
+
+def _ratio(value: object) -> float:
+    found = read_quantity(value, "number")
+    if found <= 1:
+        raise ValueError("must be larger than 1, such as 4")
+    return found
+
+
+def _numbers(value: object) -> tuple[float, ...]:
+    """Plain numbers: [1, 2, 3], or "1, 2, 3"."""
+    items = value.split(",") if isinstance(value, str) else value
+    if not isinstance(items, list | tuple) or not items:
+        raise ValueError("give numbers, such as [0.1, -0.3]")
+    return tuple(read_quantity(item, "number") for item in items)
+
+
+def words(choices: Sequence[str]) -> Value:
+    """Some of these words, each once: ["a", "b"], or "a, b"."""
+
+    def read(value: object) -> tuple[str, ...]:
+        items = value.split(",") if isinstance(value, str) else value
+        if not isinstance(items, list | tuple) or not all(isinstance(item, str) for item in items):
+            raise ValueError(f"give one or several of {', '.join(choices)}")
+        found = tuple(item.strip() for item in items if item.strip())
+        for word in found:
+            if word not in choices:
+                near = get_close_matches(word, choices, n=1)
+                hint = f": did you mean {near[0]}?" if near else ""
+                raise ValueError(f"{shown(word)} is not one of {', '.join(choices)}{hint}")
+        if len(set(found)) < len(found):
+            raise ValueError("give each word once")
+        return found
+
+    return Value(read)
+
+
+def _iso_date(value: object) -> str:
+    """A day as "2026-11-22"; "" for none; TOML's own dates too."""
+    try:
+        return date.fromisoformat(str(value)).isoformat() if value != "" else ""
+    except ValueError:
+        raise ValueError('must be a day; write it as "2026-11-22"') from None
+
+
+def _names(value: object) -> tuple[str, ...]:
+    """Names: ["U01", "V03"] or "U01, V03"."""
+    items = value.split(",") if isinstance(value, str) and value.strip() else value or []
+    if not isinstance(items, list | tuple) or not all(
+        isinstance(item, str) and re.fullmatch(r"[\w.-]+", item.strip()) for item in items
+    ):
+        raise ValueError('give names such as ["U01", "V03"], or "U01, V03"')
+    return tuple(dict.fromkeys(item.strip() for item in items))
+
+
+_POINT = pair(quantity("length"), "two finite numbers x, y in m")
+_TWO = "two lengths in m"
+_LENGTH, _ANGLE = quantity("length", positive), quantity("angle")
+_LENGTHS = pair(_LENGTH, _TWO, one_for_both=True)
+
+Name = Annotated[str, Value(str, role="name")]
+FileToRead = Annotated[str, Value(str, role="file")]
+FolderToWrite = Annotated[str, Value(str, role="folder")]
+IsoDate = Annotated[str, Value(_iso_date)]
+Names = Annotated[tuple[str, ...], Value(_names)]
+Whole = Annotated[int, Value(_whole)]
+Counts = Annotated[tuple[int, int] | Auto, Value(_counts)]
+Corners = Annotated[Literal[2, 4], Value(_corners, _checked_corners)]
+Unit = Annotated[float, Value(_unit)]
+Ratio = Annotated[float, Value(_ratio)]
+Numbers = Annotated[tuple[float, ...], Value(_numbers)]
+Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], Value(polylines)]
+Line = Annotated[tuple[tuple[float, float], ...], Value(_line)]
+PoissonRatio = Annotated[float, Value(_poisson_ratio, lambda name, value: number(name, value))]
+Stiffness = Annotated[
+    float,
+    Value(_stiffness, lambda name, value: not_negative(name, value, "N m/rad", infinite=True), words=("rigid",)),
+]
+
+Length = Annotated[float, _LENGTH]
+Distance = Annotated[float, quantity("length", not_negative)]
+Coordinate = Annotated[float, quantity("length")]
+Angle = Annotated[float, _ANGLE]
+LengthOrAuto = Annotated[float | Auto, or_auto(_LENGTH)]
+AngleOrAuto = Annotated[float | Auto, or_auto(_ANGLE)]
+Lengths = Annotated[tuple[float, float], _LENGTHS]
+LengthsOrAuto = Annotated[tuple[float, float] | Auto, or_auto(_LENGTHS)]
+Size = Annotated[tuple[float, float], pair(_LENGTH, _TWO)]
+Point = Annotated[tuple[float, float], _POINT]
+PointOrAuto = Annotated[tuple[float, float] | Auto, or_auto(_POINT)]
+Point3 = Annotated[tuple[float, float, float], triple("length")]
+Angles = Annotated[tuple[float, float, float], triple("angle")]
+
+Factor = Annotated[float, quantity("number", positive)]
+Share = Annotated[float, quantity("number", not_negative)]
+PerKelvin = Annotated[float, quantity("number", positive, "1/K")]
+Force = Annotated[float, quantity("force", positive)]
+Forces3 = Annotated[tuple[float, float, float], triple("force")]
+ForcePerLength3 = Annotated[tuple[float, float, float], triple("force per length")]
+SlipMoment = Annotated[float, quantity("moment", positive)]
+Stress = Annotated[float, quantity("stress", positive)]
+Pressure = Annotated[float, quantity("pressure", not_negative)]
+BendingStiffness = Annotated[float, quantity("bending stiffness", positive)]
+NodeStiffness = Annotated[float, quantity("stiffness", positive)]
+AngleStiffness = Annotated[float, quantity("rotational stiffness", positive)]
+SectionModulus = Annotated[float, quantity("section modulus", positive)]
+Mass = Annotated[float, quantity("mass", not_negative)]
+MassPerLength = Annotated[float, quantity("mass per length", not_negative)]
+MassPerArea = Annotated[float, quantity("mass per area", not_negative)]
+InertiaPerLength = Annotated[float, quantity("inertia per length", not_negative)]
+Density = Annotated[float, quantity("density", positive)]
+Acceleration = Annotated[float, quantity("acceleration", positive)]
+Duration = Annotated[float, quantity("time", positive)]
+KelvinChange = Annotated[float, quantity("temperature")]
