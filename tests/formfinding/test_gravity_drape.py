@@ -257,3 +257,13 @@ def test_the_ellipsoid_of_the_paper_rests_on_a_saddle_that_is_named() -> None:
     draped = rs.drape(case.layout, PAPERS_ROD, case.target, method=rs.Gravity())
     assert draped.report.converged
     assert any("saddle" in warning for warning in draped.warnings)
+
+
+def test_on_a_mesh_the_drape_says_that_it_is_for_study():
+    x, y = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-0.1, 0.1, 9)] * 2))
+    corners = np.add.outer(9 * np.arange(8), np.arange(8)).ravel()
+    faces = np.concatenate([corners[:, None] + [0, 1, 10], corners[:, None] + [0, 10, 9]])
+    target = rs.Freeform.of(np.column_stack([x, y, 0.1 - 3 * (x**2 + y**2)]), faces)
+    draped = rs.drape(layout_of(rods=(3, 3), length=0.4, edge=0.05), rod_of(), target, method=rs.Gravity())
+    assert sum("for study" in words for words in draped.warnings) == 1
+    assert not any("for study" in words for words in draped_with().warnings)

@@ -26,7 +26,7 @@ from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
-from rodshell.targets import Target
+from rodshell.targets import Freeform, Target
 
 DEPTH = 1e-5  # of the size: deepest node inside the target
 CONTACT_UPDATES = 12
@@ -83,6 +83,11 @@ def gravity_drape(
     inside = target.margin(state) > 0
     angle, where = smallest_joint_angle(mesh, state, inside)
     warnings = []
+    if isinstance(target, Freeform):
+        warnings.append(
+            "a drape under gravity on a surface from a file is for study: rods sag, and leave the surface over hollows; "
+            'method "bound" follows it everywhere'
+        )
     if levels[-1].status is Status.CONVERGED and levels[-1].negative_modes:
         warnings.append(
             f"the draped state is a saddle or near one ({levels[-1].negative_modes} negative modes): without friction "
