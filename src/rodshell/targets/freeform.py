@@ -145,7 +145,7 @@ class Freeform(Target):
         ends, moved = self._open_ends
         words = [*self.repairs, self.creased + self.along_creases] if self.creased else list(self.repairs)
         names = ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
-        offs = [rim.off for rim in self.rims]
+        offs = [rim.off if rim.off > TOLD * self.size and self._ends_at(rim) else 0.0 for rim in self.rims]
         offs[-1:] = [max([off, *map(self._off, filter(self._is_in_space, self.curves))]) for off in offs[-1:]]
         words += [
             f"the shell ends up to {length_text(off)} from {name}: on the smooth surface, in a smooth curve where six "
@@ -218,6 +218,10 @@ class Freeform(Target):
         if self.curves:
             rims.append(self._rim([_turning(self._over(curve), k > 0) for k, curve in enumerate(self.curves)]))
         return tuple(rims)
+
+    def _ends_at(self, rim: Rim) -> bool:
+        """Whether the shell ends at some point of this rim: another boundary or the base plane may lie inside of it."""
+        return bool((self.margin(rim.points) > -1e-6 * self._extent).any())
 
     @cached_property
     def _open_ends(self) -> tuple[list[Floats], list[float]]:
