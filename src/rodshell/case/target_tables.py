@@ -114,7 +114,7 @@ class PlacedTable(Table):
 class SurfaceTable(PlacedTable):
     unit: Unit | None = Field(default=None, description="the file's unit, such as mm")
     object: str | None = Field(
-        default=None, description="name of an object or layer; of a STEP face: its name or number"
+        default=None, description="name of an object or layer; of a 3dm surface or STEP face also its number"
     )
     up: Literal["z", "y"] | None = Field(
         default=None, description="axis of the file that points upwards; default: y of glTF, z of others"

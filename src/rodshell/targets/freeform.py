@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
+OTHER_UNIT = 8.0  # times as wide as the surface: such a boundary is drawn in another unit
 TOLD = 2e-4  # of the size: how far from what is given the shell may end without a word
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
 MOST_ALONG = 100_000  # points of all these curves
@@ -382,6 +383,12 @@ class Freeform(Target):
         z = self.height_at(curve[:, :2])
         if not np.isfinite(z).all():
             x, y, _ = curve[int(np.argmin(np.isfinite(z)))]
+            width, across = float(np.ptp(curve[:, :2], axis=0).max()), 2 * self._extent
+            if width > OTHER_UNIT * across:
+                raise InputError(
+                    f"the boundary curve is {length_text(width)} wide and the surface {length_text(across)}: draw it "
+                    "in the unit of the surface, in which it is read"
+                )
             raise InputError(f"the boundary curve leaves the surface in plan near ({x:.4g}, {y:.4g}) m: draw it inside")
         return np.column_stack([curve[:, :2], z])
 
