@@ -145,6 +145,18 @@ def test_rods_that_cross_no_axis_end_on_a_rectangle(name, spacing):
     assert y.max() < 4.0005
 
 
+@pytest.mark.parametrize("past", [-5e-8, 2e-8, 1e-7])
+def test_rods_that_end_beside_a_joint_by_less_than_it_can_be_told_end_at_it(past):
+    """A vault whose straight side is a line of the grid but for the rounding of a file's numbers."""
+    domain = rs.Rectangle((16.0 + 2 * past, 10.0))
+    target = rs.HeightField(formula="4 - y^2/12 + 1e-5*x^3/64", domain=domain)
+    draped = rs.drape(layout_of(spacing=0.8, edge=0.8 / 6), ROD, target)
+    assert draped.mesh.edge_lengths.min() > 1e-3
+    assert draped.levels[-1].factorizations < 10
+    x, y, _ = np.abs(rs.trim(draped).boundary.points).T
+    assert np.minimum(np.abs(x - 8.0), np.abs(y - 5.0)).max() < 1e-4
+
+
 # Equilibrium, from numpy twins of the energies
 
 

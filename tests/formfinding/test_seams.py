@@ -18,7 +18,9 @@ from rodshell.formfinding.seams import End, in_a_row, patches_of, transported_he
 from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.mesh import side_by_side
 from rodshell.results import read
+from rodshell.targets import Freeform
 from rodshell.targets.patch import Seam
+from tests.targets.meshes import sheet
 
 Floats = NDArray[np.float64]
 
@@ -323,6 +325,18 @@ def test_bad_seams_are_one_sentence(words: str, tmp_path, capsys) -> None:
 def test_patches_that_are_not_there_are_refused(own: dict[str, rs.PatchLayout], words: str) -> None:
     with pytest.raises(InputError, match=words):
         rs.find_form(DOME, layout_of(0.04), ROD, seams=[DIAGONAL], patches=own)
+
+
+def test_a_patch_that_is_nowhere_seen_from_above_is_refused_in_one_sentence():
+    """Squares of a groin vault that are split across its creases: the smooth surface through the teeth folds over."""
+    x, faces = sheet(lambda x, y: np.maximum(np.sqrt(36 - x**2), np.sqrt(36 - y**2)), 5.0, 21)
+    (a, b, c), d = faces[: len(faces) // 2].T, faces[len(faces) // 2 :, 2]
+    turn = (np.linalg.norm(x[a] - x[c], axis=1) > np.linalg.norm(x[b] - x[d], axis=1))[:, None]
+    first = np.where(turn, np.column_stack([a, b, d]), np.column_stack([a, b, c]))
+    second = np.where(turn, np.column_stack([b, c, d]), np.column_stack([a, c, d]))
+    target = Freeform.of(x, np.vstack([first, second]))
+    with pytest.raises(InputError, match=r"nothing of the patch around \(.*\) m is seen from above"):
+        rs.find_form(target, layout_of(0.6), ROD, seams=[[(-6, -6), (6, 6)], [(-6, 6), (6, -6)]])
 
 
 @pytest.mark.parametrize("rotate", [0.0, 0.4])

@@ -285,7 +285,7 @@ def test_rods_lie_at_the_offsets_of_the_layout(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ON_SPHERES)
 def test_error_estimate_on_spheres_is_the_error_before_extrapolation(name):
-    """Of the finer march alone, to 3 %; what is left after extrapolation is a hundredth of it."""
+    """Of the finer march alone, to 3 %, of lines longer than two spacings; extrapolation leaves a hundredth of it."""
     net = net_on_sphere(name)
     inside = inside_nodes(net.target, net.net)
     worst = 0.0
@@ -297,7 +297,8 @@ def test_error_estimate_on_spheres_is_the_error_before_extrapolation(name):
         rows = np.abs(across - offsets[:, None]).argmin(axis=1)
         (cuts,) = cut_lines(net.target, [Lines(s, lines[rows], mask[rows])])
         assert cuts.line.tolist() == list(range(len(offsets)))
-        worst = max(worst, np.abs(cuts.ends - exact_ends(net, offsets)).max())
+        long = np.ptp(cuts.ends, axis=1) > 2.0 * min(net.layout.spacing)
+        worst = max(worst, np.abs(cuts.ends - exact_ends(net, offsets))[long].max())
     assert net.error_estimate == pytest.approx(worst, rel=0.03)  # 0.9 % measured where rods graze, else 0.1 %
     assert sphere_error(net) < 0.03 * net.error_estimate  # 0.0085 measured where rods graze, else 0.001
 

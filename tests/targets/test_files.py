@@ -215,6 +215,36 @@ def test_curves_of_a_3dm_are_divided_its_polylines_are_not_and_its_unit_holds(tm
     assert np.abs(np.sort(drawn, axis=0) - np.sort(corners, axis=0)).max() < 1e-12
 
 
+def test_surfaces_of_a_3dm_with_one_name_are_chosen_by_number(tmp_path):
+    rhino3dm = pytest.importorskip("rhino3dm")
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
+    named = rhino3dm.ObjectAttributes()
+    named.Name = "roof"
+    for x in (0.0, 500.0):
+        circle = rhino3dm.Circle(rhino3dm.Point3d(x, 0, 0), 150.0).ToNurbsCurve()
+        model.Objects.AddBrep(rhino3dm.Brep.CreateTrimmedPlane(rhino3dm.Plane.WorldXY(), circle), named)
+    model.Write(str(tmp_path / "two.3dm"), 7)
+    for name in (None, "roof", "3"):
+        with pytest.raises(rs.InputError, match=r'number.*available: 1, "roof"; 2, "roof"'):
+            rs.surface_from(tmp_path / "two.3dm", name=name)
+    assert rs.surface_from(tmp_path / "two.3dm", name="2").summit[0] == pytest.approx(0.5, abs=0.15)
+
+
+def test_a_3dm_without_a_surface_says_what_it_has(tmp_path):
+    rhino3dm = pytest.importorskip("rhino3dm")
+    model, mesh = rhino3dm.File3dm(), rhino3dm.Mesh()
+    for x, y in ((0, 0), (1, 0), (0, 1)):
+        mesh.Vertices.Add(x, y, 0)
+    mesh.Faces.AddFace(0, 1, 2)
+    model.Objects.AddMesh(mesh)
+    for radius in (1.0, 2.0):
+        model.Objects.AddCircle(rhino3dm.Circle(radius))
+    model.Write(str(tmp_path / "mesh.3dm"), 7)
+    with pytest.raises(rs.InputError, match="has 1 mesh, 2 curves, and no surface: export the mesh as OBJ"):
+        rs.surface_from(tmp_path / "mesh.3dm")
+
+
 def test_a_3dm_without_curves_has_no_boundary(tmp_path):
     rhino3dm = pytest.importorskip("rhino3dm")
     model = rhino3dm.File3dm()

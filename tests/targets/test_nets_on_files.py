@@ -66,6 +66,16 @@ def test_rod_ends_that_two_marches_place_differently_are_warned_of():
     assert not any("have an error of up to" in sentence for sentence in finer.warnings)
 
 
+def test_ends_of_lines_that_are_too_short_to_be_built_are_not_warned_of():
+    """A line that cuts a corner of a turned rectangle, where a march in long steps finds no piece: 0.09 m of 20 m."""
+    target = rs.HeightField(formula="3 + 0.8*cos(x/5)*cos(y/4)", domain=rs.Rectangle((20.0, 14.0)))
+    layout = rs.GridLayout.orthogonal(spacing=1.0, edge=1 / 6, rotate=np.radians(30))
+    net = rs.chebyshev_net(target, layout)
+    assert min(rod.end - rod.start for rod in net.rods) < 2.0
+    assert net.error_estimate < 1e-4
+    assert not net.warnings
+
+
 def test_lines_that_a_rough_march_misses_are_found_by_a_finer_one():
     """Over a peak with a radius of a seventh of the spacing the march in half spacings ends two lines too early."""
     target = rs.HeightField(formula="6*exp(-(x^2 + y^2)/1.2)", domain=rs.Disc(6.0))

@@ -192,6 +192,20 @@ def test_how_far_the_shell_ends_from_what_is_drawn_is_said(dome):
     assert bounded(dome, lifted(dome, 4.0 * ring(1.0, 200)[:, :2])).warnings == ()
 
 
+def test_a_boundary_in_another_unit_than_its_surface_is_refused_with_both_sizes(dome):
+    with pytest.raises(rs.InputError, match="is 8000 m wide and the surface 12 m: draw it in the unit of the surface"):
+        bounded(dome, 4000.0 * ring(1.0, 60)).margin(np.zeros((1, 3)))
+
+
+def test_an_edge_of_the_mesh_is_not_spoken_of_where_the_shell_ends_within_it(dome):
+    vertices, faces = capped_sphere(6, 0.6)
+    cap = Freeform.of(10.0 * vertices, faces)
+    (words,) = cap.warnings
+    assert "from the edge of the mesh" in words
+    assert bounded(cap, lifted(cap, 4.0 * ring(1.0, 200)[:, :2])).warnings == ()
+    assert replace(cap, base=9.0).warnings == ()
+
+
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_a_boundary_of_fewer_than_three_points_is_refused(dome, count):
     few = np.repeat(lifted(dome, polygon(3, 2.0))[:count], 3, axis=0)

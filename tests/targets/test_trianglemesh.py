@@ -90,3 +90,17 @@ def test_stray_objects_with_less_than_a_hundredth_of_the_area_are_left_out_whate
     larger = 4 * corners - [9, 9, 9]
     with pytest.raises(rs.InputError, match=r"2 separate pieces \(the largest two have 94 and 6 %"):
         sound_mesh(np.vstack([points, larger]), np.vstack([faces, book + len(points)]), "the mesh")
+
+
+def test_slivers_at_a_cut_do_not_turn_the_normals_at_its_edge():
+    """A torus cut by two planes, one of which leaves slivers: the correction at the edge turned a normal by 90 deg."""
+    import trimesh
+
+    torus = trimesh.creation.torus(6.0, 2.0, major_sections=96, minor_sections=48)
+    x, faces = torus.vertices, torus.faces
+    for normal, origin in (([0.0, 0, 1], [0.0, 0, 0.8]), ([1.0, 0, 0], [1.0, 0, 0])):
+        x, faces, *_ = trimesh.intersections.slice_faces_plane(x, faces, np.array(normal), np.array(origin))
+    mesh = rs.Freeform.of(x, faces).surface
+    exact = mesh.vertices * (1 - 6 / np.hypot(*mesh.vertices[:, :2].T))[:, None] * [1, 1, 0] + mesh.vertices * [0, 0, 1]
+    cosine = (mesh.normals * exact).sum(axis=1) / np.linalg.norm(exact, axis=1)
+    assert cosine.min() > np.cos(np.radians(20))

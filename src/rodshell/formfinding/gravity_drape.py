@@ -85,8 +85,8 @@ def gravity_drape(
     warnings = []
     if isinstance(target, Freeform):
         warnings.append(
-            "a drape under gravity on a surface from a file is for study: rods sag, and leave the surface over hollows; "
-            'method "bound" follows it everywhere'
+            "a drape under gravity on a surface from a file is for study: rods sag, and leave the surface over its "
+            'hollows; method "bound" follows it everywhere'
         )
     if levels[-1].status is Status.CONVERGED and levels[-1].negative_modes:
         warnings.append(

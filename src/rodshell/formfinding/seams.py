@@ -131,6 +131,12 @@ def _middle(patch: Patch, points: Floats, areas: Floats) -> tuple[float, float]:
     centre = patch.closest(np.average(points, axis=0, weights=areas)[None])
     if not (patch.whole.margin(centre)[0] > DEEP * patch.size and _from_above(patch, centre)[0]):
         seen = points[_from_above(patch, points)]
+        if not len(seen):
+            x, y, z = points.mean(axis=0)
+            raise InputError(
+                f"nothing of the patch around ({x:.4g}, {y:.4g}, {z:.4g}) m is seen from above, as where a mesh is "
+                "jagged along a crease: let edges of its faces run along the crease, or smooth it"
+            )
         centre = seen[[np.argmax(patch.margin(seen))]]
     x, y = centre[0, :2].tolist()
     return x, y

@@ -33,6 +33,8 @@ SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
 SEARCHES = (2, 4, 8)  # steps per spacing of the march that finds the lines; more where the net extends further
 LOOSE = 0.05  # spacings: a larger error of a rod end gives a warning
 GRAZING = 0.01  # spacings: a line that is nowhere further inside than this runs along the end, and is ignored
+SHORTEST = 2.0  # spacings: a rod that is no longer has fewer than three joints, and is not built
+AT_JOINT = 1e-5  # edges: a rod that ends this near a joint ends at it, since round-off bends the edge between them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,7 +47,8 @@ class ChebyshevNet:
     lines : offsets of all lines of the lattice near the target [m]: `lines[0]` (nu,) are the u of the lines of family
         v, `lines[1]` (nv,) the v of those of family u.
     net : the finer march, from which positions are taken.
-    error_estimate : largest |G0(fine) - G0(coarse)| / 3 over all rod ends: the error before extrapolation [m].
+    error_estimate : largest |G0(fine) - G0(coarse)| / 3 over all ends of rods that are longer than two spacings: the
+        error before extrapolation [m].
     min_angle : smallest angle between the families on the target [rad].
     min_angle_at : x, y, z of the point where it is [m].
     dropped : rods of the layout that are not in `rods`, with the reason.
@@ -160,7 +163,8 @@ def chebyshev_net(
     angle, where = _smallest_angle(fine)
     if degrees(angle) < SMALLEST_ANGLE:
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
-    ends, error, loosest = _extrapolate(target, lines, (coarse, fine), GRAZING * min(layout.spacing))
+    cuts, error, loosest = _extrapolate(target, lines, (coarse, fine), min(layout.spacing))
+    ends = _at_joints(cuts[0], lines.u, layout), _at_joints(cuts[1], lines.v, layout)
     rods, dropped, pieces = _name_rods(layout, lines, ends)
     _require_names(layout, [*(rod.name for rod in rods), *(name for name, _ in dropped)])
     if all(rod.virtual for rod in rods):
@@ -312,19 +316,22 @@ def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: 
 
 
 def _extrapolate(
-    target: Target, lines: LatticeLines, nets: tuple[Covering, Covering], depth: float
+    target: Target, lines: LatticeLines, nets: tuple[Covering, Covering], spacing: float
 ) -> tuple[tuple[Cuts, Cuts], float, Floats]:
     """The cuts of the lines of families u and v, the largest error of an end before extrapolation [m], and a point of
-    that line."""
+    that line; of no line that is too short for a rod that is built, such as in a corner."""
     sets = list[Lines]()
     for net in nets:
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
         sets.append(Lines(net.u, *_columns(net.points, net.inside, column)))
         sets.append(Lines(net.v, net.points.take(row, axis=0), net.inside.take(row, axis=0)))
-    cuts = cut_lines(target, sets, depth=depth)
+    cuts = cut_lines(target, sets, depth=GRAZING * spacing)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
     in_u, errors_u = extrapolated(cuts[0], cuts[2], len(lines.v), step)
     in_v, errors_v = extrapolated(cuts[1], cuts[3], len(lines.u), step)
+    for found, errors in ((in_u, errors_u), (in_v, errors_v)):
+        long = found.line[np.ptp(found.ends, axis=1) > SHORTEST * spacing]
+        errors[np.setdiff1d(np.arange(len(errors)), long)] = 0.0
     errors = np.concatenate([errors_u, errors_v])
     worst = int(np.argmax(errors))
     if errors[worst] == 0.0:
@@ -332,6 +339,12 @@ def _extrapolate(
     points = sets[2].points[worst] if worst < len(errors_u) else sets[3].points[worst - len(errors_u)]
     known = points[np.isfinite(points[:, 0])]
     return (in_u, in_v), float(errors[worst]), known[np.argmin(np.abs(target.margin(known)))]
+
+
+def _at_joints(cuts: Cuts, stations: Floats, layout: GridLayout) -> Cuts:
+    """The cuts of one family's lines, those next to one of the `stations` (n,) where they are crossed moved to it."""
+    joints = stations[_nearest(stations, cuts.ends)]
+    return Cuts(cuts.line, np.where(np.abs(cuts.ends - joints) < AT_JOINT * layout.edge, joints, cuts.ends))
 
 
 @njit()

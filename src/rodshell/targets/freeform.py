@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
+OTHER_UNIT = 8.0  # times as wide as the surface: such a boundary is drawn in another unit
 TOLD = 2e-4  # of the size: how far from what is given the shell may end without a word
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
 MOST_ALONG = 100_000  # points of all these curves
@@ -145,7 +146,7 @@ class Freeform(Target):
         ends, moved = self._open_ends
         words = [*self.repairs, self.creased + self.along_creases] if self.creased else list(self.repairs)
         names = ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
-        offs = [rim.off for rim in self.rims]
+        offs = [rim.off if rim.off > TOLD * self.size and self._ends_at(rim) else 0.0 for rim in self.rims]
         offs[-1:] = [max([off, *map(self._off, filter(self._is_in_space, self.curves))]) for off in offs[-1:]]
         words += [
             f"the shell ends up to {length_text(off)} from {name}: on the smooth surface, in a smooth curve where six "
@@ -218,6 +219,10 @@ class Freeform(Target):
         if self.curves:
             rims.append(self._rim([_turning(self._over(curve), k > 0) for k, curve in enumerate(self.curves)]))
         return tuple(rims)
+
+    def _ends_at(self, rim: Rim) -> bool:
+        """Whether the shell ends at some point of this rim: another boundary or the base plane may lie inside of it."""
+        return bool((self.margin(rim.points) > -1e-6 * self._extent).any())
 
     @cached_property
     def _open_ends(self) -> tuple[list[Floats], list[float]]:
@@ -378,6 +383,12 @@ class Freeform(Target):
         z = self.height_at(curve[:, :2])
         if not np.isfinite(z).all():
             x, y, _ = curve[int(np.argmin(np.isfinite(z)))]
+            width, across = float(np.ptp(curve[:, :2], axis=0).max()), 2 * self._extent
+            if width > OTHER_UNIT * across:
+                raise InputError(
+                    f"the boundary curve is {length_text(width)} wide and the surface {length_text(across)}: draw it "
+                    "in the unit of the surface, in which it is read"
+                )
             raise InputError(f"the boundary curve leaves the surface in plan near ({x:.4g}, {y:.4g}) m: draw it inside")
         return np.column_stack([curve[:, :2], z])
 

@@ -341,8 +341,8 @@ def surface_from(
     Parameters
     ----------
     unit : length of the file's unit [m]; None where the file states its unit.
-    name : object name, if the file has several (3dm: object or layer name; STEP: name of a face, shell or solid, or
-        the number of a face).
+    name : object name, if the file has several (3dm: object or layer name, or number; STEP: name of a face, shell or
+        solid, or the number of a face).
     base : z of a plane below which there is no shell [m], after placement; None for a surface that ends at its edge.
     boundary : path of an OBJ, DXF or 3dm file with closed curves on the surface, in the same unit, unless a 3dm file
         states its own, and placed with it: the longest bounds the shell, the others are openings.

@@ -118,7 +118,7 @@ def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Fl
 
     Parameters
     ----------
-    name : object or layer name, if the file has several surfaces.
+    name : object or layer name, or the surface's number from 1 on, if the file has several surfaces.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Fl
     """
     found = rhino_content(path, file_bytes(path), name=name)
     if "controls" not in found:
-        raise _no_single_surface(path, json.loads(str(found["names"])), name)
+        raise _no_single_surface(path, json.loads(str(found["names"])), name, json.loads(str(found["others"])))
     # OpenNURBS omits the first and the last knot
     knots = [np.concatenate([side[:1], side, side[-1:]]) for side in (found["knots_u"], found["knots_v"])]
     surface = Nurbs(tuple(found["degrees"].tolist()), (knots[0], knots[1]), found["controls"])
@@ -159,15 +159,29 @@ def rhino_content(path: Path, data: bytes, **request: object) -> dict[str, Any]:
     return found
 
 
-def _no_single_surface(path: Path, surfaces: list[tuple[str, str, int]], name: str | None) -> InputError:
+def _no_single_surface(
+    path: Path, surfaces: list[tuple[str, str, int]], name: str | None, others: list[int]
+) -> InputError:
+    if not surfaces:
+        kinds = zip(others, ("mesh", "SubD", "curve"), ("meshes", "SubDs", "curves"), strict=True)
+        there = ", ".join(f"{count} {single if count == 1 else several}" for count, single, several in kinds if count)
+        remedy = "export the mesh as OBJ, or save a surface" if others[0] else "save a surface"
+        return InputError(f"{path} has {there or 'nothing'}, and no surface: {remedy}")
+    number = int(name) if name and name.isdecimal() else 0
     faces = [count for label, layer, count in surfaces if name in (None, label, layer)]
+    if not faces and 0 < number <= len(surfaces):
+        faces = [surfaces[number - 1][2]]
     if len(faces) == 1:
         return InputError(f"{path}: the surface has {faces[0]} faces: merge them, or export a mesh")
-    names = ", ".join(shown(label or layer) for label, layer, _ in surfaces[:LISTED]) or "none"
+    listed = [
+        f"{k}, {shown(label or layer)}" if label or layer else f"{k}"
+        for k, (label, layer, _) in enumerate(surfaces[:LISTED], start=1)
+    ]
     what = "surfaces" if name is None else f"surfaces named {shown(name)}"
-    more = ", ..." if len(surfaces) > LISTED else ""
+    more = "; ..." if len(surfaces) > LISTED else ""
     return InputError(
-        f"{path} has {len(faces)} {what}: choose one by its object or layer name (available: {names}{more})"
+        f"{path} has {len(faces)} {what}: choose one by its number, or by its object or layer name (available: "
+        f"{'; '.join(listed)}{more})"
     )
 
 

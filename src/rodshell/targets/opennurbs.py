@@ -19,9 +19,10 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
 
     Returns
     -------
-    `unit`, by its name, and `names` (JSON: object, layer and number of faces of each surface); nothing for another
-    kind of file. If one surface with one face matches, also `degrees` (2,), `knots_u` and `knots_v` without the first
-    and the last, `controls` (m, n, 4) and `trims` (k, along_edges + 1, 3), the curves that bound it.
+    `unit`, by its name, `names` (JSON: object, layer and number of faces of each surface) and `others` (JSON: numbers
+    of meshes, SubDs and curves); nothing for another kind of file. If one surface with one face matches, also `degrees`
+    (2,), `knots_u` and `knots_v` without the first and the last, `controls` (m, n, 4) and `trims`
+    (k, along_edges + 1, 3), the curves that bound it.
 
     Of curves `unit` and their `count`; if it is not above `most`, `points` and `ends` as `dxf_curves` returns them.
     """
@@ -38,7 +39,12 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
         return found | {"count": len(curves), "points": np.vstack([np.empty((0, 3)), *drawn]), "ends": ends}
     surfaces = list(surfaces_of(model))
     found["names"] = json.dumps([names for *names, _ in surfaces])
+    found["others"] = json.dumps(numbers_of(model))
     wanted = [(shape, faces) for name, layer, faces, shape in surfaces if request["name"] in (None, name, layer)]
+    number = request["name"] or ""
+    if not wanted and number.isdecimal() and 0 < int(number) <= len(surfaces):
+        *_, faces, shape = surfaces[int(number) - 1]
+        wanted = [(shape, faces)]
     if len(wanted) == 1 and wanted[0][1] == 1:
         shape = wanted[0][0]
         whole = shape if isinstance(shape, rhino3dm.Surface) else shape.Faces[0].UnderlyingSurface()
@@ -52,6 +58,14 @@ def curves_of(model: Any) -> list[Any]:
     import rhino3dm
 
     return [item.Geometry for item in model.Objects if isinstance(item.Geometry, rhino3dm.Curve)]
+
+
+def numbers_of(model: Any) -> list[int]:
+    """How many meshes, SubDs and curves a file has."""
+    import rhino3dm
+
+    kinds = rhino3dm.Mesh, rhino3dm.SubD, rhino3dm.Curve
+    return [sum(isinstance(item.Geometry, kind) for item in model.Objects) for kind in kinds]
 
 
 def surfaces_of(model: Any) -> Any:

@@ -71,9 +71,10 @@ class TriangleMesh:
     def _with_rim_normals(self, normals: Floats) -> Floats:
         """Normals (n, 3) of the vertices, those at the rim corrected, as faces on one side only miss them.
 
-        Along each edge of an arc, and of any parabola, the slopes at both ends are opposite against its chord.
+        Along each edge of an arc, and of any parabola, the slopes at both ends are opposite against its chord. Where
+        slivers turn a normal far away, it stays what it was.
         """
-        rim = np.zeros(len(self.vertices), dtype=bool)
+        given, rim = normals.copy(), np.zeros(len(self.vertices), dtype=bool)
         a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
         rim[a[edge_counts(a, b, len(rim)) == 1]] = True
         here, there = np.append(a, b), np.append(b, a)
@@ -81,16 +82,19 @@ class TriangleMesh:
         if not len(here):
             return normals
         along = unit(self.vertices[there] - self.vertices[here])
+        at = np.flatnonzero(rim)
+        spoilt = np.zeros(len(at), dtype=bool)
         for _ in range(SWEEPS):
             flat = along - dot(along, normals[here])[:, None] * normals[here]
             off = 0.5 * dot(normals[here] + normals[there], along)
             square, known = np.zeros((len(normals), 3, 3)), np.zeros_like(normals)
             np.add.at(square, here, flat[:, :, None] * flat[:, None, :])
             np.add.at(known, here, off[:, None] * flat)
-            at = np.flatnonzero(rim)
             across = normals[at][:, :, None] * normals[at][:, None, :]
             turn = np.linalg.solve(square[at] + across + 1e-3 * np.eye(3), known[at][..., None])[..., 0]
-            normals[at] = unit(normals[at] - turn)
+            turned = unit(normals[at] - turn)
+            spoilt |= dot(turned, given[at]) < SPOILT
+            normals[at] = np.where(spoilt[:, None], given[at], turned)
         return normals
 
     @cached_property
