@@ -99,8 +99,8 @@ class DrapeTable(Holding):
     frames: Annotated[FolderToWrite | None, "subfolder of the result for the steps of a fall; default: none"] = None
 
     def __post_init__(self) -> None:
-        parts = PureWindowsPath(self.frames or "frames").parts  # it knows both kinds of paths
-        if self.frames == "" or ".." in parts or any(letter in part for part in parts for letter in "/\\:"):
+        parts = PureWindowsPath("frames" if self.frames is None else self.frames).parts  # it knows both kinds of paths
+        if not parts or ".." in parts or any(letter in part for part in parts for letter in "/\\:"):
             raise InputError(  # a case from somebody else must not write to any place
                 f"drape.frames = {shown(self.frames)}: frames are kept in the result's folder: give a name in it such "
                 'as "frames"'
