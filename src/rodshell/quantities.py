@@ -258,6 +258,13 @@ def _iso_date(value: object) -> str:
         raise ValueError('must be a day; write it as "2026-11-22"') from None
 
 
+def _checked_day(name: str, value: object) -> str:
+    try:
+        return _iso_date(value)
+    except ValueError:
+        raise InputError(f'{name} cannot be {shown(value)}: write a day as "2026-11-22"') from None
+
+
 def _names(value: object) -> tuple[str, ...]:
     """Names: ["U01", "V03"] or "U01, V03"."""
     items = value.split(",") if isinstance(value, str) and value.strip() else value or []
@@ -276,7 +283,7 @@ _LENGTHS = pair(_LENGTH, _TWO, one_for_both=True)
 Name = Annotated[str, Value(str, role="name")]
 FileToRead = Annotated[str, Value(str, role="file")]
 FolderToWrite = Annotated[str, Value(str, role="folder")]
-IsoDate = Annotated[str, Value(_iso_date)]
+IsoDate = Annotated[str, Value(_iso_date, _checked_day)]
 Names = Annotated[tuple[str, ...], Value(_names)]
 Whole = Annotated[int, Value(_whole)]
 Counts = Annotated[tuple[int, int] | Auto, Value(_counts)]

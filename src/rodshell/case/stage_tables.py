@@ -1,6 +1,6 @@
-"""The tables of a case's stages: layout, drape, pop-up, seams, checks and drawings."""
+"""The tables of a case's stages: layout, drape, pop-up, seams and checks."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from math import pi
 from pathlib import PureWindowsPath
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,7 +16,6 @@ from rodshell.quantities import (
     Duration,
     FileToRead,
     FolderToWrite,
-    IsoDate,
     Length,
     LengthOrAuto,
     LengthsOrAuto,
@@ -219,28 +218,3 @@ class ChecksTable:
     shear_strength: Annotated[Stress | None, "shear strength along the fibres; default: a preset's, or von Mises"] = (
         None
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class LayersTable:
-    """Other names for the layers of DXF files."""
-
-    cut: Annotated[str | None, "name of the DXF layer CUT"] = None
-    mark: Annotated[str | None, "name of the DXF layer MARK"] = None
-    label: Annotated[str | None, "name of the DXF layer LABEL"] = None
-    boundary_flat: Annotated[str | None, "name of the DXF layer BOUNDARY-FLAT"] = None
-    boundary_final: Annotated[str | None, "name of the DXF layer BOUNDARY-FINAL"] = None
-    dim: Annotated[str | None, "name of the DXF layer DIM"] = None
-    title: Annotated[str | None, "name of the DXF layer TITLE"] = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class DrawingsTable:
-    paper: Annotated[Literal["A4", "A3", "A2", "A1", "A0"], "size of the PDF's sheets, landscape"] = "A3"
-    project: Annotated[str, "project, for the title block"] = ""
-    revision: Annotated[str, "revision, for the title block"] = ""
-    tolerance: Annotated[Length | None, "tolerance of lengths, which are shown to a tenth of it or finer"] = None
-    layers: LayersTable = field(default_factory=LayersTable)
-    name: Annotated[str, "title of the drawings; default: the target's name"] = ""
-    author: Annotated[str, "who drew them or is responsible for them, for the title block"] = ""
-    date: Annotated[IsoDate, 'date for the title block, such as "2026-11-22"; default: today'] = ""
