@@ -10,7 +10,6 @@ from rodshell.case.held import Held, built
 from rodshell.case.load_tables import BracingKinds, CombinationRows, LoadRows, NoBracing
 from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import (
-    ChecksTable,
     DrapeTable,
     LayoutTable,
     PopUpTable,
@@ -21,7 +20,7 @@ from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
 from rodshell.fabrication.settings import Fabrication
 from rodshell.loads.settings import LockedJoints, Stability, Strength
-from rodshell.output.settings import DrawingStyle
+from rodshell.output.settings import CheckOptions, DrawingStyle
 from rodshell.progress import Progress, silent
 from rodshell.rods.joints import Ball, JointKind
 from rodshell.schema import read, undescribed, written
@@ -74,7 +73,7 @@ class Case:
     pop_up: PopUpTable = field(default_factory=PopUpTable)
     refine: RefineTable = field(default_factory=RefineTable)
     seams: SeamsTable = field(default_factory=SeamsTable)
-    checks: ChecksTable = field(default_factory=ChecksTable)
+    checks: CheckOptions = field(default_factory=CheckOptions)
     fabrication: Fabrication = field(default_factory=Fabrication)
     drawings: DrawingStyle = field(default_factory=DrawingStyle)
     loads: LoadRows = ()
@@ -319,12 +318,7 @@ class Case:
         from rodshell.output.options import OutputOptions
 
         return OutputOptions(
-            self.checks.strength,
-            self.checks.stages,
-            self.fabrication,
-            self.drawings,
-            rod_chosen=self.rod.left_open,
-            shear_strength=self.checks.shear_strength,
+            **vars(self.checks), fabrication=self.fabrication, drawings=self.drawings, rod_chosen=self.rod.left_open
         )
 
 

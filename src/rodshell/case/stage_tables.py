@@ -1,4 +1,4 @@
-"""The tables of a case's stages: layout, drape, pop-up, seams and checks."""
+"""The tables of a case's stages: layout, drape, pop-up and seams."""
 
 from dataclasses import dataclass, fields
 from math import pi
@@ -27,9 +27,7 @@ from rodshell.quantities import (
     Polylines,
     Ratio,
     Share,
-    Stress,
     Unit,
-    Whole,
     words,
 )
 from rodshell.schema import Inline, Rows
@@ -209,12 +207,3 @@ class SeamsTable:
             if names.count(name) > 1:
                 raise InputError(f"seams.patches has patch {shown(name)} twice: put all that it has in one table")
         return {patch.name: patch.layout for patch in self.patches}
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChecksTable:
-    strength: Annotated[Stress | None, "design strength in bending; default: a preset's by its code"] = None
-    stages: Annotated[Whole, "equilibria of the deployment from flat; 0: it is not computed"] = 8
-    shear_strength: Annotated[Stress | None, "shear strength along the fibres; default: a preset's, or von Mises"] = (
-        None
-    )

@@ -4,51 +4,34 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rodshell.checks.bending import VON_MISES, require_known_stress
-from rodshell.checks.check import MOST_STAGES
-from rodshell.errors import InputError
 from rodshell.fabrication.settings import Fabrication
 from rodshell.joints import Joint
 from rodshell.loads.strength import Limits
-from rodshell.output.settings import DrawingStyle
+from rodshell.output.settings import CheckOptions, DrawingStyle
 from rodshell.rods.section import Rod
-from rodshell.schema import written
-from rodshell.validation import choice, instance, keep, listed, positive, whole
+from rodshell.validation import choice, instance, listed
 
 if TYPE_CHECKING:
     from rodshell.loads.settings import Strength
 
 
 @dataclass(frozen=True)
-class OutputOptions:
+class OutputOptions(CheckOptions):
     """What is checked, made and drawn.
 
     Parameters
     ----------
-    strength : of the rods' material [Pa], by which utilisation is counted; None: it is not counted.
-    stages : equilibria of the deployment from flat; 0: it is not followed.
     rod_chosen : which of the rod's "material" and "section" the program chose to fit the target.
-    shear_strength : of the rods' material [Pa], in addition to `strength`; None: in the proportion of a preset, or
-        stress is counted by von Mises.
     strength_of : the preset material that the strengths are of, where they were not given.
     """
 
-    strength: float | None = None
-    stages: int = 8
     fabrication: Fabrication = field(default_factory=Fabrication)
     drawings: DrawingStyle = field(default_factory=DrawingStyle)
     rod_chosen: tuple[str, ...] = ()
-    shear_strength: float | None = None
     strength_of: str | None = None
 
     def __post_init__(self) -> None:
-        keep(self, positive, "Pa", "strength", what="the {}")
-        keep(self, positive, "Pa", "shear_strength", what="the shear strength")
-        if self.shear_strength is not None and self.strength is None:
-            raise InputError(
-                f"a shear strength of {self.shear_strength:g} Pa does not say what bending may be: "
-                "give the strength too (checks.strength), or leave it out"
-            )
-        object.__setattr__(self, "stages", whole("stages", self.stages, 0, MOST_STAGES))
+        super().__post_init__()
         instance("fabrication", self.fabrication, Fabrication)
         instance("drawings", self.drawings, DrawingStyle)
         chosen = listed("rod_chosen", self.rod_chosen, 'parts of a rod such as ("section",)')
@@ -116,10 +99,8 @@ class OutputOptions:
         if self.strength is not None:
             require_known_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)
 
-    def parameters(self) -> dict[str, dict[str, Any]]:
-        """As it stands in a case file."""
-        return {
-            "checks": {"strength": self.strength, "stages": self.stages, "shear_strength": self.shear_strength},
-            "fabrication": dict(vars(self.fabrication)),
-            "drawings": written(self.drawings),
-        }
+    @property
+    def tables(self) -> dict[str, Any]:
+        """As they stand in a case."""
+        checks = CheckOptions(self.strength, self.stages, shear_strength=self.shear_strength)
+        return {"checks": checks, "fabrication": self.fabrication, "drawings": self.drawings}

@@ -6,12 +6,38 @@ from typing import Annotated, Any, Literal, Self
 
 from rodshell.errors import InputError
 from rodshell.output.drawing import FORBIDDEN, LAYERS
-from rodshell.quantities import IsoDate, Length
+from rodshell.quantities import IsoDate, Length, Stages, Stress
 from rodshell.schema import checked
 from rodshell.units import shown
 from rodshell.validation import instance
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
+
+
+@dataclass(frozen=True)
+class CheckOptions:
+    """What is checked, and by which strength of the material.
+
+    Parameters
+    ----------
+    strength : of the rods' material [Pa], by which utilisation is counted; None: a preset's, or it is not counted.
+    stages : equilibria of the deployment from flat; 0: it is not followed.
+    shear_strength : [Pa]; None: in the proportion of a preset, or stress is counted by von Mises.
+    """
+
+    strength: Annotated[Stress | None, "design strength in bending; default: a preset's by its code"] = None
+    stages: Annotated[Stages, "equilibria of the deployment from flat; 0: it is not computed"] = 8
+    shear_strength: Annotated[
+        Stress | None, "shear strength along the fibres; default: a preset's, or von Mises"
+    ] = field(default=None, kw_only=True)  # fmt: skip
+
+    def __post_init__(self) -> None:
+        checked(self, {"strength": "the strength", "shear_strength": "the shear strength"})
+        if self.shear_strength is not None and self.strength is None:
+            raise InputError(
+                f"a shear strength of {self.shear_strength:g} Pa does not say what bending may be: "
+                "give the strength too (checks.strength), or leave it out"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
