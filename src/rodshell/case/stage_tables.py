@@ -30,7 +30,7 @@ from rodshell.quantities import (
     Unit,
     words,
 )
-from rodshell.schema import Inline, Rows
+from rodshell.schema import Inline, Rows, written
 from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import rounded_down, shown
 
@@ -60,10 +60,7 @@ class LayoutTable(Holding):
         if spacing == "auto":
             spacing = (rounded_down((target.size if target else 0.2) / 8),) * 2
         rotate = 0.0 if self.rotate == "auto" else self.rotate
-        return GridLayout.orthogonal(
-            rods=self.rods, spacing=spacing, length=self.length, edge=self.edge, rotate=rotate, offset=self.offset,
-            left_out=self.left_out, crossing=self.crossing,
-        )  # fmt: skip
+        return GridLayout.orthogonal(**(written(self) | {"spacing": spacing, "rotate": rotate}))
 
 
 FALLING = ("height", "coupling", "C1", "C2", "time_step", "duration", "friction", "drag", "frames")
@@ -117,16 +114,14 @@ class DrapeTable(Holding):
     def build(self) -> "Method":
         """The method with its options."""
         from rodshell.formfinding.methods import Bound, Fall, Gravity
-        from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
+        from rodshell.joints import ExplicitPenalty, ImplicitPenalty, SharedDofs
 
         if self.method == "bound":
             return Bound()
         if self.method == "gravity":
             return Gravity(acceleration=self.gravity)
-        coupling: Coupling = SharedDofs()
-        if self.coupling != "shared":
-            penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
-            coupling = penalty(C1=self.C1, C2=self.C2)
+        penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
+        coupling = SharedDofs() if self.coupling == "shared" else penalty(C1=self.C1, C2=self.C2)
         return Fall(
             acceleration=self.gravity, height=self.height, coupling=coupling, time_step=self.time_step,
             duration=self.duration, friction=self.friction, drag=self.drag, stream=self.frames,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 from rodshell.errors import InputError
 from rodshell.output.drawing import FORBIDDEN, LAYERS
@@ -61,13 +61,16 @@ class Layers:
         if twice := next((name for name in names if names.count(name) > 1), ""):
             raise InputError(f'two layers would be called "{twice}": give each its own name')
 
-    @classmethod
-    def of(cls, renamed: Mapping[str, str]) -> Self:
+    @staticmethod
+    def of(renamed: "Layers | Mapping[str, str]") -> "Layers":
         """The names of a mapping, {"CUT": "LASER"}."""
+        if isinstance(renamed, Layers):
+            return renamed
+        instance("the layers of drawings", renamed, Mapping, "a mapping from layers to their new names")
         for layer in renamed:
             if layer not in LAYERS:
                 raise InputError(f'there is no layer "{layer}" to rename: there are {", ".join(LAYERS)}')
-        return cls(**{layer.lower().replace("-", "_"): name for layer, name in renamed.items()})
+        return Layers(**{layer.lower().replace("-", "_"): name for layer, name in renamed.items()})
 
     @property
     def renamed(self) -> dict[str, str]:
@@ -91,7 +94,7 @@ class DrawingStyle:
     project: Annotated[str, "project, for the title block"] = ""
     revision: Annotated[str, "revision, for the title block"] = ""
     tolerance: Annotated[Length | None, "tolerance of lengths, which are shown to a tenth of it or finer"] = None
-    layers: Layers = field(default_factory=Layers)
+    layers: Layers | Mapping[str, str] = field(default_factory=Layers)
     name: Annotated[str, "title of the drawings; default: the target's name"] = ""
     author: Annotated[str, "who drew them or is responsible for them, for the title block"] = ""
     date: Annotated[IsoDate, 'date for the title block, such as "2026-11-22"; default: today'] = ""
@@ -101,11 +104,9 @@ class DrawingStyle:
             instance(f"the {key} of drawings", getattr(self, key), str, "text")
         if self.paper not in PAPERS:
             raise InputError(f"unknown paper size {shown(self.paper)}: use {', '.join(PAPERS)}")
-        if not isinstance(self.layers, Layers):
-            instance("the layers of drawings", self.layers, Mapping, "a mapping from layers to their new names")
-            object.__setattr__(self, "layers", Layers.of(self.layers))
+        object.__setattr__(self, "layers", Layers.of(self.layers))
         checked(self, "the {} of drawings")
 
     def parameters(self) -> dict[str, Any]:
         """As it is kept in a result."""
-        return {**vars(self), "layers": self.layers.renamed}
+        return {**vars(self), "layers": Layers.of(self.layers).renamed}
