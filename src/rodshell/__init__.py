@@ -65,8 +65,9 @@ if TYPE_CHECKING:
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
-    from rodshell.output import export, save
-    from rodshell.output.options import DrawingStyle, OutputOptions
+    from rodshell.output.files import export, save
+    from rodshell.output.options import OutputOptions
+    from rodshell.output.settings import DrawingStyle
     from rodshell.progress import bar
     from rodshell.results import Archive, Results, Verdict, read
     from rodshell.rods.local_energy import LocalEnergy
@@ -120,8 +121,9 @@ _HOMES = {
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
-    "rodshell.output": ("export", "save"),
-    "rodshell.output.options": ("DrawingStyle", "OutputOptions"),
+    "rodshell.output.files": ("export", "save"),
+    "rodshell.output.options": ("OutputOptions",),
+    "rodshell.output.settings": ("DrawingStyle",),
     "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.rods.local_energy": ("LocalEnergy",),
     "rodshell.rods.materials": ("Material",),

@@ -12,7 +12,6 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.case import Case
-from rodshell.case.from_objects import tables_of
 from rodshell.checks import Checks, check
 from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
@@ -256,7 +255,7 @@ class Form:
         instance("options", options, OutputOptions)
         same = options.stages == self.options.stages and self._weight(options) == self._weight(self.options)
         known = self.known_checks if same else None
-        case = replace(self.case, **tables_of(options))
+        case = replace(self.case, **options.tables)
         loaded = self.known_loaded if same and options.strength == self.options.strength else None
         return replace(
             self, case=case, options=options, _known_checks=known, _known_fabrication=None, _known_loaded=loaded

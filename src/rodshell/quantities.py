@@ -14,12 +14,13 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from rodshell.errors import InputError
 from rodshell.units import Kind, read_quantity, require_unit_of_all, shown, si_unit, wanted
-from rodshell.validation import described, is_auto, not_negative, number, numbers, positive
+from rodshell.validation import described, is_auto, not_negative, number, numbers, positive, whole
 
 Auto = Literal["auto"]
 Reader = Callable[[object], Any]
 Sign = Callable[..., float]
 T = TypeVar("T")
+MOST_STAGES = 1000  # of a deployment
 
 
 @dataclass(frozen=True)
@@ -258,6 +259,13 @@ def _iso_date(value: object) -> str:
         raise ValueError('must be a day; write it as "2026-11-22"') from None
 
 
+def _checked_day(name: str, value: object) -> str:
+    try:
+        return _iso_date(value)
+    except ValueError:
+        raise InputError(f'{name} cannot be {shown(value)}: write a day as "2026-11-22"') from None
+
+
 def _names(value: object) -> tuple[str, ...]:
     """Names: ["U01", "V03"] or "U01, V03"."""
     items = value.split(",") if isinstance(value, str) and value.strip() else value or []
@@ -276,9 +284,10 @@ _LENGTHS = pair(_LENGTH, _TWO, one_for_both=True)
 Name = Annotated[str, Value(str, role="name")]
 FileToRead = Annotated[str, Value(str, role="file")]
 FolderToWrite = Annotated[str, Value(str, role="folder")]
-IsoDate = Annotated[str, Value(_iso_date)]
+IsoDate = Annotated[str, Value(_iso_date, _checked_day)]
 Names = Annotated[tuple[str, ...], Value(_names)]
 Whole = Annotated[int, Value(_whole)]
+Stages = Annotated[int, Value(_whole, lambda name, value: whole(name, value, 0, MOST_STAGES))]
 Counts = Annotated[tuple[int, int] | Auto, Value(_counts)]
 Corners = Annotated[Literal[2, 4], Value(_corners, _checked_corners)]
 Unit = Annotated[float, Value(_unit)]

@@ -17,7 +17,7 @@ import numpy as np
 import rodshell as rs
 from rodshell.checks import bending
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid, straight_rods
-from rodshell.output import export
+from rodshell.output.files import export
 from rodshell.results import Archive
 from tests.acceptance.cases import ELLIPSOID, HEMISPHERE, ROD, R, ridge_formula
 from tests.acceptance.rows import Row, print_table

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
-from rodshell.output import export
+from rodshell.output.files import export
 from tests.acceptance.rows import Row
 from tests.acceptance.targets_broken import as_obj, dome
 from tests.output.browser import CHROMIUM

@@ -14,11 +14,11 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.cli import main
-from rodshell.output import export
 from rodshell.output.drawing import CAPITAL, Drawing
 from rodshell.output.drawings import sheet_set
-from rodshell.output.files import KINDS
-from rodshell.output.options import DrawingStyle, OutputOptions
+from rodshell.output.files import KINDS, export
+from rodshell.output.options import OutputOptions
+from rodshell.output.settings import DrawingStyle
 from rodshell.results import Archive, read
 from rodshell.results.wording import rounding_of
 from tests.acceptance.cases import HEMISPHERE, ROD

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import rodshell as rs
-from rodshell.output import export
+from rodshell.output.files import export
 from tests.acceptance.rows import Row
 from tests.acceptance.targets_broken import WRITERS
 from tests.acceptance.verdict_levels import said_of

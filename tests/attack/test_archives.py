@@ -25,8 +25,7 @@ import pytest
 
 from rodshell.errors import OutputError, RodshellError
 from rodshell.figures.records import FARTHEST, LARGEST, MOST, SHORTEST
-from rodshell.output import save
-from rodshell.output.files import files_of
+from rodshell.output.files import files_of, save
 from rodshell.results import read
 from rodshell.results.folder import RECORD, open_folder
 from tests.output.sample_archive import with_everything

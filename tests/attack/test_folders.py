@@ -13,7 +13,7 @@ import pytest
 
 from rodshell.cli import main
 from rodshell.errors import OutputError, OutputWarning
-from rodshell.output import save
+from rodshell.output.files import save
 from rodshell.results import read
 from rodshell.results.folder import RECORD, open_folder
 from rodshell.results.manifest import mark, read_manifest

@@ -8,8 +8,9 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.fabrication.settings import Fabrication
-from rodshell.output import save
-from rodshell.output.options import DrawingStyle, OutputOptions
+from rodshell.output.files import save
+from rodshell.output.options import OutputOptions
+from rodshell.output.settings import DrawingStyle
 from rodshell.results import Archive
 from rodshell.results.archive import read
 from tests.acceptance.cases import ROD, ridge_formula

@@ -15,16 +15,17 @@ from hypothesis.extra.numpy import arrays
 
 from rodshell.errors import InputError
 from rodshell.geometry.boxes import boxes_meet, length_beneath, lines_meet
-from rodshell.output import export
 from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
 from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan, strips_drawing
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, bound, laid_out, room, tiled, title_block
 from rodshell.output.drawings.shell import SAME, bracing_drawing, elevations_drawing, erection_drawing, rod_curves
+from rodshell.output.files import export
 from rodshell.output.grid import joint_places, rods_of
 from rodshell.output.labels import spread
-from rodshell.output.options import DrawingStyle, OutputOptions
+from rodshell.output.options import OutputOptions
+from rodshell.output.settings import DrawingStyle
 from rodshell.results import Archive
 from rodshell.results.wording import rounding_of
 from tests.output.dxf_reader import read_dxf

@@ -10,9 +10,9 @@ import pytest
 from ezdxf.document import Drawing as Document
 from ezdxf.enums import TextEntityAlignment as Alignment
 
-from rodshell.output import export
 from rodshell.output.drawing import LAYERS, Drawing, Pencil
 from rodshell.output.dxf import CAPITAL, drawing_dxf
+from rodshell.output.files import export
 from tests.output.dxf_reader import read_dxf
 from tests.output.forms import TARGETS, archive, wished
 

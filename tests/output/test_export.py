@@ -13,8 +13,7 @@ import pytest
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import InputError, OutputError
-from rodshell.output import export, save
-from rodshell.output.files import DEFAULT, KINDS, read_kinds
+from rodshell.output.files import DEFAULT, KINDS, export, read_kinds, save
 from rodshell.results import Results, read
 from tests.output.forms import archive, form, wished
 from tests.output.sample_archive import sample_archive, table_archive

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from rodshell.errors import InputError, OutputError, OutputWarning
-from rodshell.output import export, save
-from rodshell.output.files import KINDS, NAMES, Content
+from rodshell.output.files import KINDS, NAMES, Content, export, save
 from rodshell.progress import TimeLimit, silent
 from rodshell.results import Archive, folder, read
 from rodshell.results.archive import ARCHIVE

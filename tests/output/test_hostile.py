@@ -13,9 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rodshell.output import export, save
 from rodshell.output.dxf import layer_names
-from rodshell.output.files import KINDS
+from rodshell.output.files import KINDS, export, save
 from rodshell.output.schedules import csv_text
 from tests.output.hostile import LAYERS, NAMES, hostile_archive
 from tests.output.live_cells import live_cells

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rodshell.output import save
 from rodshell.output.drawings.sheets import title_block
+from rodshell.output.files import save
 from rodshell.results import archive as archive_module
 from rodshell.results import read
 from rodshell.results.archive import read_inputs

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rodshell.output import save
 from rodshell.output.drawings import drawing_set, sheet_set
+from rodshell.output.files import save
 from rodshell.results import Archive, Results
 from rodshell.results.verdict import facts
 from tests.output.sample_archive import sample_archive, table_archive

@@ -13,8 +13,8 @@ import pytest
 
 from rodshell.errors import InputError
 from rodshell.figures.form import Section, Stiffness
-from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
+from rodshell.output.files import export
 from rodshell.output.grid import joints_of, rods_of
 from rodshell.output.models import section_outline, swept, widths_along
 from tests.output.forms import archive, wished

@@ -17,8 +17,8 @@ import pytest
 
 from rodshell.errors import OutputError
 from rodshell.geometry.boxes import boxes_meet, lines_meet
-from rodshell.output import export, save
 from rodshell.output.drawings.flat import flat_plan
+from rodshell.output.files import export, save
 from rodshell.output.labels import place
 from rodshell.output.pictures import picture_svg
 from rodshell.results import Archive, Results, read

@@ -14,12 +14,12 @@ from reportlab import rl_config
 
 from rodshell.cli import main
 from rodshell.errors import OutputWarning
-from rodshell.output import export, save
 from rodshell.output.drawing import CAPITAL, Drawing, Pen, Pencil, Text
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_plan
-from rodshell.output.options import PAPERS
+from rodshell.output.files import export, save
 from rodshell.output.pdf import drawings_pdf, text_width
+from rodshell.output.settings import PAPERS
 from rodshell.results import Archive, Results
 from tests.output.forms import archive, wished
 from tests.output.sample_archive import sample_archive

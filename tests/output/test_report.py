@@ -14,8 +14,8 @@ import rodshell as rs
 from rodshell.checks import Deployment
 from rodshell.figures.checks import Bending, WorstBent
 from rodshell.figures.form import Layout, Material, Target
-from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
+from rodshell.output.files import export
 from rodshell.output.report import checks_table, key_figures
 from rodshell.output.viewer import Scene, scene_of
 from rodshell.results import Archive, Results, wording

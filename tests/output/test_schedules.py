@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rodshell.checks import JointLoads
-from rodshell.output import export
+from rodshell.output.files import export
 from rodshell.output.grid import joints_of, rods_of
 from rodshell.results.wording import rounding_of
 from tests.output.forms import ROD, archive, form, wished

@@ -16,8 +16,8 @@ from rodshell.output.drawing import CAPITAL, LETTER, TEXT, Drawing
 from rodshell.output.drawings import drawing_set, sheet_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import BLOCK, MARGIN, MORE, ROW, laid_out, room, title_block
-from rodshell.output.options import PAPERS, DrawingStyle
 from rodshell.output.pdf import drawings_pdf
+from rodshell.output.settings import PAPERS, DrawingStyle
 from rodshell.results import Archive, Results
 from rodshell.results.wording import rounding_of
 from tests.acceptance.cases import ROD

@@ -15,7 +15,7 @@ import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import OutputError
 from rodshell.figures.records import Record
-from rodshell.output import save
+from rodshell.output.files import save
 from rodshell.results import Archive, Results, read
 from rodshell.results.results import VERSION, json_schema
 from tests.output.forms import formed, wished

@@ -10,9 +10,7 @@ from rodshell.case.held import Held, built
 from rodshell.case.load_tables import BracingKinds, CombinationRows, LoadRows, NoBracing
 from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import (
-    ChecksTable,
     DrapeTable,
-    DrawingsTable,
     LayoutTable,
     PopUpTable,
     RefineTable,
@@ -22,6 +20,7 @@ from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
 from rodshell.fabrication.settings import Fabrication
 from rodshell.loads.settings import LockedJoints, Stability, Strength
+from rodshell.output.settings import CheckOptions, DrawingStyle
 from rodshell.progress import Progress, silent
 from rodshell.rods.joints import Ball, JointKind
 from rodshell.schema import read, undescribed, written
@@ -74,9 +73,9 @@ class Case:
     pop_up: PopUpTable = field(default_factory=PopUpTable)
     refine: RefineTable = field(default_factory=RefineTable)
     seams: SeamsTable = field(default_factory=SeamsTable)
-    checks: ChecksTable = field(default_factory=ChecksTable)
+    checks: CheckOptions = field(default_factory=CheckOptions)
     fabrication: Fabrication = field(default_factory=Fabrication)
-    drawings: DrawingsTable = field(default_factory=DrawingsTable)
+    drawings: DrawingStyle = field(default_factory=DrawingStyle)
     loads: LoadRows = ()
     combinations: CombinationRows = ()
     bracing: BracingKinds = field(default_factory=NoBracing)
@@ -316,17 +315,10 @@ class Case:
         ------
         InputError : a value cannot be used.
         """
-        from rodshell.output.options import DrawingStyle, OutputOptions
+        from rodshell.output.options import OutputOptions
 
-        style = written(self.drawings)
-        style["layers"] = {name.upper().replace("_", "-"): new for name, new in style["layers"].items()}
         return OutputOptions(
-            self.checks.strength,
-            self.checks.stages,
-            self.fabrication,
-            DrawingStyle(**style),
-            rod_chosen=self.rod.left_open,
-            shear_strength=self.checks.shear_strength,
+            **vars(self.checks), fabrication=self.fabrication, drawings=self.drawings, rod_chosen=self.rod.left_open
         )
 
 

@@ -61,7 +61,6 @@ def case_of(
             "lines": [Seam.of(line).points.tolist() for line in seams],
             "patches": [{"name": name, **written(patch)} for name, patch in patches.items()],
         },
-        **options.parameters(),
     }
     unknown = _without_keys(shape)
     if not unknown:
@@ -76,7 +75,7 @@ def case_of(
     tables = {name: replace(getattr(case, name), held=found) for name, found in held.items()}
     if unknown:
         tables["target"] = HeldTarget(kind="python", held=Held(target, unknown, by_value=False))
-    return replace(case, joint=_of_a_kind(joint), **tables)
+    return replace(case, joint=_of_a_kind(joint), **tables, **options.tables)
 
 
 def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint) -> Case:
@@ -84,12 +83,6 @@ def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint) -> Case:
     target = HeldTarget(kind="table", held=Held(ends, f"a table of {len(ends.final)} rods"))
     table = RodTable() if rod is None else read(RodTable, rod.parameters())
     return Case(target=target, rod=table, joint=_of_a_kind(joint), pop_up=PopUpTable(ends="pinned"))
-
-
-def tables_of(options: OutputOptions) -> dict[str, Any]:
-    """The tables of checks, fabrication and drawings."""
-    case, given = read(Case, options.parameters()), options.parameters()
-    return {name: getattr(case, name) for name in given}
 
 
 def _of_a_kind(joint: Joint) -> JointKind:

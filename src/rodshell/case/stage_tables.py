@@ -1,6 +1,6 @@
-"""The tables of a case's stages: layout, drape, pop-up, seams, checks and drawings."""
+"""The tables of a case's stages: layout, drape, pop-up and seams."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from math import pi
 from pathlib import PureWindowsPath
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,7 +16,6 @@ from rodshell.quantities import (
     Duration,
     FileToRead,
     FolderToWrite,
-    IsoDate,
     Length,
     LengthOrAuto,
     LengthsOrAuto,
@@ -28,12 +27,10 @@ from rodshell.quantities import (
     Polylines,
     Ratio,
     Share,
-    Stress,
     Unit,
-    Whole,
     words,
 )
-from rodshell.schema import Inline, Rows
+from rodshell.schema import Inline, Rows, written
 from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import rounded_down, shown
 
@@ -63,10 +60,7 @@ class LayoutTable(Holding):
         if spacing == "auto":
             spacing = (rounded_down((target.size if target else 0.2) / 8),) * 2
         rotate = 0.0 if self.rotate == "auto" else self.rotate
-        return GridLayout.orthogonal(
-            rods=self.rods, spacing=spacing, length=self.length, edge=self.edge, rotate=rotate, offset=self.offset,
-            left_out=self.left_out, crossing=self.crossing,
-        )  # fmt: skip
+        return GridLayout.orthogonal(**(written(self) | {"spacing": spacing, "rotate": rotate}))
 
 
 FALLING = ("height", "coupling", "C1", "C2", "time_step", "duration", "friction", "drag", "frames")
@@ -120,16 +114,14 @@ class DrapeTable(Holding):
     def build(self) -> "Method":
         """The method with its options."""
         from rodshell.formfinding.methods import Bound, Fall, Gravity
-        from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
+        from rodshell.joints import ExplicitPenalty, ImplicitPenalty, SharedDofs
 
         if self.method == "bound":
             return Bound()
         if self.method == "gravity":
             return Gravity(acceleration=self.gravity)
-        coupling: Coupling = SharedDofs()
-        if self.coupling != "shared":
-            penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
-            coupling = penalty(C1=self.C1, C2=self.C2)
+        penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
+        coupling = SharedDofs() if self.coupling == "shared" else penalty(C1=self.C1, C2=self.C2)
         return Fall(
             acceleration=self.gravity, height=self.height, coupling=coupling, time_step=self.time_step,
             duration=self.duration, friction=self.friction, drag=self.drag, stream=self.frames,
@@ -210,37 +202,3 @@ class SeamsTable:
             if names.count(name) > 1:
                 raise InputError(f"seams.patches has patch {shown(name)} twice: put all that it has in one table")
         return {patch.name: patch.layout for patch in self.patches}
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChecksTable:
-    strength: Annotated[Stress | None, "design strength in bending; default: a preset's by its code"] = None
-    stages: Annotated[Whole, "equilibria of the deployment from flat; 0: it is not computed"] = 8
-    shear_strength: Annotated[Stress | None, "shear strength along the fibres; default: a preset's, or von Mises"] = (
-        None
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class LayersTable:
-    """Other names for the layers of DXF files."""
-
-    cut: Annotated[str | None, "name of the DXF layer CUT"] = None
-    mark: Annotated[str | None, "name of the DXF layer MARK"] = None
-    label: Annotated[str | None, "name of the DXF layer LABEL"] = None
-    boundary_flat: Annotated[str | None, "name of the DXF layer BOUNDARY-FLAT"] = None
-    boundary_final: Annotated[str | None, "name of the DXF layer BOUNDARY-FINAL"] = None
-    dim: Annotated[str | None, "name of the DXF layer DIM"] = None
-    title: Annotated[str | None, "name of the DXF layer TITLE"] = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class DrawingsTable:
-    paper: Annotated[Literal["A4", "A3", "A2", "A1", "A0"], "size of the PDF's sheets, landscape"] = "A3"
-    project: Annotated[str, "project, for the title block"] = ""
-    revision: Annotated[str, "revision, for the title block"] = ""
-    tolerance: Annotated[Length | None, "tolerance of lengths, which are shown to a tenth of it or finer"] = None
-    layers: LayersTable = field(default_factory=LayersTable)
-    name: Annotated[str, "title of the drawings; default: the target's name"] = ""
-    author: Annotated[str, "who drew them or is responsible for them, for the title block"] = ""
-    date: Annotated[IsoDate, 'date for the title block, such as "2026-11-22"; default: today'] = ""

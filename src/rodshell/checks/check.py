@@ -21,13 +21,13 @@ from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
+from rodshell.quantities import MOST_STAGES
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.load_path import MOST_FACTORIZATIONS
 from rodshell.units import length_text, stress_text
 from rodshell.validation import brief, choice, instance, mapping, positive, whole
 
-MOST_STAGES = 1000
 WORTH = 0.01  # of the stress: less torsion is not worth a word
 
 

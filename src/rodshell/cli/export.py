@@ -33,7 +33,7 @@ def command(folder: str, only: str | None, out: str | None, force: bool, quiet: 
 
     KINDS are dxf, svg, pdf, csv, obj, gltf, vtp, compas, png, report, and 3dm, which needs the package rhino3dm.
     """
-    from rodshell.output import export
+    from rodshell.output.files import export
     from rodshell.results import read
 
     where = file_path("--out", out or folder)

@@ -24,7 +24,6 @@ from rodshell.output.drawings.shell import (
     rod_curves,
     supports_drawing,
 )
-from rodshell.output.options import PAPERS
 from rodshell.output.schedules import (
     bracing_table,
     joints_table,
@@ -34,6 +33,7 @@ from rodshell.output.schedules import (
     stock_table,
     supports_table,
 )
+from rodshell.output.settings import PAPERS
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.strength_used import ENDS
