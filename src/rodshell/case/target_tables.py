@@ -112,7 +112,7 @@ class Placed(Holding):
 @dataclass(frozen=True, kw_only=True)
 class Surface(Placed):
     unit: Annotated[Unit | None, "the file's unit, such as mm"] = None
-    object: Annotated[str | None, "name of an object or layer; of a 3dm surface or STEP face also its number"] = None
+    object: Annotated[str | None, "name of an object or layer; in 3dm and STEP files also a number"] = None
     up: Annotated[
         Literal["z", "y"] | None, "axis of the file that points upwards; default: y of glTF, z of others"
     ] = None  # fmt: skip
