@@ -9,8 +9,7 @@ import rodshell as rs
 from benchmarks.rows import Row, Section, clock
 from rodshell.checks.contact import contact_of
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid
-from rodshell.output.files import export
-from rodshell.output.files import DEFAULT
+from rodshell.output.files import DEFAULT, export
 from rodshell.results import Archive, Results
 from tests.acceptance.targets import SAME, gallery, gallery_target
 from tests.output.sample_archive import with_deployment
