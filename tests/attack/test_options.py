@@ -65,7 +65,7 @@ def _nothing_is_computed(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in BEGINS:
         import_module(f"rodshell.cli.{name.partition('.')[0]}")
         monkeypatch.setattr(f"rodshell.cli.{name}", stop)
-    monkeypatch.setattr("rodshell.output.export", stop)
+    monkeypatch.setattr("rodshell.output.files.export", stop)
     monkeypatch.setattr("socket.socket.bind", stop)
 
 
