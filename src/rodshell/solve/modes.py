@@ -206,21 +206,20 @@ def _largest(tangent: Tangent, upper: csc_matrix, count: int, least: float) -> t
     if available == 0:
         return np.empty(0), np.empty((0, size))
     count = min(count, available)
-    wanted = count + SPARE
-    for _ in range(TRIES):
-        wanted = min(wanted, available)
+    wanted = min(count + SPARE, available)
+    for number in range(TRIES):
         if size <= DENSE or wanted >= size - 1:
             values, vectors = eigh(matrix.toarray(), stiffness.toarray())
             order = np.argsort(values)[::-1]
         else:
-            values, vectors = _lanczos(tangent, matrix, stiffness, wanted)
+            values, vectors = _lanczos(tangent, matrix, stiffness, wanted, start=number)
             order = np.argsort(values)[::-1]
         values, vectors = values[order], vectors.T[order]
         positive = values > max(least, 1e-14 * float(np.abs(values).max(initial=0.0)))
         values, vectors = values[positive], vectors[positive]
         if not len(values) and least == 0.0:
             return values, vectors
-        at, found = _between(values, count, least, complete=len(values) < wanted or wanted == available)
+        at, found = _between(values, count, least, complete=len(values) < wanted or wanted >= available)
         if _above(tangent, upper, at) == found:
             kept = min(count, found)
             return values[:kept], vectors[:kept]
@@ -248,13 +247,15 @@ def _above(tangent: Tangent, upper: csc_matrix, value: float) -> int:
     return tangent.pattern.solver.factor(tangent.values - upper.data / value).negative
 
 
-def _lanczos(tangent: Tangent, matrix: csc_matrix, stiffness: csc_matrix, count: int) -> tuple[Floats, Floats]:
+def _lanczos(
+    tangent: Tangent, matrix: csc_matrix, stiffness: csc_matrix, count: int, *, start: int
+) -> tuple[Floats, Floats]:
+    """From another vector for each number `start`: a vector may hide a mode that another one is as low as."""
     size = tangent.freedom.size
     inverse = LinearOperator((size, size), matvec=tangent.factors.solve, dtype=float)
-    start = generic(size, 1)[0]
     try:
         with threadpool_limits(limits=1, user_api="blas"):  # others would keep ours from the processors
-            values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=start, tol=ACCURACY)
+            values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=generic(size, 1 + start)[-1], tol=ACCURACY)
     except ArpackError as error:
         raise ConvergenceError(f"the modes were not found: {error}; ask for fewer") from None
     return values, vectors
