@@ -253,9 +253,10 @@ def _lanczos(
     """From another vector for each number `start`: a vector may hide a mode that another one is as low as."""
     size = tangent.freedom.size
     inverse = LinearOperator((size, size), matvec=tangent.factors.solve, dtype=float)
+    vector = generic(size, 1 + start)[-1]
     try:
         with threadpool_limits(limits=1, user_api="blas"):  # others would keep ours from the processors
-            values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=generic(size, 1 + start)[-1], tol=ACCURACY)
+            values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=vector, tol=ACCURACY)
     except ArpackError as error:
         raise ConvergenceError(f"the modes were not found: {error}; ask for fewer") from None
     return values, vectors
