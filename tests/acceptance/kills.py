@@ -133,7 +133,8 @@ def kill(job: Job, folder: Path, how: signal.Signals, stage: str, after: float, 
     if code in FOUND and seen == NEW:
         return None
     words = said.splitlines()
-    spoken = words[-1:] == ["rodshell: interrupted"] and all(word.startswith("rodshell: ") for word in words)
+    late = seen == NEW and words[-1:] == [f"rodshell: interrupted: the new result in {folder} is complete"]
+    spoken = (late or words[-1:] == ["rodshell: interrupted"]) and all(word.startswith("rodshell: ") for word in words)
     if code != CODES[how] or not (spoken or how is signal.SIGKILL):
         faults.ends += 1
         faults.notes.append(f"{where}: exit code {code}, said {said!r}")
