@@ -7,6 +7,7 @@ import rodshell as rs
 from rodshell.model import Shell
 from rodshell.rods.elements import twist_angles
 from rodshell.solve.load_path import load_path
+from rodshell.solve.newton_step import generic_motion
 from rodshell.solve.path import relax
 from rodshell.solve.problem import mean_radius
 from tests.solve.scaled import LATH, TUBE, Placed, boundary_placed, cap, form, others
@@ -87,6 +88,17 @@ def test_a_boundary_may_be_turned_by_any_angle_against_its_footprint(start, turn
     if start == "draped":
         assert there.report.factorizations == shell.report.factorizations
     np.testing.assert_allclose(there.positions, Placed(turned=turned)(shell.positions), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("turned", [1.0, np.pi / 2, np.pi])
+def test_a_generic_motion_turns_with_the_structure(turned):
+    """And has a part along each axis, also of a rod that stands upright."""
+    state, twists = np.random.default_rng(1).normal(size=(12, 3)), np.arange(12) > 8
+    placed = np.where(twists[:, None], state, Placed(turned=turned)(state))
+    motion, there = generic_motion(state, twists), generic_motion(placed, twists)
+    np.testing.assert_allclose(there[:9], Placed(turned=turned)(motion[:9]), atol=1e-12)
+    np.testing.assert_array_equal(there[9:], motion[9:])
+    assert (np.abs(generic_motion(np.outer(np.arange(9.0), [0, 0, 1]), twists[:9])).max(axis=0) > 0.1).all()
 
 
 @pytest.mark.parametrize("joint", ["spring", "two layers"])
