@@ -242,19 +242,23 @@ def pop_up_rows() -> Iterator[Row]:
 def genetic_rows() -> Iterator[Row]:
     """The kept searches, their best popped up again, and the beginning of one made again."""
     for one in genetic.make(silent).comparisons:
-        name, history, best = one.case.target.name, one.history, one.best
-        assert best is not None
-        course = [generation.best for generation in history.generations]
-        runs = f"{history.runs} forward runs, {history.seconds:.0f} s; direct: one run, {history.direct_seconds:.2g} s"
-        note = f"{len(course)} generations of {history.population}; {runs}"
-        yield Row(f"{name}, genetic", "gained in the last 20 generations", 1 - course[-1] / course[-21], 0.01, "", note)
-        yield Row(f"{name}, genetic", "best popped up again, rms apart", abs(best.rms / history.best - 1), 1e-4)
-        off = 1e3 * one.apart
-        note = f"{1e3 * best.rms:.3f} mm, direct {1e3 * one.direct.rms:.3f} mm; G0 apart max {off.max():.2f} mm, rms "
-        note += f"{rms(off):.2f} mm"
-        yield Row(f"{name}, genetic", "popped rms over the direct method's", best.rms / one.direct.rms, 1.0, "", note)
-    case, kept = genetic.CASES[1], genetic.stored("paraboloid")
-    assert kept is not None
+        name = f"{one.case.target.name}, genetic"
+        yield Row(name, "seeds kept, at least", -len(one.searches), -5, "", one.spread())
+        for sought in one.searches:
+            history, again, seed = sought.history, sought.best, f", seed {sought.history.seed}"
+            assert again is not None
+            course = [generation.best for generation in history.generations]
+            note = f"{len(course)} generations of {history.population}; {history.runs} forward runs, "
+            note += f"{history.seconds:.0f} s; direct: one run, {history.direct_seconds:.2g} s"
+            yield Row(name + seed, "gained in the last 20 generations", 1 - course[-1] / course[-21], 0.01, "", note)
+            note = f"{1e3 * again.rms:.3f} mm"
+            yield Row(name + seed, "best popped up again, rms apart", abs(again.rms / history.best - 1), 1e-4, "", note)
+        best, off = one.searches[0], 1e3 * one.searches[0].apart
+        assert best.best is not None
+        note = f"direct {1e3 * one.direct.rms:.3f} mm; G0 apart max {off.max():.2f} mm, rms {rms(off):.2f} mm"
+        ratio = best.best.rms / one.direct.rms
+        yield Row(f"{name}, best seed", "popped rms over the direct method's", ratio, 1.0, "", note)
+    case, kept = genetic.CASES[1], genetic.stored("paraboloid")[0]
     with TemporaryDirectory() as folder:
         again = genetic.find(case, Path(folder), seed=kept.seed, population=kept.population, most=2)
     pairs = zip(again.generations, kept.generations, strict=False)

@@ -100,8 +100,7 @@ def with_all_gates() -> Iterator[Row]:
 
 def against_genetic(shell: str) -> Iterator[Row]:
     """The best design of thousands of pop-ups, through the gates; and refinement with the same variables."""
-    stages, history = stages_of(shell, "pinned", 0.005), stored(shell)
-    assert history is not None
+    stages, history = stages_of(shell, "pinned", 0.005), stored(shell)[0]
     design = Design.of(stages)
     popped = design.pop_up(history.variables)
     assert popped is not None

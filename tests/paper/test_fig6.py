@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -83,7 +84,7 @@ def test_the_files_hold_tables_and_one_picture_a_method(tmp_path: Path) -> None:
 
 def test_the_differences_show_every_rod_end_by_every_method(monkeypatch: pytest.MonkeyPatch) -> None:
     """Dots at the heights of the errors: their spread is that of the table's rows, in one scale."""
-    monkeypatch.setattr(drapes, "stored_footprint", lambda name: None)
+    monkeypatch.setattr(drapes, "stored", lambda name: ())
     root = ElementTree.fromstring(figure().pictures()["fig6-differences"])
     heights = [float(dot.get("cy", "nan")) for dot in root.findall(".//{http://www.w3.org/2000/svg}circle")]
     errors = np.concatenate([by(method).errors for method in METHODS])
@@ -104,7 +105,8 @@ def test_a_footprint_that_was_sought_is_drawn_where_its_rods_are_those_of_the_ca
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def curves(found: np.ndarray | None) -> int:
-        monkeypatch.setattr(drapes, "stored_footprint", lambda name: found)
+        kept = () if found is None else (SimpleNamespace(footprint=found),)
+        monkeypatch.setattr(drapes, "stored", lambda name: kept)
         return drapes.rows_svg([by("bound")]).count("<polygon")
 
     around = np.column_stack([np.cos(np.arange(28)), np.sin(np.arange(28))])

@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Footprint, PatchForm, find_stages
 from rodshell.paper import genetic, genetic_search
 from rodshell.paper.figure import CASES, Case
-from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
+from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored
 from rodshell.paper.genetic_search import Design
 from rodshell.progress import silent
 from tests.formfinding.falls import HEMISPHERE, PAPER_ROD
@@ -298,9 +298,9 @@ def test_a_search_has_converged_when_twenty_generations_gained_less_than_a_hundr
 @pytest.mark.slow
 def test_the_table_the_picture_and_the_files_tell_the_search(tmp_path: Path) -> None:
     made = genetic.make(silent, seed=SEED, generations=1, cases=[SMALL], folder=tmp_path / "kept")
-    assert made.status == "the search on the hemisphere has not converged: 1 of at least 21 generations"
+    assert made.status == f"seed {SEED} on the hemisphere has not converged: 1 of at least 21 generations"
     made.save(tmp_path / "genetic")
-    found, by_direct = made.comparisons[0], made.rows()[0]
+    found, by_direct = made.comparisons[0].searches[0], made.rows()[0]
     assert float(by_direct[5]) == pytest.approx(1e3 * direct(SMALL).agreement["pinned"].rms, abs=6e-4)
     assert by_direct[3] == "1"
     row = made.rows()[1]
@@ -309,11 +309,11 @@ def test_the_table_the_picture_and_the_files_tell_the_search(tmp_path: Path) -> 
     apart = 1e3 * np.abs(reach(direct(SMALL).footprint) - found.history.variables[design(SMALL).orbit])
     assert [float(one) for one in row[7:9]] == pytest.approx([apart.max(), np.sqrt(np.mean(apart**2))], abs=6e-3)
     assert row[-1].startswith("NOT CONVERGED")
-    kept = History.of((tmp_path / "genetic" / "hemisphere.json").read_text())
+    kept = History.of((tmp_path / "genetic" / f"hemisphere-{SEED}.json").read_text())
     assert kept.generations == found.history.generations
     assert np.array_equal(kept.variables, found.history.variables)
     result = json.loads((tmp_path / "genetic" / "result.json").read_text())
-    assert result["comparisons"][0]["forward_runs"] == genetic_search.POPULATION
+    assert result["comparisons"][0]["searches"][0]["forward_runs"] == genetic_search.POPULATION
     root = ElementTree.parse(tmp_path / "genetic" / "genetic.svg").getroot()
     assert len(root.findall(".//{http://www.w3.org/2000/svg}polyline")) == 2  # the search, the direct method
 
@@ -351,31 +351,37 @@ def test_the_command_says_what_an_interrupted_search_keeps(
 def test_a_best_footprint_that_pops_up_otherwise_is_said(whole: History) -> None:
     last = replace(whole.generations[-1], best=0.5 * whole.best)
     lying = replace(whole, generations=(*whole.generations[:-1], last))
-    assert "does not pop up again" in genetic.compare(SMALL, lying).status
+    assert "does not pop up again" in genetic.compare(SMALL, [lying]).status
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.target.name)
-def test_the_kept_searches_converged_and_their_best_pop_up_again_nearer_than_the_direct_answer(case: Case) -> None:
-    history = stored(case.target.name)
-    assert history is not None
+SEEDS = range(1, 6)
+KEPT = [(case, number) for case in CASES for number in range(len(SEEDS))]
+
+
+@pytest.mark.parametrize(("case", "number"), KEPT, ids=lambda one: one.target.name if isinstance(one, Case) else one)
+def test_the_kept_searches_converged_and_their_best_pop_up_again(case: Case, number: int) -> None:
+    history = stored(case.target.name)[number]
     best = [one.best for one in history.generations]
     assert best[-1] > (1 - GAIN) * best[-1 - WINDOW]
     assert min(np.array(best[: -1 - WINDOW][WINDOW:]) * (1 - GAIN) - best[2 * WINDOW : -1]) > 0  # not before
     assert best == sorted(best, reverse=True)
     assert history.runs == history.population * len(best)
-    # the boundary of the drape, which was up to 0.1 mm elsewhere when the searches were made: 2e-3 measured
-    assert design(case).error(history.variables) == pytest.approx(best[-1], rel=3e-3)
-    assert best[-1] < direct(case).agreement["pinned"].rms
+    assert design(case).error(history.variables) == pytest.approx(best[-1], rel=1e-4)
     assert best[0] > 5 * direct(case).agreement["pinned"].rms  # they began far from the direct answer
-    footprint = stored_footprint(case.target.name)
-    assert footprint is not None
-    np.testing.assert_allclose(footprint, design(case).footprint(history.variables).points, atol=1e-7)
+    np.testing.assert_allclose(history.footprint, design(case).footprint(history.variables).points, atol=1e-7)
     assert history.rods == tuple(rod.name for rod in direct(case).footprint.rods)
 
 
 def test_a_target_without_a_kept_search_has_none() -> None:
-    assert stored("cap") is None
-    assert stored_footprint("cap") is None
+    assert stored("cap") == ()
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.target.name)
+def test_five_seeds_are_kept_from_the_best_and_the_best_is_nearer_than_the_direct_answer(case: Case) -> None:
+    kept = stored(case.target.name)
+    assert sorted(history.seed for history in kept) == list(SEEDS)
+    assert [history.best for history in kept] == sorted(history.best for history in kept)
+    assert kept[0].best < direct(case).agreement["pinned"].rms
 
 
 def test_a_history_is_read_as_it_was_written(whole: History) -> None:

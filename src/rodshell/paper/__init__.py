@@ -19,7 +19,10 @@ FIGURES = {
 }
 
 _MAKERS = {"fig6": ("drapes", "make_fig6"), "fig7": ("drapes", "make_fig7")}  # others: `make` of the module
-_MORE = {"fig4": ["angles-?.csv"], "genetic": ["hemisphere.json", "paraboloid.json", "ellipsoid.json"]}
+_MORE = {
+    "fig4": ["angles-?.csv"],
+    "genetic": [f"{target}-*.json" for target in ("hemisphere", "paraboloid", "ellipsoid")],
+}
 
 
 def figure_maker(figure: str) -> "Callable[..., Figure]":

@@ -35,7 +35,7 @@ from rodshell.paper.figure import (
     rows_of_panels,
     standing,
 )
-from rodshell.paper.genetic_records import stored_footprint
+from rodshell.paper.genetic_records import stored
 from rodshell.progress import Progress
 from rodshell.results.wording import nice_ticks
 
@@ -229,9 +229,9 @@ def _plan(run: DrapeRun) -> list[str]:
 
 
 def _sought(run: DrapeRun) -> Floats | None:
-    """(2m, 2) G0 by the genetic algorithm [m], if a search has been stored for this target with these rods."""
-    found = stored_footprint(run.case.target.name)
-    return found if found is not None and len(found) == 2 * sum(run.case.rods) else None
+    """(2m, 2) G0 by the best of the stored genetic searches [m], if there are any for this target with these rods."""
+    best = next(iter(stored(run.case.target.name)), None)
+    return best.footprint if best is not None and len(best.footprint) == 2 * sum(run.case.rods) else None
 
 
 def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:

@@ -98,6 +98,14 @@ class History:
         """Whether the best gains less than `GAIN` in `WINDOW` generations."""
         return self.last_gain < GAIN
 
+    @property
+    def ending(self) -> str:
+        """How the search ended, in a few words."""
+        count = len(self.generations)
+        if count <= WINDOW:
+            return f"{count} of at least {WINDOW + 1} generations"
+        return f"{100 * self.last_gain:.1f} % gained in the last {WINDOW} of {count} generations of {self.population}"
+
     def json(self) -> str:
         """As JSON, one line for each generation."""
         content: dict[str, Any] = {"format": "rodshell-genetic", "version": 1, "units": "SI"}
@@ -123,16 +131,11 @@ def gain(best: list[float]) -> float:
     return 1.0 - best[-1] / best[-1 - WINDOW] if len(best) > WINDOW else 1.0
 
 
-def stored(target: str) -> History | None:
-    """The search for the case with a target of this name that comes with the package, or None."""
-    file = files("rodshell.paper") / "data" / f"genetic-{target}.json"
-    return History.of(file.read_text(encoding="utf-8")) if file.is_file() else None
-
-
-def stored_footprint(target: str) -> Floats | None:
-    """(2m, 2) G0 by the genetic algorithm [m], start and end of each rod in turn; None without a stored search."""
-    history = stored(target)
-    return None if history is None else history.footprint
+def stored(target: str) -> tuple[History, ...]:
+    """The searches for the case with a target of this name that come with the package, the best first."""
+    kept = (file for file in (files("rodshell.paper") / "data").iterdir() if file.name.startswith(f"genetic-{target}-"))
+    histories = [History.of(file.read_text(encoding="utf-8")) for file in kept]
+    return tuple(sorted(histories, key=lambda history: history.best))
 
 
 @dataclass
