@@ -14,7 +14,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.targets.creases import Creases
 from rodshell.targets.field_fitting import OFF, Fit, fit_mesh
-from rodshell.targets.rim import UPRIGHT, Rim, smooth_loop
+from rodshell.targets.rim import UPRIGHT, Given, Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Deviation, Gap, Implicit, Target
 from rodshell.targets.trianglemesh import FARTHEST, TriangleMesh, sound_mesh
@@ -146,16 +146,14 @@ class Freeform(Target):
         ends, moved = self._open_ends
         words = [*self.repairs, self.creased + self.along_creases] if self.creased else list(self.repairs)
         names = ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
-        offs = [rim.off if rim.off > TOLD * self.size and self._ends_at(rim) else 0.0 for rim in self.rims]
-        offs[-1:] = [max([off, *map(self._off, filter(self._is_in_space, self.curves))]) for off in offs[-1:]]
         words += [
-            f"the shell ends up to {length_text(off)} from {name}: on the smooth surface, in a smooth curve where six "
-            "or more of its points turn by little; give more points, or corners"
-            for name, off in zip(names, offs, strict=False)
-            if off > TOLD * self.size
+            f"the shell ends up to {length_text(rim.off)} from {name}: on the smooth surface, in a smooth curve where "
+            "six or more of its points turn by little; give more points, or corners"
+            for name, rim in zip(names, self.rims, strict=False)
+            if rim.off > TOLD * self.size and self._ends_at(rim)
         ]
-        if moved:
-            edges = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else f"{names[0]} is"
+        if jagged := np.count_nonzero(moved):
+            edges = f"{jagged} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else f"{names[0]} is"
             words.append(
                 f"{edges} jagged where faces are missing: the shell ends at a smooth curve, up to "
                 f"{length_text(max(moved))} from the vertices there; to end it elsewhere give target.boundary"
@@ -215,9 +213,11 @@ class Freeform(Target):
         """The rims of the open boundary and of the boundary curves, if there are any."""
         rims = []
         if self.surface.loops:
-            rims.append(self._rim(self._open_ends[0]))
+            ends, moved = self._open_ends
+            rims.append(self._rim(ends, ["surface" if far else "space" for far in moved]))
         if self.curves:
-            rims.append(self._rim([_turning(self._over(curve), k > 0) for k, curve in enumerate(self.curves)]))
+            over = [_turning(self._over(curve), k > 0) for k, curve in enumerate(self.curves)]
+            rims.append(self._rim(over, ["space" if self._is_in_space(curve) else "plan" for curve in self.curves]))
         return tuple(rims)
 
     def _ends_at(self, rim: Rim) -> bool:
@@ -226,18 +226,17 @@ class Freeform(Target):
 
     @cached_property
     def _open_ends(self) -> tuple[list[Floats], list[float]]:
-        """The loops (n, 3) of the open boundary; and how far those that were jagged were moved [m]."""
+        """The loops (n, 3) of the open boundary; and how far each was moved, where it was jagged [m]."""
         ends, moved = list[Floats](), list[float]()
         for loop in self.surface.loops:
             x = self.surface.vertices[loop]
             smooth = smooth_loop(x, self.surface.normals[loop])
             ends.append(x if smooth is None else smooth)
-            if smooth is not None:
-                moved.append(float(np.linalg.norm(self._settle(smooth) - x, axis=1).max()))
+            moved.append(0.0 if smooth is None else float(np.linalg.norm(self._settle(smooth) - x, axis=1).max()))
         return ends, moved
 
-    def _rim(self, loops: list[Floats]) -> Rim:
-        return Rim.of(loops, self._settle, lambda x: unit(self.level(x)[1]))
+    def _rim(self, loops: list[Floats], given: list[Given]) -> Rim:
+        return Rim.of(loops, self._settle, lambda x: unit(self.level(x)[1]), given)
 
     def _settle(self, x: Floats) -> Floats:
         """Points (n, 3) near the surface moved onto it: straight up or down, so that what is straight in plan stays so,

@@ -9,8 +9,8 @@ little, and alike (`Rim.of`). Jagged edges of meshes are smoothed.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
-from typing import Protocol
+from itertools import pairwise, zip_longest
+from typing import Literal, Protocol
 
 import numpy as np
 from scipy.sparse import coo_matrix, diags_array
@@ -38,6 +38,8 @@ MOST, RMS = (
     0.35,
 )  # edge lengths: moves of vertices, largest and rms; steps of a lattice deviate by 0.29 rms
 HALVINGS = 20
+
+Given = Literal["plan", "space", "surface"]  # where a loop is drawn
 
 
 class Domain(Protocol):
@@ -217,7 +219,7 @@ class Rim:
     points : (n, 3) points of all loops, one loop after the other [m].
     inward : (n, 3) unit vectors in the surface, across the edge from each point to the next, towards the shell.
     after : (n,) index of the next point of the loop.
-    off : largest distance from the loops as they are given, with straight sides, along the surface [m].
+    off : largest distance to the rim from the loops, each in the sense in which it is given [m].
     """
 
     points: Floats
@@ -226,7 +228,12 @@ class Rim:
     off: float = 0.0
 
     @staticmethod
-    def of(loops: Sequence[Floats], onto: Callable[[Floats], Floats], normal: Callable[[Floats], Floats]) -> "Rim":
+    def of(
+        loops: Sequence[Floats],
+        onto: Callable[[Floats], Floats],
+        normal: Callable[[Floats], Floats],
+        given: Sequence[Given] = (),
+    ) -> "Rim":
         """Refine loops into a rim, as they are drawn, with cubics where their points are those of a smooth curve.
 
         A point is a corner where the loop turns by more than 14 degrees, or curves three times as much as at both its
@@ -238,16 +245,22 @@ class Rim:
         loops : closed polylines (n, 3) with the shell on their left, seen from outside [m].
         onto : moves points (n, 3) onto the surface.
         normal : outward unit normals (n, 3) of the surface at points.
+        given : of each loop, how `off` is measured: seen from above, from its points in space and from its sides on the
+            surface, or from these alone (default).
         """
-        points, drawn, after, count = list[Floats](), list[Floats](), list[Ints](), 0
-        for given in loops:
-            length = np.linalg.norm(np.roll(given, -1, axis=0) - given, axis=1)
-            loop = given[length > TOUCH * length.sum()]
+        points, laid, plan, after, count = list[Floats](), [np.empty((0, 3))], [np.empty((0, 3))], list[Ints](), 0
+        for all_points, sense in zip_longest(loops, given):
+            length = np.linalg.norm(np.roll(all_points, -1, axis=0) - all_points, axis=1)
+            loop = all_points[length > TOUCH * length.sum()]
             up = normal(onto(loop))
             upright = np.abs(up[:, 2:]) > UPRIGHT
             straight, smooth = _refined(loop, np.where(upright, np.copysign([0.0, 0.0, 1.0], up[:, 2:]), up))
             x = onto(smooth)
-            drawn.append(onto(straight[(straight != smooth).any(axis=1)]))
+            if sense == "plan":
+                plan.append(straight)
+            else:
+                laid.append(onto(straight[(straight != smooth).any(axis=1)]))
+                laid += [loop] if sense == "space" else []
             x = x[np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1) > 0]
             points.append(x)
             after.append(count + (np.arange(len(x)) + 1) % len(x))
@@ -255,7 +268,9 @@ class Rim:
         x, onward = np.vstack(points), np.concatenate(after)
         along = x[onward] - x
         rim = Rim(x, unit(cross(normal(x + 0.5 * along), along)), onward)
-        return replace(rim, off=float(np.abs(rim.distance(np.vstack(drawn))).max(initial=0.0)))
+        above = np.array([1.0, 1.0, 0.0])
+        seen = replace(rim, points=above * rim.points)._farthest(above * np.vstack(plan))
+        return replace(rim, off=max(seen, rim._farthest(np.vstack(laid))))
 
     def __repr__(self) -> str:
         return f"Rim({len(self.points)} points in {self.loops} loop{'s' * (self.loops != 1)})"
@@ -300,6 +315,10 @@ class Rim:
         edge, share = np.empty(len(x), dtype=np.intp), np.empty(len(x))
         _feet(x, self.points, self.after, self._before, *self._balls, edge, share)
         return edge, share
+
+    def _farthest(self, x: Floats) -> float:
+        """The largest distance of points (n, 3) from the rim [m]."""
+        return float(np.linalg.norm(x - self.at(*self.feet(x)), axis=1).max(initial=0.0))
 
     def at(self, edge: Ints, share: Floats) -> Floats:
         """Points (n, 3) [m] on the edges (n,), at fractions `share` (n,) of their lengths."""
