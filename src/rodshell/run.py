@@ -254,7 +254,7 @@ class Run:
         best = searched.best
         layout = replace(found.layout, rotate=best.heading)
         case = case.decided(best.anchor, best.heading)
-        rod = case.rod_on(found.target, layout, anchor=best.anchor)
+        rod = case.rod_on(found.target, layout, anchor=best.anchor, progress=self.progress)
         return case, found._replace(layout=layout, anchor=best.anchor, rod=rod), searched
 
     def _best_heading(self, case: Case, found: Built) -> float:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -139,12 +140,20 @@ class Case:
         paths = (getattr(self.target, key, None) for key in ("file", "boundary"))
         return {path for path in paths if path is not None}
 
-    def rod_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Rod":
+    def rod_on(
+        self,
+        target: "Target",
+        layout: "GridLayout",
+        *,
+        anchor: tuple[float, float] | None = None,
+        progress: Progress = silent,
+    ) -> "Rod":
         """The rod; material and section that were left to the target are chosen by the bends of its net."""
         if self.rod.held is not None:
             rod: Rod = self.rod.held.value
             return rod
-        return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.permanent_strength)
+        fit = partial(self.fit_on, target, layout, anchor=anchor, progress=progress)
+        return self.rod.build(fit, strength=self.permanent_strength)
 
     def permanent_strength(self, material: "Material") -> float | None:
         """What rods of a material withstand permanently [Pa]: as given, or by the building code of a preset."""
@@ -153,11 +162,18 @@ class Case:
         given = self.strength.permanent or self.checks.strength
         return given or permanent_strength(material, self.strength.service_class)
 
-    def fit_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Fit":
+    def fit_on(
+        self,
+        target: "Target",
+        layout: "GridLayout",
+        *,
+        anchor: tuple[float, float] | None = None,
+        progress: Progress = silent,
+    ) -> "Fit":
         """What a rod that is left to the target has to fit."""
         from rodshell.checks.sizing import Fit
 
-        return Fit.on(target, layout, anchor=anchor, joint=self.joint)
+        return Fit.on(target, layout, anchor=anchor, joint=self.joint, progress=progress)
 
     def with_rod(self, rod: "Rod") -> "Case":
         """The same case with this rod spelled out."""
@@ -193,7 +209,7 @@ class Case:
         Parameters
         ----------
         target : the target, where it was built before.
-        progress : called before the net by whose bends the rod is chosen.
+        progress : called while a file is read and fitted, and by the net by whose bends the rod is chosen.
 
         Raises
         ------
@@ -213,7 +229,8 @@ class Case:
             )
         anchor = None if self.drape.anchor == "auto" else self.drape.anchor
         joint, method = self.joint, built(self.drape)
-        target = cut_at(target or built(self.target), [Seam.of(line) for line in self.seams.lines])
+        seams = [Seam.of(line) for line in self.seams.lines]
+        target = cut_at(target or built(self.target, progress), seams, progress)
         layout = built(self.layout, target).with_edges(method.edges_a_span)
         spacings = [row.layout.spacing for row in self.seams.patches if row.layout.spacing is not None]
         shortest = min(map(min, (layout.spacing, *spacings)))
@@ -229,7 +246,7 @@ class Case:
             )
         if self.rod.left_open:
             progress("preparing", "net for the size of the rods", 0.0)
-        rod = self.rod_on(target, layout, anchor=anchor)
+        rod = self.rod_on(target, layout, anchor=anchor, progress=progress)
         require_likely_sizes(rod, 2 * target.size, shortest)
         self.require_strength(rod, joint)
         return Built(target, layout, rod, joint, method, anchor, self.ends)

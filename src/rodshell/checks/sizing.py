@@ -25,6 +25,7 @@ from rodshell.formfinding.popup import PopUp
 from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, Tube, scaled, size_text
@@ -98,6 +99,7 @@ class Fit:
         *,
         anchor: tuple[float, float] | None = None,
         joint: Joint | None = None,
+        progress: Progress = silent,
     ) -> Self:
         """By the net of a layout on its target.
 
@@ -106,13 +108,14 @@ class Fit:
         layout : of the rods on it.
         anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
         joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
+        progress : called by the net, which is marched when bends are first asked for.
         """
         slender = SLENDER * target.size
         room = ROOM * min(layout.spacing)
 
         @cache  # a net costs more than all that is asked of it
         def bends() -> Bends:
-            found = bends_of(target, layout, anchor)
+            found = bends_of(target, layout, anchor, progress)
             return found if (joint or Ball()).holds_normals else found.rolled()
 
         fit = cls(2 * target.size, slender, 2 * slender, bends)
@@ -289,7 +292,9 @@ def _other_unit(depth: float, width: float) -> str:
     return "check their units"
 
 
-def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
+def bends_of(
+    target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None, progress: Progress = silent
+) -> Bends:
     """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature.
 
     No rod runs across a crease.
@@ -301,7 +306,7 @@ def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | N
     """
     if not isinstance(target, Creased):
         try:
-            return net_bends(chebyshev_net(target, layout, anchor=anchor))
+            return net_bends(chebyshev_net(target, layout, anchor=anchor, progress=progress))
         except NetLimitError:  # it is cut by seams, or another anchor is looked for
             pass
     sharpest = np.atleast_1d(_sharpest_of(target))

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.progress import Progress, silent
 from rodshell.targets.creases import Creases
 from rodshell.targets.field_fitting import OFF, Fit, fit_mesh
 from rodshell.targets.rim import UPRIGHT, Given, Rim, smooth_loop
@@ -72,6 +73,7 @@ class Freeform(Target):
         source: Mapping[str, object] | None = None,
         name: str = "the mesh",
         notes: tuple[str, ...] = (),
+        progress: Progress = silent,
     ) -> "Freeform":
         """Make a target of a mesh; the shell ends at the mesh's open boundary, at curves and at a base plane.
 
@@ -84,6 +86,7 @@ class Freeform(Target):
         source : kind, file and options, as they are written in a case file.
         name : of the mesh, for messages.
         notes : what was changed in the mesh before, in sentences.
+        progress : called at each step of the fit.
 
         Raises
         ------
@@ -94,6 +97,7 @@ class Freeform(Target):
         faces = array("faces", faces, np.intp, None, 3)
         base = None if base is None else number("target base", base, "m")
         curves = tuple(array("a boundary curve", curve, np.float64, None, 3) for curve in curves)
+        progress("preparing", f"mesh of {len(faces)} triangles", 0.0)
         found = sound_mesh(vertices, faces, name)
         made = {"kind": "mesh", "vertices": len(vertices), "faces": len(faces)}
         target = Freeform(
@@ -105,6 +109,9 @@ class Freeform(Target):
                 raise InputError(target.creased)
             return target
         try:
+            target._require_curves(name)
+            target.fit(progress)
+            progress("preparing", "ends of the surface", 0.0)
             target._require_an_end(name)
             target.require_a_good_fit(name)
         except InputError as reason:
@@ -180,8 +187,13 @@ class Freeform(Target):
 
     @cached_property
     def _fitted(self) -> Fit:
+        return self.fit()
+
+    def fit(self, progress: Progress = silent) -> Fit:
+        """Fit its field now, which else is fitted when it is needed first; `progress` is called at each step."""
         self.require_usable()
-        return fit_mesh(self.surface, size=self._extent)
+        self.__dict__["_fitted"] = fitted = fit_mesh(self.surface, size=self._extent, progress=progress)
+        return fitted
 
     @property
     def field(self) -> SmoothField:
@@ -398,7 +410,8 @@ class Freeform(Target):
         """Largest distance of a curve from the surface [m]."""
         return float(np.nan_to_num(np.abs(self.implicit(curve).value), nan=np.inf).max())
 
-    def _require_an_end(self, name: str) -> None:
+    def _require_curves(self, name: str) -> None:
+        """Refuse a surface without an end or with too many, and curves of too few points: known without the field."""
         ends = len(self.surface.loops) + len(self.curves)
         along = sum(map(len, (*self.surface.loops, *self.curves)))
         for count, most, what in ((ends, MOST_ENDS, "closed curves"), (along, MOST_ALONG, "points")):
@@ -419,6 +432,8 @@ class Freeform(Target):
                 f"{name} is closed: say where the shell ends, by a base plane between z = {x[:, 2].min():.4g} and "
                 f"{x[:, 2].max():.4g} m or by a boundary curve"
             )
+
+    def _require_an_end(self, name: str) -> None:
         for curve in self.curves:
             off = self._off(self._over(curve))
             if not off < ASIDE * self._extent:

@@ -13,6 +13,7 @@ from scipy.linalg import solveh_banded
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.progress import Progress, silent
 from rodshell.targets.apart import cause
 from rodshell.targets.curve_files import read_curves
 from rodshell.targets.freeform import Freeform
@@ -335,6 +336,7 @@ def surface_from(
     base: float | None = None,
     boundary: File | None = None,
     placement: Placement = UNMOVED,
+    progress: Progress = silent,
 ) -> Freeform:
     """Make a target of the surface in an OBJ, STL, PLY, OFF, glTF, 3dm or STEP file.
 
@@ -347,6 +349,7 @@ def surface_from(
     boundary : path of an OBJ, DXF or 3dm file with closed curves on the surface, in the same unit, unless a 3dm file
         states its own, and placed with it: the longest bounds the shell, the others are openings.
     placement : scales, turns and moves the surface.
+    progress : called before the file is read, and at each step of the fit.
 
     Raises
     ------
@@ -356,6 +359,7 @@ def surface_from(
     if unit is not None:
         positive("unit", unit, "m")
     _require_placing(name, base, placement)
+    progress("preparing", f"reading {shown(path.name)}", 0.0)
     curves: list[Floats] = []
     notes: tuple[str, ...] = ()
     if path.suffix.lower() in MESH_FILES:
@@ -373,7 +377,7 @@ def surface_from(
     else:
         raise InputError(f"{path} is not a surface file: use one of {', '.join(SURFACE_FILES)}")
     source: dict[str, object] = {"kind": kind, "unit": unit, "object": name}
-    return _placed(path, vertices, faces, curves, unit or 1.0, base, boundary, placement, source, notes)
+    return _placed(path, vertices, faces, curves, unit or 1.0, base, boundary, placement, source, notes, progress)
 
 
 def heights_from(
@@ -384,6 +388,7 @@ def heights_from(
     base: float | None = None,
     boundary: File | None = None,
     placement: Placement = UNMOVED,
+    progress: Progress = silent,
 ) -> Freeform:
     """Make a target of heights on a lattice: a CSV with a row of heights for each y, a CSV of points, or a grey image.
 
@@ -391,7 +396,7 @@ def heights_from(
     ----------
     size : width along x and depth along y [m], centred on the origin; the first row is at the largest y.
     height : of a CSV the length of its unit [m], default 1; of an image the height of white [m], default 1.
-    base, boundary, placement : as in `surface_from`, with the boundary in metres.
+    base, boundary, placement, progress : as in `surface_from`, with the boundary in metres.
 
     Raises
     ------
@@ -406,9 +411,10 @@ def heights_from(
     _require_placing(None, base, placement)
     if path.suffix.lower() not in GRID_FILES:
         raise InputError(f"{path} is not a file of heights: use one of {', '.join(GRID_FILES)}")
+    progress("preparing", f"reading {shown(path.name)}", 0.0)
     vertices, faces, notes = read_heights(path, (width, depth), height)
     source: dict[str, object] = {"kind": "heights", "size": [width, depth], "height": height}
-    return _placed(path, vertices, faces, [], 1.0, base, boundary, placement, source, notes)
+    return _placed(path, vertices, faces, [], 1.0, base, boundary, placement, source, notes, progress)
 
 
 def _require_placing(name: str | None, base: float | None, placement: Placement) -> None:
@@ -429,7 +435,8 @@ def _placed(
     boundary: File | None,
     placement: Placement,
     source: dict[str, object],
-    notes: tuple[str, ...] = (),
+    notes: tuple[str, ...],
+    progress: Progress,
 ) -> Freeform:
     if boundary is not None:
         drawn = file_path("boundary", boundary)
@@ -448,7 +455,9 @@ def _placed(
                 f"{path} is steeper than {STEEP:.0f} degrees on average: does {other} point upwards in it? Then give "
                 f'target.up = "{other}" (--up {other}; in Python Placement(up="{other}")), and otherwise "{usual}"'
             )
-    return Freeform.of(vertices, faces, base=base, curves=placed, source=chosen, name=shown(path.name), notes=notes)
+    return Freeform.of(
+        vertices, faces, base=base, curves=placed, source=chosen, name=shown(path.name), notes=notes, progress=progress
+    )
 
 
 def _stands(vertices: Floats, faces: Ints) -> bool:
