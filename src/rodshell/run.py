@@ -10,7 +10,7 @@ from rodshell.case import Case
 from rodshell.case.case import Built
 from rodshell.case.held import built
 from rodshell.case.rod_ends import RodEnds
-from rodshell.checks.sizing import Fit, require_likely_sizes
+from rodshell.checks.sizing import Fit, doubt_of_unit, require_likely_sizes
 from rodshell.errors import OutOfTimeError
 from rodshell.form import Form, Stages
 from rodshell.formfinding import Bound, Fall, PatchForm, find_stages, pop_up_stages
@@ -115,7 +115,7 @@ class Run:
         ends: RodEnds = case.target.held.value
         fit, stages = Fit.between(ends.lengths, ends.final), None
         rod = case.rod.held.value if case.rod.held else case.rod.build(lambda: fit, strength=case.permanent_strength)
-        require_likely_sizes(rod, fit.width, ends.grid.span)
+        require_likely_sizes(fit.width, min(ends.grid.span, fit.width), rod.section)  # flat, rods may be longer
         if self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, self._table_stages)
         self._announce_rod(rod, fit)
@@ -309,14 +309,16 @@ class Run:
 
     def _announce_sizes(self, found: Built) -> None:
         """Which lengths were left to the target's size: a wrong unit shows here."""
+        unit = getattr(self.asked.target, "unit", None)
         lengths = {
             "spacing": min(found.layout.spacing) if self.asked.layout.spacing == "auto" else None,
             "edge": found.layout.edge if self.asked.layout.edge == "auto" else None,
         }
         said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
         if said and self.announce is not None:
-            name = self.asked.drawings.name or found.target.name
-            self.announce(f"{name}, {length_text(2 * found.target.size)} wide; {said}")
+            name, width = self.asked.drawings.name or found.target.name, 2 * found.target.size
+            doubt = "" if lengths["spacing"] is None else doubt_of_unit(width, self.asked.rod.given_section, unit)
+            self.announce(f"{name}, {length_text(width)} wide{doubt}; {said}")
 
     def _announce_rod(self, rod: Rod, fit: "Fit | None") -> None:
         """A rod of which the case left something open, and what decided its size."""

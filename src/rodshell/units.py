@@ -333,6 +333,18 @@ def length_text(metres: float) -> str:
     return f"{float(f'{1e3 * metres if in_mm else metres:.3g}'):g} {'mm' if in_mm else 'm'}"
 
 
+DRAWN_IN = {"m": 1.0, "mm": 1e-3, "cm": 0.01, "in": 0.0254, "ft": 0.3048}  # units of files [m]
+BUILT = (2.0, 200.0)  # m: widths of shells that people walk under
+
+
+def as_built(width: float, unit: float) -> dict[str, float]:
+    """Units of a file by which a width [m] that was read in `unit` [m] would be that of a building; and that width."""
+    if BUILT[0] <= width <= BUILT[1]:
+        return {}
+    widths = {name: width / unit * length for name, length in DRAWN_IN.items()}
+    return {name: wide for name, wide in widths.items() if BUILT[0] <= wide <= BUILT[1]}
+
+
 PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 
 

@@ -633,11 +633,14 @@ def test_a_table_in_another_unit_than_its_own_is_refused(
     in_mm = [[3e4 * x for x in row] for row in CROSS]  # of 6 m
     table = write_table(Path("rods.csv"), in_mm)
     said = refused(capsys, "popup", table, "--unit", "m")
-    assert "rods.csv is 6e+03 m wide in this unit (6000 x 6000 units): give another unit, for 0.001 to 1000 m" in said
+    assert (
+        "rods.csv is 6e+03 m wide in this unit (6000 x 6000 units): give another unit, such as mm, for 1e-06 to 1000 m"
+        in said
+    )
     in_m = write_table(Path("small.csv"), [[1e-4 * x for x in row] for row in CROSS])
     assert "small.csv is 2e-08 m wide" in refused(capsys, "popup", in_m, "--unit", "mm")
     named = write_table(Path("named.csv"), [[1e7 * x for x in row] for row in CROSS], tuple(f"{c}_mm" for c in COLUMNS))
-    assert "check its columns, which are in mm, for 0.001 to 1000 m" in refused(capsys, "popup", named)
+    assert "check its columns, which are in mm, for 1e-06 to 1000 m" in refused(capsys, "popup", named)
     assert finder.calls == []
 
 

@@ -244,10 +244,11 @@ class Case:
             raise InputError(
                 f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
             )
+        section = self.rod.given_section
+        require_likely_sizes(2 * target.size, shortest, section, getattr(self.target, "unit", None))
         if self.rod.left_open:
             progress("preparing", "net for the size of the rods", 0.0)
         rod = self.rod_on(target, layout, anchor=anchor, progress=progress)
-        require_likely_sizes(rod, 2 * target.size, shortest)
         self.require_strength(rod, joint)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
 

@@ -133,10 +133,10 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
         names.append(row.get("id", "").strip())
     if not numbers:
         raise InputError(f"{path} has no rods: give one row for each rod under the header")
-    from rodshell.targets.mesh_files import require_size  # here, as most cases have no such table
+    from rodshell.targets.mesh_files import ANOTHER_UNIT, require_size  # here, as most cases have no such table
 
     values = np.array(numbers)
-    instead = "give another unit" if columns == COLUMNS else "check its columns, which are in mm"
+    instead = ANOTHER_UNIT if columns == COLUMNS else "check its columns, which are in mm"
     for ends in (values[:, :4].reshape(-1, 2), values[:, 4:].reshape(-1, 3)):
         require_size(path, np.ptp(ends, axis=0), scale, instead=instead)
     values *= scale

@@ -65,6 +65,13 @@ class RodTable(Holding):
         material = self.material is None and section.kind != "given"
         return (*(["material"] if material else []), *(["section"] if sized else []))
 
+    @property
+    def given_section(self) -> Section | GivenSection | None:
+        """The section; None where its size is left to the target."""
+        if self.held is not None:
+            return self.held.value.section  # type: ignore[no-any-return]
+        return None if "section" in self.left_open else self._section
+
     def build(
         self, fit: "Callable[[], Fit] | None" = None, *, strength: "Callable[[Material], float | None] | None" = None
     ) -> Rod:

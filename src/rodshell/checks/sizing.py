@@ -31,7 +31,7 @@ from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, Tube, scaled, size_text
 from rodshell.targets import Target
 from rodshell.targets.creased import Creased
-from rodshell.units import length_text, rounded_down
+from rodshell.units import BUILT, as_built, length_text, rounded_down
 from rodshell.untrusted import limit, raised
 
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
@@ -42,8 +42,10 @@ SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is 
 AIM = 3 / 4
 ROOM = 1 / 6  # depth of a rod over the spacing: joints need room
 PLAN = 41  # points each way at which a target without a net is sampled
-MOST_SLENDER = 100_000  # width of a shell over the depth of its rods; known ones have 50 to 5000
+KNOWN = 50  # width of a shell over the depth of its rods, at least
+MOST_SLENDER = 100_000  # the same, at most; known ones have up to 5000
 USUAL = (20, 5000)  # the same of the sizes that are proposed
+SPACED = (5, 500)  # width of a shell over the spacing of its rods, of those
 UNITS = (1e-3, 0.01, 0.0254)  # by which lengths are wrong that were given as metres
 THICKEST, WIDEST = 0.5, 1e3  # m: a section and a shell that are proposed
 
@@ -253,43 +255,84 @@ class Fit:
         return f"{said}the next step would be wider than {self.thickest_of}, {length_text(self.thickest)}"
 
 
-def require_likely_sizes(rod: Rod, width: float, spacing: float) -> None:
-    """Refuse sizes of which one was given in another unit than was meant.
+def require_likely_sizes(
+    width: float, spacing: float, section: Section | GivenSection | None = None, unit: float | None = None
+) -> None:
+    """Refuse sizes of which one was given in another unit than was meant. Only their ratios count.
 
     Parameters
     ----------
-    rod : with a section whose size is known; others are not judged.
     width : of the shell [m].
     spacing : the smallest between rods [m].
+    section : of the rods, if it is known; one without a size is not judged.
+    unit : that the target's file was read in [m], if it was.
 
     Raises
     ------
-    InputError : the rods are as thick as the spacing or the shell, or far thinner than those of any shell.
+    InputError : the rods are as thick as the spacing or the shell, or far thinner than those of any shell; the spacing
+        is wider than the shell.
     """
-    section = rod.section
-    depth = 2 * max(section.fibre_distances or (0.0,)) if isinstance(section, GivenSection) else section.depth
-    allowed = ""
+    depth = _depth_of(section)
+    shell, allowed = f"the shell of {length_text(width)}", ""
     if 0 < depth * limit(MOST_SLENDER) < width:
-        what = f"thin for the shell of {length_text(width)}, which is more than {limit(MOST_SLENDER):.0f} times as wide"
+        what = f"thin for {shell}, which is more than {limit(MOST_SLENDER):.0f} times as wide"
         allowed = f", {raised(MOST_SLENDER, width / depth)}"
     elif depth >= width:
-        what = f"as wide as the shell of {length_text(width)}"
+        what = f"as wide as {shell}"
+    elif spacing > width:
+        meant = _other_unit("spacing", spacing, width, unit, SPACED)
+        raise InputError(f"the spacing of {length_text(spacing)} is wider than {shell}: give a smaller one, or {meant}")
     elif depth >= spacing:
         what = f"as thick as the spacing of the rods, {length_text(spacing)}"
     else:
         return
-    raise InputError(f"the section of {length_text(depth)} is {what}: {_other_unit(depth, width)}{allowed}")
+    meant = _other_unit("section", depth, width, unit, USUAL)
+    raise InputError(f"the section of {length_text(depth)} is {what}: {meant}{allowed}")
 
 
-def _other_unit(depth: float, width: float) -> str:
-    """What to check, and sizes of section and shell [m] in another unit that would suit each other."""
-    for unit in UNITS:
-        factor = unit if width < USUAL[0] * depth else 1 / unit
-        pairs = ("a section", depth * factor, THICKEST), ("a shell", width / factor, WIDEST)
-        meant = [f"{what} of {length_text(length)}" for what, length, most in pairs if length <= most]
-        if USUAL[0] <= width / (depth * factor) <= USUAL[1] and meant:
-            return f"check its unit ({' or '.join(meant)} would be usual)"
-    return "check their units"
+def doubt_of_unit(width: float, section: Section | GivenSection | None, unit: float | None) -> str:
+    """What is said of a shell whose spacing follows its size, if no building is as wide, and no rod is like it.
+
+    Parameters
+    ----------
+    width : of the shell [m].
+    section : of the rods, if it is given.
+    unit : that the target's file was read in [m], if it was.
+    """
+    depth = _depth_of(section)
+    if unit is None or depth * KNOWN < width < depth * limit(MOST_SLENDER):
+        return ""
+    meant = " or ".join(f"{length_text(wide)} in {name}" for name, wide in as_built(width, unit).items())
+    return meant and f" (if that is too {'small' if width < BUILT[0] else 'large'}, check its unit: {meant})"
+
+
+def _depth_of(section: Section | GivenSection | None) -> float:
+    """Its larger dimension [m]; 0 where it has none."""
+    if isinstance(section, GivenSection):
+        return 2 * max(section.fibre_distances or (0.0,))
+    return 0.0 if section is None else section.depth
+
+
+def _other_unit(name: str, size: float, width: float, unit: float | None, usual: tuple[float, float]) -> str:
+    """What to check, and sizes in another unit that would suit each other.
+
+    Parameters
+    ----------
+    name, size : what the shell is compared with [m].
+    width : of the shell [m].
+    unit : that its file was read in [m], or None.
+    usual : ratios of width and size.
+    """
+    meant = list[str]()
+    for other in UNITS:
+        factor = other if width < usual[0] * size else 1 / other
+        if not meant and usual[0] <= width / (size * factor) <= usual[1]:
+            meant += [f"a {name} of {length_text(size * factor)}"] * (size * factor <= THICKEST)
+            meant += [f"a shell of {length_text(width / factor)}"] * (unit is None and width / factor <= WIDEST)
+    for drawn_in, wide in ({} if unit is None else as_built(width, unit)).items():
+        if usual[0] <= wide / size <= usual[1]:
+            meant.append(f"a shell of {length_text(wide)}, drawn in {drawn_in},")
+    return f"check its unit ({' or '.join(meant)} would be usual)" if meant else "check their units"
 
 
 def bends_of(

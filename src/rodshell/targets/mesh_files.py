@@ -17,7 +17,7 @@ from rodshell.targets.gltf import gltf_counts, gltf_parts
 from rodshell.targets.polygon_files import obj_content, off_content, ply_content
 from rodshell.targets.polygons import Polygons
 from rodshell.targets.trianglemesh import MOST_FACES, require_indices
-from rodshell.units import shown
+from rodshell.units import as_built, shown
 from rodshell.untrusted import limit, raised, read_bytes
 
 Content = TypeVar("Content")
@@ -26,7 +26,8 @@ Notes = tuple[str, ...]
 MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
 IN_METRES = (".glb", ".gltf")  # the standard of these formats fixes the unit
 LARGEST_FILE = 300e6  # bytes
-SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a gridshell can have
+ANOTHER_UNIT = "give another unit"
+SMALLEST, LARGEST = 1e-6, 1e3  # m: extents that a gridshell can have, from micro-structures to roofs
 LOOSE = 0.03  # of the vertices of a file that belong to no face: more are reported
 HEAD = 4000  # bytes that hold the header
 MOST_HEIGHTS = MOST_FACES // 2
@@ -99,7 +100,7 @@ def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> 
 
     Raises
     ------
-    InputError : no unit, or a surface smaller than 1 mm or larger than 1 km.
+    InputError : no unit, or a surface smaller than 1 um or larger than 1 km.
     """
     used = vertices[np.unique(faces)] if len(faces) else vertices
     extent = np.ptp(used, axis=0) if len(used) and np.isfinite(used).all() else np.full(3, np.nan)
@@ -114,7 +115,7 @@ def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> 
     return vertices * unit
 
 
-def require_size(path: Path, extent: Floats, unit: float, *, instead: str = "give another unit") -> None:
+def require_size(path: Path, extent: Floats, unit: float, *, instead: str = ANOTHER_UNIT) -> None:
     """Refuse a size that no gridshell has; one that is not finite is left to other checks.
 
     Parameters
@@ -125,10 +126,12 @@ def require_size(path: Path, extent: Floats, unit: float, *, instead: str = "giv
 
     Raises
     ------
-    InputError : smaller than 1 mm or larger than 1 km.
+    InputError : smaller than 1 um or larger than 1 km.
     """
     largest = float(extent.max()) * unit
     if np.isfinite(largest) and largest > 0 and not SMALLEST <= largest <= LARGEST:
+        if instead == ANOTHER_UNIT and (likely := as_built(largest, unit)):
+            instead += f", such as {next(iter(likely))}"
         raise InputError(
             f"{path} is {largest:.3g} m wide in this unit ({_units(extent)}): {instead}, for {SMALLEST:g} to "
             f"{LARGEST:g} m"
