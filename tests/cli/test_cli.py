@@ -41,7 +41,10 @@ CROSS = [
 class FakeArchive:
     def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
         verdict = {"level": level, "reasons": ["the rods touch"]}
-        self.results = Results.model_validate({"format": "rodshell-result", "status": status, "verdict": verdict})
+        popped = {"pop_up": {"pinned": {"status": status}}} if level == "unknown" else {}
+        self.results = Results.model_validate(
+            {"format": "rodshell-result", "status": status, "verdict": verdict, **popped}
+        )
         self.case_toml = case_toml
 
     def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
@@ -283,14 +286,15 @@ def test_a_file_that_comes_into_the_way_while_the_job_runs_sends_the_result_else
 @pytest.mark.parametrize(
     ("status", "level", "code"),
     [("converged", "good", 0), ("converged", "check", 0), ("converged", "unbuildable", 4), ("stalled", "check", 3),
-     ("stalled", "unbuildable", 3)],
+     ("stalled", "unbuildable", 3), ("converged", "unknown", 3)],
 )  # fmt: skip
 def test_the_exit_code_is_the_verdict_s_and_not_converged_wins(
     finder: FakeFinder, capsys: pytest.CaptureFixture[str], status: str, level: str, code: int
 ) -> None:
     finder.status, finder.level = status, level
     assert main(["form", "hemisphere", "--quiet"]) == code
-    said = {0: "", 3: "rodshell: NOT CONVERGED: stalled", 4: "rodshell: NOT BUILDABLE: the rods touch"}[code]
+    not_known = "NOT CONVERGED: stalled" if status == "stalled" else "NOT KNOWN: the rods touch"
+    said = {0: "", 3: f"rodshell: {not_known}", 4: "rodshell: NOT BUILDABLE: the rods touch"}[code]
     err = capsys.readouterr().err
     assert err.startswith(said)
     assert (err == "") == (code == 0)

@@ -491,7 +491,31 @@ def test_a_shell_that_falls_under_its_own_weight_with_every_support_cannot_be_bu
     assert verdict(changed(falls[0])).level == "check"  # clamped it stands
     assert verdict(changed(falls[0], ("bending.clamped.utilisation", 1.2))).level == "unbuildable"
     assert verdict(changed(falls[0], ("pop_up.clamped.status", "stalled"))).level == "unknown"
-    assert verdict(changed(*falls, ("self_weight.clamped.limit", "not followed"))).level == "check"  # it may stand
+
+
+@pytest.mark.parametrize(("others", "why"), [
+    ([(WEIGHTS[1], 0.4), ("self_weight.clamped.limit", "not followed")], "it could be followed only up to 40 % of it"),
+    ([("self_weight.clamped", MISSING)], "this was not checked"),
+    ([("pop_up.clamped.status", "stalled"), ("status", "stalled")], "the pop-up did not converge"),
+])  # fmt: skip
+def test_where_one_support_lets_it_fall_and_the_other_is_not_known_none_is_shown_to_stand(
+    others: list[Any], why: str
+) -> None:
+    """It might stand on the other: neither unbuildable, nor to be checked."""
+    found = verdict(changed((WEIGHTS[0], 0.024), *others))
+    assert found.level == "unknown"
+    (reason,) = (each for each in found.findings if each.code == "none_stands")
+    said = found.reasons[found.findings.index(reason)]
+    assert said == (
+        "no support that was asked for is shown to hold the shell up: with pinned ends it falls under its own weight, "
+        f"and with clamped ends this is not known, as {why}; take stiffer rods, or brace it, and check it again"
+    )
+    assert found.reasons.index(said) == (1 if "stalled" in str(others) else 0)
+    stands = [(key, 2.51 if key == WEIGHTS[1] else value) for key, value in others]
+    if why.startswith("it could"):  # the other way round, and where it is known to stand
+        assert verdict(changed((WEIGHTS[0], 0.024), *stands)).level == "check"
+        swapped = [(WEIGHTS[1], 0.024), (WEIGHTS[0], 0.4), ("self_weight.pinned.limit", "not followed")]
+        assert "with clamped ends it falls under its own weight, and with pinned" in verdict(changed(*swapped)).headline
 
 
 def test_without_imperfections_the_factors_are_said_to_be_those_of_the_perfect_shell() -> None:

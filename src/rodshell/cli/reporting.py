@@ -254,6 +254,7 @@ def deliver(
     quiet: bool,
 ) -> int:
     """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
+    from rodshell.results.results import LEVELS
     from rodshell.results.wording import CASE, FORM, FORM_AGAIN
 
     Interruption.check()
@@ -274,9 +275,11 @@ def deliver(
         say(f"{said}; partial results are in {folder}")
         return NOT_CONVERGED
     verdict = result.result().get("verdict")
-    if verdict and verdict["level"] == "unbuildable":
-        say(f"NOT BUILDABLE: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
-        return UNBUILDABLE
+    codes = {"unbuildable": UNBUILDABLE} | ({"unknown": NOT_CONVERGED} if result.result().get("pop_up") else {})
+    if verdict and (level := verdict["level"]) in codes:
+        named = LEVELS[level].upper()
+        say(f"{named}: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
+        return codes[level]
     return FOUND
 
 

@@ -27,6 +27,7 @@ CODES = {
     "no_room": "rods pass each other so near that there is hardly any room for joints",
     "no_shear_strength": "torsion counts, and the shear strength of timber or a fibre composite was not given",
     "no_strength": "no strength was given",
+    "none_stands": "with some supports the shell falls under its own weight, and with the others that is not known",
     "not_checked": "something was not checked",
     "not_computed": "a computation did not converge or is not complete",
     "not_followed": "the shell could be followed only up to a part of the loads",
@@ -61,13 +62,14 @@ FAULTS = frozenset({
     "too_thick", "unstable",
 })  # fmt: skip
 """Of these a shell cannot be built; another on other supports may be."""
+NOT_KNOWN = frozenset({"none_stands", "not_computed"})
 
 
 def level_of(code: str) -> Level:
     """How grave a finding is by itself."""
     if code in GOOD:
         return "good"
-    return "unbuildable" if code in FAULTS else "unknown" if code == "not_computed" else "check"
+    return "unbuildable" if code in FAULTS else "unknown" if code in NOT_KNOWN else "check"
 
 
 class Finding(Record):

@@ -66,6 +66,10 @@ SENTENCES = {
         "the design strength of the rods is not known, so that whether they break under the loads was not judged: "
         "give strength.permanent and strength.short"
     ),
+    "none_stands": (
+        "no support that was asked for is shown to hold the shell up: with {falls} ends it falls under its own "
+        "weight{bracing}, and {unknown}; take stiffer rods, or brace it, and check it again"
+    ),
     "not_checked: clamped": "whether the clamped shape is reached from the pinned one by turning the ends is not known",
     "not_checked: contact": (
         "whether rods touch and are thin enough for their curvature was not checked; a given section needs "

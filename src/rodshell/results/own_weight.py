@@ -48,6 +48,37 @@ def falling(results: Results) -> set[Ends]:
     return {end for end in _below(found, 1.0) if found[end].limit not in NOT_KNOWN}
 
 
+def none_stands(results: Results, usable: Sequence[Ends], lost: Sequence[Ends]) -> list[Said]:
+    """That no end condition is shown to stand, where the shell falls with some and nothing is known of the others.
+
+    Parameters
+    ----------
+    results : with the checks of the self-weight.
+    usable : with which there is a shell without another fault.
+    lost : with which the pop-up did not converge.
+    """
+    fallen, found = falling(results), _carried(results, usable)
+    falls, why = [end for end in usable if end in fallen], dict.fromkeys(lost, "the pop-up did not converge")
+    for end in usable:
+        weighed = found.get(end) or SelfWeight()
+        if end in fallen:
+            continue
+        if weighed.limit == "not followed" and (weighed.load_factor or 0.0) < 1:
+            why[end] = f"it could be followed only up to {part_of_weight(weighed.load_factor or 0.0)} of it"
+        elif weighed.limit in NOT_KNOWN[1:]:
+            why[end] = "this was not checked"
+        else:
+            return []
+    if not falls or not why:
+        return []
+    unknown = " and ".join(f"with {end} ends this is not known, as {reason}" for end, reason in why.items())
+    return [said("none_stands", falls=" and ".join(falls), bracing=_bracing(results), unknown=unknown)]
+
+
+def _bracing(results: Results) -> str:
+    return " with its bracing" * is_braced(results)
+
+
 def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], bool]:
     """What is said of shells that do not carry their own weight with the reserve that is asked for, or are not known
     to; and whether one of them stands.
@@ -59,7 +90,7 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], boo
     found, findings = _carried(results, ends), list[Said]()
     parts = _below(found, 1.0)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
-    bracing = " with its bracing" * is_braced(results)
+    bracing = _bracing(results)
     if bracing and (bare := light(results, ends)):
         unknown_above = any(results.self_weight[end].limit == "not followed" for end in bare)
         carries = "is known to carry only" if unknown_above else "carries only"

@@ -13,7 +13,7 @@ from rodshell.figures.form import Agreement, PopUp
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends
 from rodshell.figures.sentences import ANOTHER_WAY, SENTENCES
-from rodshell.results.own_weight import falling, is_braced, reserve, weight_findings
+from rodshell.results.own_weight import falling, is_braced, none_stands, reserve, weight_findings
 from rodshell.results.results import Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import (
@@ -59,8 +59,9 @@ def verdict(results: Results) -> Verdict:
     An end condition can be used if its shell converged, is stable and carries its own weight, its rods do not touch,
     hold, and are thin enough for their bends. Without one that can be used, or far off the target, the result is
     unbuildable; unknown if one that might be was not computed: a computation that does not converge says nothing about
-    the shell. The deployment that is computed is one of several ways to erect the shell: what breaks on it has to be
-    checked, but where rods of the flat grid touch, no way begins.
+    the shell, nor of its own weight that could not be followed, if the shell falls with the other ends. The deployment
+    that is computed is one of several ways to erect the shell: what breaks on it has to be checked, but where rods of
+    the flat grid touch, no way begins.
 
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
@@ -95,11 +96,13 @@ def verdict(results: Results) -> Verdict:
         *gravest, *weight, *sinks, *_loads(results, usable or there), *air_findings(results),
         *_open_points(results, usable), *(word if isinstance(word, Said) else Said(word) for word in results.warnings),
     ]  # fmt: skip
-    standing = set(usable) - falling(results)
+    standing, in_doubt = set(usable) - falling(results), none_stands(results, usable, lost)
     if lost and not standing and not deployment:
-        return _verdict("unknown", [*failed, *to_check])
+        return _verdict("unknown", [*failed, *in_doubt, *to_check])
     if not standing or deployment or off > FAR_OFF:
         return _verdict("unbuildable", to_check)
+    if in_doubt:
+        return _verdict("unknown", [*in_doubt, *to_check])
     if to_check:
         return _verdict("check", [*to_check, *_perfect(results)])
     return _verdict("good", [*_merits(results, usable), *_perfect(results)])
