@@ -213,24 +213,29 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, t
     """
     rod, kind = results.rod, (results.joint.kind if results.joint else None) or "ball"
     factors = {ends: factor for ends, factor in factors.items() if factor > 0}
+    chosen = rod is not None and "section" in (rod.chosen or {})
+    why = "; its section was chosen without regard to its weight" * chosen
     if not factors or rod is None or kind not in WITHOUT_STIFFNESS or is_braced(results):
-        return "", ()
+        return why, ()
+    sold = () if results.refinement else sizes_sold(rod)  # a refined rod's section varies along it
     enough = ENOUGH * reserve(results)
     for ends, factor in sorted(factors.items(), key=lambda pair: pair[1]):
-        for section in () if results.refinement else sizes_sold(rod):  # a refined rod's section varies along it
+        for section in sold:
             gain, sharper = _gain(rod, section), _sharper(rod, section)
             if factor * gain >= enough and not _too_much(results, ends, sharper):
                 words = (
-                    f"; made of {size_text(section)}, it would carry about {rounded_down(factor * gain)} times its own "
-                    f"weight or more with {ends} ends{_share(results, ends, sharper)}"
+                    f"{why}; made of {size_text(section)}, it would carry about {rounded_down(factor * gain)} times "
+                    f"its own weight or more with {ends} ends{_share(results, ends, sharper)}"
                 )
                 offers = _again(results, section)
                 return words + "".join(f" ({offer})" for offer in offers), offers
+    if chosen and sold:
+        why += ", and no size that is sold is likely to carry it and to withstand its bends"
     ends, factor = max(factors.items(), key=lambda pair: pair[1])
     thicker = sqrt(enough / factor)
     made = (
-        f"; made of rods about {rounded(thicker, 2)} times as thick, it would carry {rounded(reserve(results))} times "
-        f"its own weight with {ends} ends, by an estimate"
+        f"{why}; made of rods about {rounded(thicker, 2)} times as thick, it would carry {rounded(reserve(results))} "
+        f"times its own weight with {ends} ends, by an estimate"
     )
     if too_much := _too_much(results, ends, thicker):
         words = "support it, or take another material; rodshell check finds what bracing adds"
