@@ -240,6 +240,8 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, time_limit="60"), 'time_limit must be a number in s, not "60"'),
         (lambda: rs.save(form().unchecked(), "x", [], more="x"), 'more must be texts by the names .*, not "x"'),
         (lambda: rs.save(form().unchecked(), "x", [], force="no"), 'force must be True or False, not "no"'),
+        (lambda: rs.surface_from("x.obj", unit=1.0, progress=3), "progress must be a function of stage, .*, not 3"),
+        (lambda: rs.heights_from("x.csv", size=(1, 1), progress="x"), 'progress must be a function .*, not "x"'),
         (lambda: rs.search(LAYOUT, TARGET, ROD), "target must be a rodshell Target, not a GridLayout"),
         (lambda: rs.search(TARGET, LAYOUT, "rod"), 'rod must be a rodshell Rod, not "rod"'),
         (lambda: rs.search(TARGET, LAYOUT, ROD, anchors=(0.0, 0.0)), "each of the anchors must be two finite numbers"),

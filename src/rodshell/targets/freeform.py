@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.targets.creases import Creases
 from rodshell.targets.field_fitting import OFF, Fit, fit_mesh
 from rodshell.targets.rim import UPRIGHT, Given, Rim, smooth_loop
@@ -93,6 +93,7 @@ class Freeform(Target):
         InputError : an argument is of the wrong kind; the mesh is not a smooth surface; or it is closed, and neither a
             base nor a curve says where the shell ends.
         """
+        require_progress(progress)
         vertices = array("vertices", vertices, np.float64, None, 3)
         faces = array("faces", faces, np.intp, None, 3)
         base = None if base is None else number("target base", base, "m")

@@ -13,7 +13,7 @@ from scipy.linalg import solveh_banded
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.progress import Progress, silent
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.targets.apart import cause
 from rodshell.targets.curve_files import read_curves
 from rodshell.targets.freeform import Freeform
@@ -359,6 +359,7 @@ def surface_from(
     if unit is not None:
         positive("unit", unit, "m")
     _require_placing(name, base, placement)
+    require_progress(progress)
     progress("preparing", f"reading {shown(path.name)}", 0.0)
     curves: list[Floats] = []
     notes: tuple[str, ...] = ()
@@ -411,6 +412,7 @@ def heights_from(
     _require_placing(None, base, placement)
     if path.suffix.lower() not in GRID_FILES:
         raise InputError(f"{path} is not a file of heights: use one of {', '.join(GRID_FILES)}")
+    require_progress(progress)
     progress("preparing", f"reading {shown(path.name)}", 0.0)
     vertices, faces, notes = read_heights(path, (width, depth), height)
     source: dict[str, object] = {"kind": "heights", "size": [width, depth], "height": height}
