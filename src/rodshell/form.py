@@ -23,7 +23,7 @@ from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
-from rodshell.layout import GridLayout
+from rodshell.layout import Layout
 from rodshell.layout.cells import Pattern
 from rodshell.loads.check import (
     check_shells,  # most forms have no loads
@@ -107,7 +107,7 @@ class Form:
         return self.stages.target
 
     @property
-    def layout(self) -> GridLayout:
+    def layout(self) -> Layout:
         """The flat grid asked for."""
         return self.stages.layout
 

@@ -23,8 +23,9 @@ from rodshell.checks.bending import VON_MISES, bending_of, largest_stress
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.popup import PopUp
 from rodshell.joints import Ball, Joint
-from rodshell.layout import GridLayout
+from rodshell.layout import Layout, SurfaceLattice
 from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.nets.surface_lattice import surface_net
 from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, Tube, scaled, size_text
@@ -94,7 +95,7 @@ class Fit:
     def on(
         cls,
         target: Target,
-        layout: GridLayout,
+        layout: Layout,
         *,
         anchor: tuple[float, float] | None = None,
         joint: Joint | None = None,
@@ -108,7 +109,7 @@ class Fit:
         joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
         """
         slender = SLENDER * target.size
-        room = ROOM * min(layout.spacing)
+        room = ROOM * layout.least_spacing
 
         @cache  # a net costs more than all that is asked of it
         def bends() -> Bends:
@@ -289,7 +290,7 @@ def _other_unit(depth: float, width: float) -> str:
     return "check their units"
 
 
-def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
+def bends_of(target: Target, layout: Layout, anchor: tuple[float, float] | None = None) -> Bends:
     """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature.
 
     No rod runs across a crease.
@@ -299,6 +300,8 @@ def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | N
     layout : of the rods on it.
     anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
     """
+    if isinstance(layout, SurfaceLattice):
+        return Bends(*surface_net(target, layout, anchor=anchor).curvatures)
     if not isinstance(target, Creased):
         try:
             return net_bends(chebyshev_net(target, layout, anchor=anchor))

@@ -17,8 +17,8 @@ from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import StrongBending, joint_tangents
 from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
-from rodshell.layout import FlatRod, GridLayout, GridMesh
-from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.layout import FlatRod, GridMesh, Layout
+from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.nets import ChebyshevNet
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status
@@ -188,7 +188,7 @@ class Draped:
 
     method: Method
     target: Target
-    layout: GridLayout
+    layout: Layout
     rod: Rod
     anchor: tuple[float, float] | None
     eccentricity: float
