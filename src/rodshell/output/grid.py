@@ -1,7 +1,7 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -23,6 +23,7 @@ CAPTIONS = {
 }
 STAGE = "stage_"
 FEWEST = 3  # ends of an outline
+STRAIGHT = 1e-6  # of a rod's length, which it leaves its chord by: it is straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +33,12 @@ class GridRod:
     Parameters
     ----------
     record : what the result knows of it.
-    flat : (2, 2) x, y of its two ends in the flat state [m].
+    course : (k, 2) x, y of points along it in the flat state [m]: its two ends, or more where it bends there.
     nodes : (k,) its nodes in the states, from start to end; empty if the states do not hold them.
     """
 
     record: Rod
-    flat: Floats
+    course: Floats
     nodes: Ints
 
     @property
@@ -77,10 +78,27 @@ class GridRod:
         """Distance from the cut end of the start [m] of what lies at the distance `at` from the start."""
         return at + self.allowance
 
+    @property
+    def flat(self) -> Floats:
+        """(2, 2) x, y of its two ends in the flat state [m]."""
+        return self.course[[0, -1]]
+
+    @cached_property
+    def stations(self) -> Floats:
+        """(k,) distances of the points of its course from the start [m]."""
+        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.course, axis=0), axis=1)))
+
     def point(self, at: float) -> Floats:
-        """(2,) x, y [m] of the flat point at the distance `at` from the start."""
-        along = self.flat[1] - self.flat[0]
-        return np.asarray(self.flat[0] + at / np.linalg.norm(along) * along)
+        """(2,) x, y [m] of the flat point at the distance `at` from the start, which may lie beyond its ends."""
+        k = int(np.clip(np.searchsorted(self.stations, at) - 1, 0, len(self.stations) - 2))
+        (first, second), start = self.course[k : k + 2], self.stations[k]
+        return np.asarray(first + (at - start) / (self.stations[k + 1] - start) * (second - first))
+
+    @property
+    def as_cut(self) -> Floats:
+        """(k, 2) its course with its allowances at both ends [m]."""
+        ends = self.point(-self.allowance), self.point(self.length + self.allowance)
+        return np.vstack([ends[0], self.course[1:-1], ends[1]])
 
 
 @dataclass(frozen=True)
@@ -149,7 +167,8 @@ def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
     nodes = dict[str, list[int]]()
     if flat is None:
         return nodes
-    stations = [np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[:1]], axis=1) for rod in rods]
+    steps = [np.linalg.norm(np.diff(flat[rod.nodes], axis=0), axis=1) for rod in rods]
+    stations = [np.append(0.0, np.cumsum(step)) for step in steps]
     for joint in joints_of(rods):
         if all(len(rods[k].nodes) for k in joint.rods):
             pairs = zip(joint.rods, joint.at, strict=True)
@@ -171,14 +190,17 @@ def _nodes(archive: Archive) -> list[Ints]:
 
 def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
     if rod.family == "u" and rod.offset is not None:
-        ends = np.array([[rod.start, rod.offset], [rod.end, rod.offset]])
+        course = np.array([[rod.start, rod.offset], [rod.end, rod.offset]])
     elif rod.family == "v" and rod.offset is not None:
-        ends = np.array([[rod.offset, rod.start], [rod.offset, rod.end]])
+        course = np.array([[rod.offset, rod.start], [rod.offset, rod.end]])
     elif flat is not None and len(nodes):
-        ends = np.asarray(flat[nodes[[0, -1]], :2], dtype=np.float64)
+        course = np.asarray(flat[nodes, :2], dtype=np.float64)
+        along, off = course[-1] - course[0], course - course[0]
+        if np.abs(off[:, 0] * along[1] - off[:, 1] * along[0]).max() < STRAIGHT * float(along @ along):
+            course = course[[0, -1]]
     else:
-        ends = np.array([[rod.start, 0.0], [rod.end, 0.0]])
-    return GridRod(rod, ends, nodes)
+        course = np.array([[rod.start, 0.0], [rod.end, 0.0]])
+    return GridRod(rod, course, nodes)
 
 
 @dataclass(frozen=True, eq=False)
