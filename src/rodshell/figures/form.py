@@ -58,6 +58,15 @@ class Layout(Record):
     crossing: Number = key("angle between both families on the target, at the anchor", "rad")
 
 
+class FlatState(Record):
+    """The rods of a geodesic or asymptotic lattice laid out in the plane, where they bend as little as they can."""
+
+    lies_flat: Flag | None = key("whether the rods withstand that; else the shell is assembled in place")
+    in_plane_strain: Number = key("largest bending strain of the rods within the plane")
+    limit: Number = key("bending strain that the rods withstand during erection, or up to which they are thin rods")
+    negative_modes: Whole | None = key("directions in which that state is unstable; 0: it is stable")
+
+
 class Section(Record):
     """A rod's section: the parameters of the case file's [rod.section]."""
 

@@ -5,14 +5,14 @@ all arc lengths. There laths that lie flat bend about their strong axes; the str
 assembled flat, or only in place.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import rod_breadth
-from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
+from rodshell.formfinding.methods import Bound, Draped, DrapeFigures, FlatState
 from rodshell.geometry.frames import unit
 from rodshell.joints import Joint
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
@@ -27,26 +27,11 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status, find_stable
 from rodshell.solve.problem import Problem, Supports
 from rodshell.targets import Target
+from rodshell.units import shown
 
 MOST_ITERATIONS = 200  # of the flat state: from the plan of a steep shell it takes some hundred
 PENALTY = 8e4  # stiffness of the edges against that of bending over the size, as of a bound drape
 LETTERS = "UVW"  # of the families
-
-
-@dataclass(frozen=True, eq=False)
-class FlatState:
-    """Where the rods lie in the plane.
-
-    Parameters
-    ----------
-    positions : (n, 2) of the mesh's nodes [m].
-    strain : the largest of a rod's fibres that bend in the plane [-].
-    negative_modes : of that state; 0: it is stable.
-    """
-
-    positions: Floats
-    strain: float
-    report: SolveReport
 
 
 def lay(
@@ -91,8 +76,19 @@ def lay(
     report = SolveReport(Status.CONVERGED, 0, 0, 0, 0.0, 0.0, 0.0, 0)
     return Draped(
         method=Bound(), target=target, layout=lattice, rod=rod, anchor=anchor, eccentricity=0.0, mesh=mesh,
-        positions=positions, rods=mesh.grid.rods, levels=(report,), figures=figures, warnings=target.warnings,
+        positions=positions, rods=_built(mesh.grid.rods, lattice), levels=(report,), figures=figures, flat_state=flat,
+        warnings=target.warnings,
     )  # fmt: skip
+
+
+def _built(rods: tuple[FlatRod, ...], lattice: Geodesic | Asymptotic) -> tuple[FlatRod, ...]:
+    """The rods but those that the lattice leaves out."""
+    if unknown := set(lattice.left_out) - {rod.name for rod in rods}:
+        raise InputError(
+            f"layout left_out has {shown(min(unknown))}, which is not the name of a rod on the target: these are "
+            f"{rods[0].name} to {rods[-1].name}"
+        )
+    return tuple(rod for rod in rods if rod.name not in lattice.left_out)
 
 
 def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:

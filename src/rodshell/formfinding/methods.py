@@ -170,6 +170,22 @@ class DrapeFigures:
 
 
 @dataclass(frozen=True, eq=False)
+class FlatState:
+    """Rods along curves of a target, laid out in the plane such that they bend as little as they can.
+
+    Parameters
+    ----------
+    positions : (n, 2) of the mesh's nodes [m].
+    strain : the largest of a rod's fibres that bend in the plane [-].
+    report : of the solve; without negative modes that state is stable.
+    """
+
+    positions: Floats
+    strain: float
+    report: SolveReport
+
+
+@dataclass(frozen=True, eq=False)
 class Draped:
     """A flat grid lying on a target, not yet trimmed.
 
@@ -184,6 +200,7 @@ class Draped:
     figures : how well the grid lies on the target.
     net : the net that the drape started from; None where it started from the flat grid.
     rest : how the motion ended (`Fall`); else None.
+    flat_state : of rods along curves of the target, which do not form a straight lattice in the plane; else None.
     """
 
     method: Method
@@ -199,6 +216,7 @@ class Draped:
     figures: DrapeFigures
     net: ChebyshevNet | None = None
     rest: "Rest | None" = None
+    flat_state: FlatState | None = None
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:

@@ -13,7 +13,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
-from rodshell.formfinding.methods import Bound, Draped, Method
+from rodshell.formfinding.methods import Bound, Draped, FlatState, Method
 from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
@@ -180,6 +180,11 @@ class PatchForm:
     def drape_out_of_time(self) -> bool:
         """Whether a time limit stopped the drape."""
         return self.lying is not None and self.draped.report.status is Status.OUT_OF_TIME
+
+    @property
+    def flat_state(self) -> FlatState | None:
+        """Where the rods lie in the plane, where they follow curves of the target."""
+        return None if self.lying is None else self.draped.flat_state
 
     def finished_pop_ups(self, ends: Sequence[Ends]) -> dict[Ends, PopUp]:
         """The pop-ups with these ends that were not stopped by a time limit."""

@@ -86,7 +86,7 @@ class GridRod:
     @cached_property
     def stations(self) -> Floats:
         """(k,) distances of the points of its course from the start [m]."""
-        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.course, axis=0), axis=1)))
+        return along(self.course)
 
     def point(self, at: float) -> Floats:
         """(2,) x, y [m] of the flat point at the distance `at` from the start, which may lie beyond its ends."""
@@ -99,6 +99,11 @@ class GridRod:
         """(k, 2) its course with its allowances at both ends [m]."""
         ends = self.point(-self.allowance), self.point(self.length + self.allowance)
         return np.vstack([ends[0], self.course[1:-1], ends[1]])
+
+
+def along(points: Floats) -> Floats:
+    """(k,) distances of points (k, d) of a polyline from its first, along it [m]."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
 
 
 @dataclass(frozen=True)
@@ -167,8 +172,7 @@ def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
     nodes = dict[str, list[int]]()
     if flat is None:
         return nodes
-    steps = [np.linalg.norm(np.diff(flat[rod.nodes], axis=0), axis=1) for rod in rods]
-    stations = [np.append(0.0, np.cumsum(step)) for step in steps]
+    stations = [along(flat[rod.nodes]) for rod in rods]
     for joint in joints_of(rods):
         if all(len(rods[k].nodes) for k in joint.rods):
             pairs = zip(joint.rods, joint.at, strict=True)
@@ -195,8 +199,8 @@ def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
         course = np.array([[rod.offset, rod.start], [rod.offset, rod.end]])
     elif flat is not None and len(nodes):
         course = np.asarray(flat[nodes, :2], dtype=np.float64)
-        along, off = course[-1] - course[0], course - course[0]
-        if np.abs(off[:, 0] * along[1] - off[:, 1] * along[0]).max() < STRAIGHT * float(along @ along):
+        chord, off = course[-1] - course[0], course - course[0]
+        if np.abs(off[:, 0] * chord[1] - off[:, 1] * chord[0]).max() < STRAIGHT * float(chord @ chord):
             course = course[[0, -1]]
     else:
         course = np.array([[rod.start, 0.0], [rod.end, 0.0]])
@@ -232,8 +236,14 @@ class Shape:
 def shape_names(archive: Archive) -> list[str]:
     """All shapes, in the order of the deployment."""
     stages = [f"{STAGE}{k}" for k in range(1, len(archive.states.get("history_share", ())) - 1)]
-    states = archive.states
-    return [name for name in ("flat", *stages, *SHELLS) if name.startswith(STAGE) or name in states]
+    states, flat = archive.states, ("flat",) if lies_flat(archive) else ()
+    return [name for name in (*flat, *stages, *SHELLS) if name.startswith(STAGE) or name in states]
+
+
+def lies_flat(archive: Archive) -> bool:
+    """Whether there is a flat grid to be drawn; else the shell is assembled in place."""
+    flat = archive.results.flat_state
+    return flat is None or flat.lies_flat is not False
 
 
 def caption_of(archive: Archive, state: str) -> str:
