@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Protocol, Self
 
 from rodshell.errors import InputError
-from rodshell.quantities import Angle, LengthOrAuto, Names, Whole
-from rodshell.units import rounded_down
-from rodshell.validation import is_auto, number, positive, texts, whole
+from rodshell.quantities import Angle, LengthOrAuto, LengthsOrAuto, Names, Whole
+from rodshell.units import NUMBER, rounded_down
+from rodshell.validation import is_auto, number, numbers, positive, texts, whole
 
 EDGES_A_SPAN = 6  # edges of the mesh per spacing, where the edge is "auto"
 
@@ -28,8 +28,8 @@ class SurfaceLattice(ABC):
     Parameters
     ----------
     spacing : between the rods of a family, where they cross the curve through the anchor from which they are set out
-        [m]; "auto" for an eighth of the target's size.
-    edge : longest edge of the mesh [m]; "auto" for a sixth of the spacing.
+        [m]: of the first family and of the others, or one length for all; "auto" for an eighth of the target's size.
+    edge : longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing.
     rotate : angle of the first family against the target's x axis, in plan at the anchor [rad].
     left_out : names of rods that are not built.
 
@@ -39,7 +39,7 @@ class SurfaceLattice(ABC):
         the spacing.
     """
 
-    spacing: Annotated[LengthOrAuto, "distance between neighbouring rods where they are set out"] = "auto"
+    spacing: Annotated[LengthsOrAuto | float, "distance between neighbouring rods: one, or first,others"] = "auto"
     edge: Annotated[LengthOrAuto, 'longest edge of the mesh, or "auto"'] = "auto"
     rotate: Annotated[Angle, "angle of the first family at the anchor, seen from above"] = 0.0
     left_out: Annotated[Names, "names of rods that are not built, such as U01, V03"] = ()
@@ -52,21 +52,26 @@ class SurfaceLattice(ABC):
         """Number of families."""
 
     @property
-    def least_spacing(self) -> float:
-        """The spacing, which is that of all families [m].
+    def spacings(self) -> tuple[float, ...]:
+        """Of each family [m].
 
         Raises
         ------
-        InputError : it is "auto", which `build` decides for a target.
+        InputError : they are "auto", which `build` decides for a target.
         """
-        if self.spacing == "auto":
+        if not isinstance(self.spacing, tuple):
             raise InputError('the spacing "auto" depends on the target: build(target) gives the lattice there')
-        return self.spacing
+        return (*self.spacing, *self.spacing[1:] * (self.family_count - 2))
+
+    @property
+    def least_spacing(self) -> float:
+        """The smallest spacing [m]."""
+        return min(self.spacings)
 
     @property
     def most_spacing(self) -> float:
-        """The spacing [m]."""
-        return self.least_spacing
+        """The largest spacing [m]."""
+        return max(self.spacings)
 
     @property
     def longest_edge(self) -> float:
@@ -74,22 +79,27 @@ class SurfaceLattice(ABC):
         return self.least_spacing / EDGES_A_SPAN if self.edge == "auto" else self.edge
 
     def __post_init__(self) -> None:
-        lengths = {name: getattr(self, name) for name in ("spacing", "edge")}
-        values = {name: positive(f"layout {name}", size, "m") for name, size in lengths.items() if not is_auto(size)}
+        values: dict[str, object] = {
+            "rotate": number("layout rotate", self.rotate, "rad"),
+            "left_out": texts("layout left_out", self.left_out, "names of rods"),
+        }
+        if not is_auto(self.edge):
+            values["edge"] = positive("layout edge", self.edge, "m")
+        if not is_auto(self.spacing):
+            given = (self.spacing,) * 2 if isinstance(self.spacing, NUMBER) else self.spacing
+            pair = numbers("layout spacing", given, "one length or two in m", 2)
+            values["spacing"] = tuple(positive("layout spacing", size, "m") for size in pair)
         for name, value in values.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "rotate", number("layout rotate", self.rotate, "rad"))
-        object.__setattr__(self, "left_out", texts("layout left_out", self.left_out, "names of rods"))
-        if values.get("edge", 0.0) > values.get("spacing", float("inf")):
+        if {"edge", "spacing"} <= values.keys() and self.longest_edge > self.least_spacing:
             raise InputError(
-                f"layout edge {self.edge} m is longer than the spacing {self.spacing} m: use a shorter edge"
+                f"layout edge {self.edge} m is longer than the spacing {self.least_spacing} m: use a shorter edge"
             )
 
     def parameters(self) -> dict[str, object]:
         """The lattice in SI."""
-        spacing = (self.least_spacing,) * self.family_count
-        known = {"kind": self.kind, "families": self.family_count, "rotate": self.rotate}
-        return known | {"spacing": spacing, "edge": self.longest_edge}
+        known: dict[str, object] = {"kind": self.kind, "families": self.family_count, "rotate": self.rotate}
+        return known | {"spacing": self.spacings, "edge": self.longest_edge}
 
     def build(self, target: Sized | None = None) -> Self:
         """The lattice with the spacing for a target."""

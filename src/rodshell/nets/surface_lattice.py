@@ -78,8 +78,9 @@ def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float,
     points, tangents, family = list[Floats](), list[Floats](), list[int]()
     for k in range(len(headings)):
         shift = 0.5 if k == 2 else 0.0  # of three families: else three rods nearly meet
-        low, high = guides.ends[k] / lattice.least_spacing
-        s = lattice.least_spacing * (np.arange(np.ceil(low - shift), np.floor(high - shift) + 1) + shift)
+        spacing = lattice.spacings[k]
+        low, high = guides.ends[k] / spacing
+        s = spacing * (np.arange(np.ceil(low - shift), np.floor(high - shift) + 1) + shift)
         x, along = guides.at(np.full(len(s), k), s)
         points.append(x)
         tangents.append(_off(target, x, along, law))
