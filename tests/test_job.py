@@ -539,7 +539,7 @@ def test_a_notebook_shows_the_shell_and_its_verdict(earlier: rs.Form) -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda job: job.changed(layout=3), r"layout = 3: must be a table; \[layout\] has rods"),
+        (lambda job: job.changed(layout=3), r"layout = 3: must be a table; \[layout\] has kind, rods"),
         (lambda job: job.changed({3: 4}), "words such as target.radius, not 3"),
         (lambda job: job.run(time_limit="60 s"), 'time_limit must be a number in s, not "60 s"'),
         (lambda _: rs.Job.load(""), "the name of the case is empty"),

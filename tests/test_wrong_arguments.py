@@ -35,7 +35,10 @@ def form():
             "warm_start must be a form .*, not a GridLayout",
         ),
         (lambda: rs.find_form(LAYOUT, TARGET, ROD), "target must be a rodshell Target, not a GridLayout"),
-        (lambda: rs.find_form(TARGET, ROD, LAYOUT), "layout must be a rodshell GridLayout, not a Rod"),
+        (
+            lambda: rs.find_form(TARGET, ROD, LAYOUT),
+            "layout must be a rodshell GridLayout or Geodesic or A",
+        ),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD.section), "rod must be a rodshell Rod, not a Circle"),
         (
             lambda: rs.find_form("dome", LAYOUT, ROD, seams=[[(-1, 0), (1, 0)]]),
@@ -43,7 +46,10 @@ def form():
         ),
         (lambda: rs.Job(TARGET, LAYOUT), "a job needs target, layout and rod; for a case"),
         (lambda: rs.Job("hemisphere", LAYOUT, ROD), 'target must be a rodshell Target, not "hemisphere"'),
-        (lambda: rs.drape(TARGET, LAYOUT, ROD), "layout must be a rodshell GridLayout, not a Hemisphere"),
+        (
+            lambda: rs.drape(TARGET, LAYOUT, ROD),
+            "layout must be a rodshell GridLayout or Geodesic or A",
+        ),
         (lambda: rs.drape(LAYOUT, ROD, 3.0), "target must be a rodshell Target, not 3.0"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, warm_start="x"), 'warm_start must be what .* rodshell.drape .*"x"'),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, anchor="0,0"), "anchor must be two finite numbers x, y in m, not '0,0'"),

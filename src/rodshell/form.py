@@ -17,13 +17,14 @@ from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
+from rodshell.figures.form import FlatState
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
 from rodshell.formfinding.patches import MergedPopUp, PatchedForm
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
-from rodshell.layout import GridLayout
+from rodshell.layout import Layout
 from rodshell.layout.cells import Pattern
 from rodshell.loads.check import (
     check_shells,  # most forms have no loads
@@ -47,6 +48,7 @@ from rodshell.results.from_checks import (
     sharpest,
 )
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
+from rodshell.results.strength_used import THIN
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance
@@ -107,7 +109,7 @@ class Form:
         return self.stages.target
 
     @property
-    def layout(self) -> GridLayout:
+    def layout(self) -> Layout:
         """The flat grid asked for."""
         return self.stages.layout
 
@@ -195,6 +197,21 @@ class Form:
     def warnings(self) -> tuple[str, ...]:
         """Sentences of form finding that a user should read; those of checks are in the archive."""
         return self.stages.warnings
+
+    @property
+    def flat_state(self) -> FlatState | None:
+        """Whether rods along curves of the target can be laid out in the plane, by what they withstand while they are
+        erected; None where the flat grid is a straight lattice."""
+        found = None if isinstance(self.stages, PatchedForm) else self.stages.flat_state
+        if found is None:
+            return None
+        limits, material = self.options.limits(self.rod, self.case.strength), self.rod.material
+        strength = limits.erection or self.options.judged_by(self.rod).strength
+        limit = strength / material.youngs_modulus if strength and material else THIN
+        return FlatState(
+            lies_flat=found.report.stable and found.strain <= limit, in_plane_strain=found.strain, limit=limit,
+            negative_modes=found.report.negative_modes,
+        )  # fmt: skip
 
     # Checks, fabrication, verdict
 
@@ -379,7 +396,9 @@ class Form:
 
     def _checked(self, progress: Progress) -> Checks:
         self.options.require_known_stress(self.rod, self.joint)
-        settings: dict[str, Any] = {"stages": self.options.stages, "shear_weight": self._weight(self.options)}
+        flat = self.flat_state
+        stages = self.options.stages if flat is None or flat.lies_flat else 0  # else it is assembled in place
+        settings: dict[str, Any] = {"stages": stages, "shear_weight": self._weight(self.options)}
         if not isinstance(self.stages, PatchedForm):
             return check(self.stages.popped, self.rod, **settings, progress=progress)
         found = self.stages.patches
@@ -400,7 +419,7 @@ class Form:
     @cached_property
     def _archive(self) -> Archive:
         checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
-        results = self.results()
+        results = self.results().changed(flat_state=self.flat_state)
         if isinstance(self.stages, PatchedForm):
             results = with_seam_forces(results, self.stages, checks)
         mesh, asked = self.footprint.mesh, self.case.strength

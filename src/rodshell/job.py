@@ -24,7 +24,7 @@ from rodshell.formfinding.methods import require_method
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
-from rodshell.layout import FlatGrid, GridLayout
+from rodshell.layout import FlatGrid, Layout
 from rodshell.output.options import OutputOptions
 from rodshell.progress import Progress, limited, silent
 from rodshell.results.folder import reading
@@ -90,7 +90,7 @@ class Job:
     def __init__(
         self,
         target: Target | None = None,
-        layout: GridLayout | None = None,
+        layout: Layout | None = None,
         rod: Rod | None = None,
         *,
         method: Method = Bound(),
@@ -105,7 +105,7 @@ class Job:
     ) -> None:
         if target is None or layout is None or rod is None:
             raise InputError(OBJECTS)
-        for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
+        for name, value, kind in (("target", target, Target), ("layout", layout, Layout), ("rod", rod, Rod)):
             instance(name, value, kind)
         require_method(method)
         require_joint(joint)
@@ -295,7 +295,8 @@ class Job:
             return f"<rodshell.Job: pop up {target}>"
         what = case.drawings.name or target
         source = getattr(case.target, "file", None)
-        spacing = "auto" if case.layout.spacing == "auto" else " x ".join(map(length_text, case.layout.spacing))
+        spacings = (case.layout.spacing,) if isinstance(case.layout.spacing, float | str) else case.layout.spacing
+        spacing = " x ".join(each if isinstance(each, str) else length_text(each) for each in spacings)
         cuts = len(case.seams.lines)
         seams = f", {cuts} seam{'s' if cuts > 1 else ''}" if cuts else ""
         return (
@@ -360,7 +361,7 @@ def _ends_and_case(
 
 def find_form(
     target: Target,
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     method: Method = Bound(),

@@ -311,8 +311,8 @@ class Run:
         """Which lengths were left to the target's size: a wrong unit shows here."""
         unit = getattr(self.asked.target, "unit", None)
         lengths = {
-            "spacing": min(found.layout.spacing) if self.asked.layout.spacing == "auto" else None,
-            "edge": found.layout.edge if self.asked.layout.edge == "auto" else None,
+            "spacing": found.layout.least_spacing if self.asked.layout.spacing == "auto" else None,
+            "edge": found.layout.longest_edge if self.asked.layout.edge == "auto" else None,
         }
         said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
         if said and self.announce is not None:

@@ -14,7 +14,7 @@ from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from types import UnionType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 from rodshell.errors import InputError
 from rodshell.units import NUMBER, as_float, out_of_range, shown
@@ -40,7 +40,8 @@ def instance(name: str, value: object, kind: type | UnionType, wanted: str = "")
     wanted : what the value must be, in words; default "a rodshell KIND".
     """
     if not isinstance(value, kind):
-        what = wanted or f"a rodshell {getattr(kind, '__name__', kind)}"
+        kinds = [each.__name__ for each in (get_args(kind) or (kind,))]
+        what = wanted or f"a rodshell {' or '.join(kinds)}"
         raise InputError(f"{name} must be {what}, not {described(value)}")
 
 

@@ -69,6 +69,7 @@ def test_built_in_cases_have_the_papers_values(name: str, target: dict[str, obje
     case = load_case(name)
     assert written(case.target) == target
     assert written(case.layout) == {
+        "kind": "chebyshev",
         "rods": rods,
         "spacing": (0.03, 0.03),
         "length": 1.2,

@@ -15,7 +15,7 @@ from rodshell.errors import InputError
 from rodshell.figures.records import json_text
 from rodshell.formfinding import bound_drape, pipeline
 from rodshell.formfinding.finite_sections import section_rotation
-from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.results import read
 from rodshell.results.verdict import verdict
 from rodshell.solve.equilibrium import Status

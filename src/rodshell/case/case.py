@@ -12,6 +12,7 @@ from rodshell.case.load_tables import BracingKinds, CombinationRows, LoadRows, N
 from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import (
     DrapeTable,
+    LayoutKinds,
     LayoutTable,
     PopUpTable,
     RefineTable,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.methods import Method
     from rodshell.formfinding.popup import Ends
     from rodshell.joints import Joint
-    from rodshell.layout import GridLayout
+    from rodshell.layout import Layout
     from rodshell.loads.combinations import Loads
     from rodshell.output.options import OutputOptions
     from rodshell.rods.materials import Material
@@ -54,7 +55,7 @@ class Built(NamedTuple):
     """
 
     target: "Target"
-    layout: "GridLayout"
+    layout: "Layout"
     rod: "Rod"
     joint: "Joint"
     method: "Method"
@@ -67,7 +68,7 @@ class Case:
     """Everything that decides one job, complete and in SI. Make one with `load_case`."""
 
     target: TargetKinds | HeldTarget = field(default_factory=Hemisphere)
-    layout: LayoutTable = field(default_factory=LayoutTable)
+    layout: LayoutKinds = field(default_factory=LayoutTable)
     rod: RodTable = field(default_factory=RodTable)
     joint: JointKind = field(default_factory=Ball)
     drape: DrapeTable = field(default_factory=DrapeTable)
@@ -143,7 +144,7 @@ class Case:
     def rod_on(
         self,
         target: "Target",
-        layout: "GridLayout",
+        layout: "Layout",
         *,
         anchor: tuple[float, float] | None = None,
         progress: Progress = silent,
@@ -165,7 +166,7 @@ class Case:
     def fit_on(
         self,
         target: "Target",
-        layout: "GridLayout",
+        layout: "Layout",
         *,
         anchor: tuple[float, float] | None = None,
         progress: Progress = silent,
@@ -192,6 +193,8 @@ class Case:
 
     def headed(self, rotate: float) -> "Case":
         """The same case with its heading [rad]."""
+        if not isinstance(self.layout, LayoutTable):
+            return replace(self, layout=replace(self.layout, rotate=rotate))
         held = self.layout.held
         turned = None if held is None else replace(held, value=replace(held.value, rotate=rotate))
         return replace(self, layout=replace(self.layout, rotate=rotate, held=turned))
@@ -217,6 +220,7 @@ class Case:
             also keys that a form in patches does not have.
         """
         from rodshell.checks.sizing import require_likely_sizes
+        from rodshell.layout import GridLayout
         from rodshell.targets.creased import cut_at
         from rodshell.targets.patch import Seam
 
@@ -231,9 +235,11 @@ class Case:
         joint, method = self.joint, built(self.drape)
         seams = [Seam.of(line) for line in self.seams.lines]
         target = cut_at(target or built(self.target, progress), seams, progress)
-        layout = built(self.layout, target).with_edges(method.edges_a_span)
+        layout: Layout = built(self.layout, target)
+        if isinstance(layout, GridLayout):
+            layout = layout.with_edges(method.edges_a_span)
         spacings = [row.layout.spacing for row in self.seams.patches if row.layout.spacing is not None]
-        shortest = min(map(min, (layout.spacing, *spacings)))
+        shortest = min([layout.least_spacing, *map(min, spacings)])
         self._require_stock(shortest)
         self._require_allowance(target)
         loads = self.built_loads()
@@ -284,6 +290,11 @@ class Case:
     def _require_keys_of_patches(self) -> None:
         """InputError where a key is set that a form in patches does not have."""
         patches = "each patch of a target cut by seams has its own"
+        if not isinstance(self.layout, LayoutTable):
+            raise InputError(
+                f'layout.kind = {shown(self.layout.kind)}: a target cut by seams needs "chebyshev": set it, or leave '
+                "the seams out"
+            )
         for key, value, default, instead in (
             ("layout.rods", self.layout.rods, "auto", f'{patches}: use "auto"'),
             ("layout.length", self.layout.length, "auto", f'{patches}: use "auto"'),

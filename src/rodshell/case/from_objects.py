@@ -20,7 +20,7 @@ from rodshell.formfinding import Bound, Fall, Method
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Joint
-from rodshell.layout import GridLayout
+from rodshell.layout import GridLayout, Layout
 from rodshell.output.options import OutputOptions
 from rodshell.rods.joints import JointKind
 from rodshell.rods.section import Rod
@@ -37,7 +37,7 @@ NOT_POPPED_UP = "the grid was not popped up; a case file always asks for a pop-u
 
 def case_of(
     target: Target,
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     joint: Joint,
@@ -53,7 +53,7 @@ def case_of(
     """The case of a target, a layout and a rod; arguments as of `rodshell.Job`, each of its kind."""
     heading, shape = layout.rotate if rotate is None else rotate, target.parameters()
     given: dict[str, Any] = {
-        "layout": _layout_keys(layout, heading),
+        "layout": _layout_keys(layout, heading) if isinstance(layout, GridLayout) else written(layout),
         "rod": rod.parameters(),
         "drape": _drape_keys(method, anchor, objective),
         "pop_up": {"ends": ends[0] if len(ends) == 1 else "both"},
@@ -67,7 +67,7 @@ def case_of(
         given["target"] = _target_keys(shape)
     case = read(Case, given)
     held = {
-        "layout": _held_layout(layout, heading),
+        **({"layout": _held_layout(layout, heading)} if isinstance(layout, GridLayout) else {}),
         "rod": None if case.rod.build() == rod else Held(rod, f"the rod {rod}"),
         "drape": _held_method(case.drape.build(), method),
         "pop_up": None if ends else Held((), "a grid that is not popped up", writable=True, note=NOT_POPPED_UP),

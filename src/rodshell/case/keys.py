@@ -16,6 +16,7 @@ from rodshell.validation import either
 
 BY_KIND: dict[str, str] = {
     "target": "hemisphere",
+    "layout": "chebyshev",
     "rod.section": "auto",
     "joint": "ball",
     "bracing": "none",

@@ -3,10 +3,11 @@
 from dataclasses import dataclass, fields
 from math import pi
 from pathlib import PureWindowsPath
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from rodshell.case.held import Holding
 from rodshell.errors import InputError
+from rodshell.layout.lattices import Asymptotic, Geodesic
 from rodshell.quantities import (
     Acceleration,
     Angle,
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class LayoutTable(Holding):
+    """An inextensible net of straight rods: a lattice of equal spacing in the flat grid."""
+
     rods: Annotated[Counts, 'numbers of rods along x and y: 17x17, or "auto": all that touch'] = "auto"
     spacing: Annotated[LengthsOrAuto, 'distance between neighbouring rods: one length, or u,v, or "auto"'] = "auto"
     length: Annotated[LengthOrAuto, 'length of every rod before trimming, or "auto"'] = "auto"
@@ -52,6 +55,8 @@ class LayoutTable(Holding):
     crossing: Annotated[Angle, "angle between both families on the target, at the anchor"] = pi / 2
     left_out: Annotated[Names, "names of rods that are not built, such as U01, V03"] = ()
 
+    kind: ClassVar[str] = "chebyshev"
+
     def build(self, target: "Target | None" = None) -> "GridLayout":
         """The layout; a spacing "auto" stands for some 17 rods each way over the target."""
         from rodshell.layout import GridLayout
@@ -60,7 +65,11 @@ class LayoutTable(Holding):
         if spacing == "auto":
             spacing = (rounded_down((target.size if target else 0.2) / 8),) * 2
         rotate = 0.0 if self.rotate == "auto" else self.rotate
-        return GridLayout.orthogonal(**(written(self) | {"spacing": spacing, "rotate": rotate}))
+        keys = {name: value for name, value in written(self).items() if name != "kind"}
+        return GridLayout.orthogonal(**(keys | {"spacing": spacing, "rotate": rotate}))
+
+
+LayoutKinds = LayoutTable | Geodesic | Asymptotic
 
 
 FALLING = ("height", "coupling", "C1", "C2", "time_step", "duration", "friction", "drag", "frames")

@@ -17,7 +17,6 @@ material frames say, and without these upright on the shell.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -26,8 +25,8 @@ from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
 from rodshell.figures.checks import Clearance
 from rodshell.geometry.frames import adapted, cross, dot, unit
 from rodshell.geometry.near_pairs import near_pairs
-from rodshell.layout import FlatGrid, GridMesh
-from rodshell.layout.flatgrid import Crossings, FlatRod
+from rodshell.layout import GridMesh
+from rodshell.layout.flatgrid import Crossings
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.model.shell import UP
@@ -67,7 +66,8 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
     if outline is None:
         return APART
     sizes = np.cumsum([0, *(len(shell.mesh.grid.rods) for shell, _ in patches)])
-    parts = [_crossing_lines(mesh.grid.rods[a:b], outline) for a, b in pairwise(sizes)]
+    beyond = 4 * outline.reach / FLATTEST
+    parts = [shell.mesh.grid.meetings(beyond) for shell, _ in patches]
     positions = np.concatenate([state[shell.node_blocks] for shell, state in patches])
     ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
     together = near_pairs(ends, outline.near)
@@ -98,7 +98,7 @@ def contact(
     outline = _Outline.of(rod, mesh)
     if outline is None:
         return APART
-    by_design = _crossing_lines(mesh.grid.rods, outline) if crossings is None else crossings
+    by_design = mesh.grid.meetings(4 * outline.reach / FLATTEST) if crossings is None else crossings
     edges = _Edges(mesh, positions, outline, directors, by_design)
     first, second, p, q, limit = edges.near()
     gap = edges.gaps(first, second, q - p)
@@ -174,11 +174,6 @@ class _Outline:
         if share is not None:
             parts = share[:, 0] * parts[0], share[:, 1] * parts[1]
         return parts[0] + parts[1] if self.box else np.hypot(*parts)
-
-
-def _crossing_lines(rods: Sequence[FlatRod], outline: _Outline) -> Crossings:
-    """Where lines of rods cross in the flat grid, joined or not, or would if the rods were a little longer."""
-    return FlatGrid.of(rods, margin=-4 * outline.reach / FLATTEST).crossings
 
 
 class _Edges:

@@ -23,8 +23,9 @@ from rodshell.checks.bending import VON_MISES, bending_of, largest_stress
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.popup import PopUp
 from rodshell.joints import Ball, Joint
-from rodshell.layout import GridLayout
+from rodshell.layout import Layout, SurfaceLattice
 from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.nets.surface_lattice import surface_net
 from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.materials import Material, PresetName
@@ -97,7 +98,7 @@ class Fit:
     def on(
         cls,
         target: Target,
-        layout: GridLayout,
+        layout: Layout,
         *,
         anchor: tuple[float, float] | None = None,
         joint: Joint | None = None,
@@ -113,7 +114,7 @@ class Fit:
         progress : called by the net, which is marched when bends are first asked for.
         """
         slender = SLENDER * target.size
-        room = ROOM * min(layout.spacing)
+        room = ROOM * layout.least_spacing
 
         @cache  # a net costs more than all that is asked of it
         def bends() -> Bends:
@@ -336,7 +337,7 @@ def _other_unit(name: str, size: float, width: float, unit: float | None, usual:
 
 
 def bends_of(
-    target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None, progress: Progress = silent
+    target: Target, layout: Layout, anchor: tuple[float, float] | None = None, progress: Progress = silent
 ) -> Bends:
     """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature.
 
@@ -347,6 +348,8 @@ def bends_of(
     layout : of the rods on it.
     anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
     """
+    if isinstance(layout, SurfaceLattice):
+        return Bends(*surface_net(target, layout, anchor=anchor).curvatures)
     if not isinstance(target, Creased):
         try:
             return net_bends(chebyshev_net(target, layout, anchor=anchor, progress=progress))

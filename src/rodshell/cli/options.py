@@ -97,6 +97,7 @@ def _kinds_of(arguments: tuple[str, ...]) -> dict[str, str] | None:
     section = getattr(case.bracing, "section", None)
     return {
         "target": case.target.kind,
+        "layout": case.layout.kind,
         "rod.section": case.rod.section.kind,
         "joint": case.joint.kind,
         "bracing": case.bracing.kind,

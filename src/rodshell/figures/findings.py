@@ -18,6 +18,8 @@ CODES = {
     "flat": "the target is flat",
     "guided": "lifted and driven by its ends, the shell comes to rest in another shape than the final one",
     "imperfect": "with imperfections the shell falls under a combination of loads, or nothing is known of it",
+    "in_place": "flat, the rods would bend by more than they withstand: the shell is assembled in place",
+    "lies_flat": "the rods can be laid out flat, although they follow curves of the target",
     "linear_buckling": "linear buckling is below the loads, which the shell carries in another shape",
     "lost": "the deployment could not be followed all the way",
     "needs_bracing": "without its bracing the shell does not carry its own weight",
@@ -56,7 +58,7 @@ CODES = {
 
 Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
-GOOD = frozenset({"stands", "stands_under_loads", "no_loads", "no_imperfections"})
+GOOD = frozenset({"in_place", "lies_flat", "stands", "stands_under_loads", "no_loads", "no_imperfections"})
 FAULTS = frozenset({
     "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",
     "too_thick", "unstable",

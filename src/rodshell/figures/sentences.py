@@ -27,6 +27,18 @@ SENTENCES = {
         "under {place} with {ends} ends and imperfections nothing is known above {factor} times the loads"
     ),
     "imperfect: unloaded": "with {ends} ends and imperfections the shell is unstable before the loads of {place} act",
+    "in_place": (
+        "the rods cannot be laid out flat: there they would bend within the plane by up to {bent}, and withstand "
+        "{withstood} during erection; bring rod by rod to its place over a scaffold, by the holes of its strip"
+    ),
+    "in_place: unstable": (
+        "the rods cannot be laid out flat, since no stable state in the plane was found; bring rod by rod to its place "
+        "over a scaffold, by the holes of its strip"
+    ),
+    "lies_flat": (
+        "the rods can be laid out flat: there they bend within the plane by up to {bent}, and withstand {withstood} "
+        "during erection"
+    ),
     "linear_buckling": (
         "under {place} with {ends} ends linear buckling is at {factor} times these loads: the shell carries them only "
         "in another shape, its nodes having moved by {moved}"

@@ -7,9 +7,10 @@ from rodshell.errors import InputError
 from rodshell.formfinding.bound_drape import bound_drape
 from rodshell.formfinding.fall_drape import fall_drape
 from rodshell.formfinding.gravity_drape import gravity_drape
+from rodshell.formfinding.laid import lay
 from rodshell.formfinding.methods import Bound, Draped, Gravity, Method, require_method
 from rodshell.joints import Joint, require_joint
-from rodshell.layout import GridLayout
+from rodshell.layout import Layout, SurfaceLattice
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
@@ -17,7 +18,7 @@ from rodshell.validation import instance, point
 
 
 def drape(
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     target: Target,
     *,
@@ -51,7 +52,7 @@ def drape(
     StabilityError : the fall's time step is beyond the stability limit of explicit ties.
     """
     require_progress(progress)
-    for name, value, kind in (("layout", layout, GridLayout), ("rod", rod, Rod), ("target", target, Target)):
+    for name, value, kind in (("layout", layout, Layout), ("rod", rod, Rod), ("target", target, Target)):
         instance(name, value, kind)
     require_method(method)
     require_joint(joint)
@@ -61,6 +62,13 @@ def drape(
         instance("warm_start", warm_start, Draped, "what an earlier rodshell.drape returned")
     if anchor is not None:
         point("anchor", anchor)
+    if isinstance(layout, SurfaceLattice):
+        if not isinstance(method, Bound):
+            raise InputError(
+                f'a lattice "{layout.kind}" follows curves of the target: bind it there (method = bound), or let a '
+                "lattice of straight rods hang or fall"
+            )
+        return lay(target, layout, rod, anchor=anchor, joint=joint, progress=progress)
     if layout.crossing != pi / 2 and not isinstance(method, Bound):
         raise InputError(
             f"layout crossing {degrees(layout.crossing):.4g} degrees: a grid that hangs or falls on its target finds "

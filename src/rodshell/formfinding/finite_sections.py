@@ -111,6 +111,16 @@ def rod_thickness(rod: Rod) -> float:
     return 2 * section.a if isinstance(section, Ellipse) else section.width
 
 
+def rod_breadth(rod: Rod) -> float:
+    """Size of a rod's section across its thickness [m]; 0 where the shape of its section is not known."""
+    section = rod.section
+    if isinstance(section, GivenSection):
+        return 0.0
+    if isinstance(section, Circle | Tube):
+        return 2 * section.outer_radius
+    return 2 * section.b if isinstance(section, Ellipse) else section.height
+
+
 def thickness_warnings(
     normal: Floats, mesh: GridMesh, positions: Floats, touching: Bools, rod: Rod, spacing: float
 ) -> tuple[str, ...]:

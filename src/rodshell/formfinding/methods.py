@@ -17,8 +17,8 @@ from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import StrongBending, joint_tangents
 from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
-from rodshell.layout import FlatRod, GridLayout, GridMesh
-from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.layout import FlatRod, GridMesh, Layout
+from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.nets import ChebyshevNet
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status
@@ -170,6 +170,22 @@ class DrapeFigures:
 
 
 @dataclass(frozen=True, eq=False)
+class FlatState:
+    """Rods along curves of a target, laid out in the plane such that they bend as little as they can.
+
+    Parameters
+    ----------
+    positions : (n, 2) of the mesh's nodes [m].
+    strain : the largest of a rod's fibres that bend in the plane [-].
+    report : of the solve; without negative modes that state is stable.
+    """
+
+    positions: Floats
+    strain: float
+    report: SolveReport
+
+
+@dataclass(frozen=True, eq=False)
 class Draped:
     """A flat grid lying on a target, not yet trimmed.
 
@@ -184,11 +200,12 @@ class Draped:
     figures : how well the grid lies on the target.
     net : the net that the drape started from; None where it started from the flat grid.
     rest : how the motion ended (`Fall`); else None.
+    flat_state : of rods along curves of the target, which do not form a straight lattice in the plane; else None.
     """
 
     method: Method
     target: Target
-    layout: GridLayout
+    layout: Layout
     rod: Rod
     anchor: tuple[float, float] | None
     eccentricity: float
@@ -199,6 +216,7 @@ class Draped:
     figures: DrapeFigures
     net: ChebyshevNet | None = None
     rest: "Rest | None" = None
+    flat_state: FlatState | None = None
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:

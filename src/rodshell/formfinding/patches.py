@@ -18,7 +18,8 @@ from rodshell.formfinding.seams import FEWEST, Meeting, PatchNet, lay_patches, p
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
 from rodshell.joints import Ball, Joint, require_joint
-from rodshell.layout import GridLayout
+from rodshell.layout import GridLayout, Layout
+from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.layout.mesh import SideBySide, side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
@@ -176,7 +177,7 @@ class PatchedForm:
 def find_patched_stages(
     target: Target,
     seams: Sequence[Seam],
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     patch_layouts: Mapping[str, PatchLayout] | None = None,
@@ -193,7 +194,7 @@ def find_patched_stages(
     patch_layouts : settings of single patches, by name.
     warm_start, same_drape : as in `find_stages`; patches are matched by their names.
     """
-    ends = choices_of("ends", ends, ENDS)
+    layout, ends = require_chebyshev(layout, "seams"), choices_of("ends", ends, ENDS)
     require_joint(joint)
     patch_layouts, joint = dict(patch_layouts or {}), joint or Ball()
     earlier = warm_start.patches if warm_start is not None else {}
@@ -224,7 +225,7 @@ def find_patched_stages(
 def best_heading(
     target: Target,
     seams: Sequence[Seam],
-    layout: GridLayout,
+    layout: Layout,
     patch_layouts: Mapping[str, PatchLayout],
     *,
     eccentricity: float = 0.0,
@@ -236,7 +237,7 @@ def best_heading(
     ------
     RodshellError : every heading fails; the error is that of the first heading.
     """
-    shares, reasons = dict[float, float](), list[RodshellError]()
+    layout, shares, reasons = require_chebyshev(layout, "seams"), dict[float, float](), list[RodshellError]()
     for heading in HEADINGS:
         progress("seams", f"trying {degrees(heading):.0f} deg", 0.0)
         try:

@@ -13,7 +13,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
-from rodshell.formfinding.methods import Bound, Draped, Method
+from rodshell.formfinding.methods import Bound, Draped, FlatState, Method
 from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
@@ -27,9 +27,9 @@ from rodshell.formfinding.trim import (
 )
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.kernels import njit
-from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
+from rodshell.layout import FlatGrid, GridMesh, Layout, mesh_grid
 from rodshell.layout.flatgrid import TOGETHER
-from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Status
@@ -172,7 +172,7 @@ class PatchForm:
         return self.draped.target
 
     @property
-    def layout(self) -> GridLayout:
+    def layout(self) -> Layout:
         """The layout of the flat grid; raises as `trimmed` does."""
         return self.draped.layout
 
@@ -180,6 +180,11 @@ class PatchForm:
     def drape_out_of_time(self) -> bool:
         """Whether a time limit stopped the drape."""
         return self.lying is not None and self.draped.report.status is Status.OUT_OF_TIME
+
+    @property
+    def flat_state(self) -> FlatState | None:
+        """Where the rods lie in the plane, where they follow curves of the target."""
+        return None if self.lying is None else self.draped.flat_state
 
     def finished_pop_ups(self, ends: Sequence[Ends]) -> dict[Ends, PopUp]:
         """The pop-ups with these ends that were not stopped by a time limit."""
@@ -223,7 +228,7 @@ class PatchForm:
 
 def find_stages(
     target: Target,
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     method: Method = Bound(),
@@ -306,7 +311,7 @@ def meshed_again(form: PatchForm, ends: Ends) -> PatchForm:
     ends : how the rods' ends are held.
     """
     old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
-    mesh, normals = mesh_grid(old.grid, form.layout.edge), None
+    mesh, normals = mesh_grid(old.grid, form.layout.longest_edge), None
     if old.layered:
         mesh = mesh.in_layers(2 * float(np.abs(old.heights).max()))
         assert boundary.normals is not None
@@ -385,7 +390,7 @@ def _off_the_end(trimmed: Trimmed) -> tuple[str, ...]:
     allowed, worst = min(ON_THE_END * draped.target.size, MOST_OFF), int(np.argmax(off > (1 - 1e-6) * off.max()))
     if off[worst] <= allowed:
         return ()
-    edge = length_text(0.9 * draped.layout.edge * sqrt(allowed / off[worst]))  # the error is of second order
+    edge = length_text(0.9 * draped.layout.longest_edge * sqrt(allowed / off[worst]))  # the error is of second order
     rod, (x, y, z) = trimmed.mesh.grid.rods[worst // 2].name, points[worst]
     return (
         f"{np.count_nonzero(off > allowed)} supports are off the end of the target, by up to {length_text(off[worst])} "
@@ -402,11 +407,11 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     np.minimum.at(first, grid.crossings.rods, grid.crossings.at)
     np.maximum.at(last, grid.crossings.rods, grid.crossings.at)
     tails = np.maximum(first - ends[:, 0], ends[:, 1] - last)
-    spacing = max(trimmed.draped.layout.spacing)
+    spacing = trimmed.draped.layout.most_spacing
     long, worst = int(np.count_nonzero(tails > LONG_TAIL * spacing)), int(np.argmax(tails))
     if not long:
         return ()
-    left = len(FlatGrid.of(grid.rods).crossings) - len(grid.crossings)
+    left = len(grid.meetings()) - len(grid.crossings)
     others = f" ({long} rods do so by more than {LONG_TAIL:g} spacings)" if long > 1 else ""
     near = f"no joint is made within {NEAREST_JOINT:g} spacings of a rod's end, here at {left} crossings"
     why = f": {near}" if left else ""

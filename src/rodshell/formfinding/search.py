@@ -9,7 +9,8 @@ import numpy as np
 
 from rodshell.errors import InputError, OutOfTimeError, RodshellError
 from rodshell.formfinding.pipeline import find_stages
-from rodshell.layout import GridLayout
+from rodshell.layout import GridLayout, Layout
+from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.net_ends import inside_nodes
 from rodshell.progress import Progress, require_progress, silent
@@ -73,7 +74,7 @@ class Search:
 
 def search(
     target: Target,
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     objective: Objective = "shear",
@@ -95,7 +96,8 @@ def search(
     InputError : no trial has a net; an unknown objective.
     """
     instance("target", target, Target)
-    instance("layout", layout, GridLayout)
+    instance("layout", layout, Layout)
+    require_chebyshev(layout, "searches for anchor or heading")
     instance("rod", rod, Rod)
     choice("objective", objective, get_args(Objective))
     require_progress(progress)

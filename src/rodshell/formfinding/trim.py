@@ -10,7 +10,7 @@ from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
-from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
 from rodshell.nets import chebyshev_net
 from rodshell.validation import array, finite, instance, whole
@@ -28,7 +28,7 @@ class Boundary:
     points : (2m, 3), start and end of each rod's own line in turn [m].
     tangents : (2m, 3) outward unit tangents of the draped rods there: the directions of clamps.
     draped : (n, 3) the state of the whole trimmed shell that has these ends, or None [m].
-    normals : (n, 3) of the surface at the draped nodes, where rods lie in layers; else None.
+    normals : (n, 3) of the surface at the draped nodes, where rods lie in layers or along its curves; else None.
     """
 
     points: Floats
@@ -111,7 +111,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     """
     instance("draped", draped, Draped, "what rodshell.drape returned")
     whole("fewest", fewest, 0)
-    margin = NEAREST_JOINT * min(draped.layout.spacing)
+    margin = NEAREST_JOINT * draped.layout.least_spacing
     rods, positions, dropped = draped.rods, draped.positions, list(draped.dropped)
     if isinstance(draped.method, Bound):
         source = draped.mesh
@@ -119,15 +119,16 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
         rods, lost = _cut_rods(draped)
         dropped += lost
         source, positions = _recut(draped, rods)
-    kept, swinging = FlatGrid.of(rods, margin=margin).without(lambda grid: grid.joint_counts() < fewest)
+    grid, _ = source.grid.cut(rods, margin=margin)
+    kept, swinging = grid.without(lambda grid: grid.joint_counts() < fewest)
     dropped += [(name, f"it has fewer than {fewest} joints and would swing") for name in swinging]
     if not kept.rods:
         raise InputError(
             f"no rod of the grid has {fewest} joints on the target: use a smaller spacing or a larger target"
         )
-    mesh, nodes = cut_mesh(source, kept)
+    mesh, nodes = cut_mesh(source, kept.rods, margin=margin)
     positions = positions.take(nodes, axis=0)
-    normals: Floats | None = None
+    normals = None if isinstance(draped.layout, GridLayout) else draped.target.on_surface(positions).normal
     if draped.eccentricity:
         bound = isinstance(draped.method, Bound)
         normals = draped.target.on_surface(positions).normal if bound else node_normals(mesh, positions)
@@ -171,6 +172,8 @@ def ends_past_net(trimmed: Trimmed) -> Floats | None:
     Of a bound drape, whose G0 is that of the net: how far the draped rods would. None where there is no such net.
     """
     draped, rods = trimmed.draped, trimmed.mesh.grid.rods
+    if not isinstance(draped.layout, GridLayout):
+        return None
     if draped.figures.net_deviation is not None:
         past = dict(zip([rod.name for rod in draped.rods], draped.figures.net_deviation, strict=True))
         return np.array([past[rod.name] for rod in rods])
@@ -253,7 +256,7 @@ def _crossing(draped: Draped, rod: int, before: int) -> float:
 
 def _recut(draped: Draped, rods: tuple[FlatRod, ...]) -> tuple[GridMesh, Floats]:
     """A mesh of the cut rods with their draped positions, its end nodes put on the target."""
-    mesh = mesh_grid(FlatGrid.of(rods), draped.layout.edge)
+    mesh = mesh_grid(FlatGrid.of(rods), draped.layout.longest_edge)
     names = {rod.name: k for k, rod in enumerate(draped.mesh.grid.rods)}
     positions = draped.mesh.prolong(draped.positions, mesh, rods=[names[rod.name] for rod in rods])
     ends = np.unique(mesh.ends)

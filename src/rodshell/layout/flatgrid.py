@@ -156,6 +156,15 @@ class Crossings:
     def __repr__(self) -> str:
         return f"Crossings({len(self)})"
 
+    def and_those(self, others: "Crossings") -> "Crossings":
+        """These and others of the same rods."""
+        return Crossings(np.concatenate([self.rods, others.rods]), np.concatenate([self.at, others.at]))
+
+    def between(self, kept: Bools) -> "Crossings":
+        """Those of the rods marked in `kept` (m,) among each other, numbered as if there were only these rods."""
+        index, pairs = np.cumsum(kept) - 1, self.select(np.asarray(kept[self.rods].all(axis=1)))
+        return Crossings(index[pairs.rods], pairs.at)
+
     def select(self, keep: Bools) -> "Crossings":
         """The crossings marked in `keep` (c,)."""
         return Crossings(self.rods.compress(keep, axis=0), self.at.compress(keep, axis=0))
@@ -167,12 +176,14 @@ class FlatGrid:
 
     Parameters
     ----------
-    rods : straight rods in the plane.
-    crossings : of these rods; not all places where lines cross need be joined.
+    rods : straight rods: in the plane, or, where `passed` is given, each for itself.
+    crossings : of these rods; not all places where rods cross need be joined.
+    passed : where rods cross without a joint, or would if they were longer; None: where their lines do.
     """
 
     rods: tuple[FlatRod, ...]
     crossings: Crossings
+    passed: Crossings | None = None
 
     @cached_property
     def ends(self) -> Floats:
@@ -210,6 +221,52 @@ class FlatGrid:
                 f"{rod.start:g} m and end {rod.end:g} m"
             )
         return FlatGrid(rods, Crossings(*_crossings(lines, margin)))
+
+    def meetings(self, beyond: float = 0.0) -> Crossings:
+        """Where rods cross, joined or not, or would if each were longer by `beyond` at both ends [m]."""
+        if self.passed is None:
+            return FlatGrid.of(self.rods, margin=-beyond).crossings
+        every = self.crossings.and_those(self.passed)
+        first, last = self.ends[every.rods].transpose(2, 0, 1)
+        near = (first - beyond <= every.at) & (every.at <= last + beyond)
+        return every.select(np.asarray(near.all(axis=1)))
+
+    def cut(self, pieces: Sequence[FlatRod], *, margin: float = 0.0) -> tuple["FlatGrid", Ints]:
+        """The grid of pieces of its rods, joined where these are; and which crossing (c,) of this grid each of its
+        crossings is.
+
+        Parameters
+        ----------
+        pieces : each a rod of the grid, or a piece of it.
+        margin : crossings closer to an end of either piece are left out [m].
+
+        Raises
+        ------
+        ValueError : a piece belongs to no rod.
+        """
+        whole, ends = whole_rods(self.rods, pieces), np.array([(piece.start, piece.end) for piece in pieces])
+        slack = margin - 1e-9 * np.diff(ends).ravel()  # a crossing exactly at an end is a joint at that end
+        low, high = ends[:, 0] + slack, ends[:, 1] - slack
+        every = self.crossings if self.passed is None else self.crossings.and_those(self.passed)
+        order = np.argsort(whole, kind="stable")
+        first = np.searchsorted(whole[order], np.arange(len(self.rods) + 1))
+        piece_of, inside = np.full(every.rods.shape, -1), np.zeros(every.rods.shape, dtype=bool)
+        for k in range(int(np.diff(first).max(initial=0))):  # the k-th piece of every rod
+            place = first[every.rods] + k
+            piece = order[np.minimum(place, len(order) - 1)]
+            known = place < first[every.rods + 1]
+            within = known & (low[piece] <= every.at) & (every.at <= high[piece])
+            piece_of = np.where(within | (known & ~inside), piece, piece_of)
+            inside |= within
+        joined = inside.all(axis=1) & (np.arange(len(every)) < len(self.crossings))
+        kept, left = np.flatnonzero(joined), ~joined & (piece_of >= 0).all(axis=1)
+        rods = piece_of[kept]
+        at = np.clip(every.at[kept], ends[rods, 0], ends[rods, 1])
+        turned = rods[:, 0] > rods[:, 1]
+        rods[turned], at[turned] = rods[turned, ::-1], at[turned, ::-1]
+        rows = np.lexsort((at[:, 0], rods[:, 1], rods[:, 0]))
+        passed = None if self.passed is None else Crossings(piece_of[left], every.at[left])
+        return FlatGrid(tuple(pieces), Crossings(rods[rows], at[rows]), passed), kept[rows]
 
     def __repr__(self) -> str:
         return f"FlatGrid({len(self.rods)} rods, {len(self.crossings)} crossings)"
@@ -295,10 +352,9 @@ class FlatGrid:
         grid, names = self, list[str]()
         while (out := leave_out(grid)).any():
             names += [rod.name for rod, gone in zip(grid.rods, out, strict=True) if gone]
-            index = np.cumsum(~out) - 1
-            kept = grid.crossings.select(np.logical_not(out[grid.crossings.rods].any(axis=1)))
             rods = tuple(rod for rod, gone in zip(grid.rods, out, strict=True) if not gone)
-            grid = FlatGrid(rods, Crossings(index[kept.rods], kept.at))
+            passed = None if grid.passed is None else grid.passed.between(~out)
+            grid = FlatGrid(rods, grid.crossings.between(~out), passed)
             if not rods:
                 break
         return grid, names

@@ -3,20 +3,20 @@
 from dataclasses import dataclass, fields, replace
 from math import degrees, pi
 from numbers import Real
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod, refuse_too_many
+from rodshell.layout.lattices import EDGES_A_SPAN, Asymptotic, Geodesic
 from rodshell.units import NUMBER
 from rodshell.validation import flag, instance, is_auto, number, numbers, positive, short, texts, whole
 
 Auto = Literal["auto"]
 
 FLATTEST = pi / 6 - 1e-9  # smallest crossing angle; and its supplement is the largest
-EDGES_A_SPAN = 6  # edges of the mesh per spacing, where the edge is "auto"
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,6 +54,8 @@ class GridLayout:
     left_out: tuple[str, ...] = ()
     crossing: float = pi / 2
     auto_edge: bool = False
+
+    kind: ClassVar[str] = "chebyshev"
 
     def __post_init__(self) -> None:
         for name in ("spacing", "offset"):
@@ -136,6 +138,21 @@ class GridLayout:
             rods, pair, length, longest, rotate, offset, left_out=left_out, crossing=crossing, auto_edge=auto
         )
 
+    @property
+    def least_spacing(self) -> float:
+        """The smaller spacing [m]."""
+        return min(self.spacing)
+
+    @property
+    def most_spacing(self) -> float:
+        """The larger spacing [m]."""
+        return max(self.spacing)
+
+    @property
+    def longest_edge(self) -> float:
+        """Of the mesh [m]."""
+        return self.edge
+
     def with_edges(self, a_span: int) -> "GridLayout":
         """The layout with so many edges to the smaller spacing, unless its edge was given."""
         edge = min(self.spacing) / whole("edges a span", a_span, 1)
@@ -183,7 +200,7 @@ class GridLayout:
     def parameters(self) -> dict[str, object]:
         """The layout in SI, as it is written in a case file."""
         keys = (key.name for key in fields(self) if key.name not in ("lines", "left_out", "auto_edge"))
-        return {key: getattr(self, key) for key in keys}
+        return {"kind": self.kind, **{key: getattr(self, key) for key in keys}}
 
     def flat_grid(self, counts: tuple[int, int], length: float) -> FlatGrid:
         """The rectangular grid before trimming.
@@ -247,3 +264,21 @@ def rod_names(family: Family, count: int) -> list[str]:
     """
     letter, digits = family.upper(), max(2, len(str(count)))
     return [letter + str(k + 1).zfill(digits) for k in range(count)]
+
+
+Layout = GridLayout | Geodesic | Asymptotic
+"""How the rods of a form are laid out: in the flat grid, or along curves of the target."""
+
+
+def require_chebyshev(layout: Layout, what: str) -> GridLayout:
+    """The layout, which must be of straight rods in the flat grid.
+
+    Raises
+    ------
+    InputError : it is another lattice, for which `what` is not offered.
+    """
+    if isinstance(layout, GridLayout):
+        return layout
+    raise InputError(
+        f'{what} need the lattice "chebyshev", not "{layout.kind}": leave them out, or set layout.kind to "chebyshev"'
+    )

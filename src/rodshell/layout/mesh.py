@@ -425,7 +425,7 @@ def _divided(lines, begin, s, nodes, edges, count):  # type: ignore[no-untyped-d
     return flat, rod_nodes, rod_start, stations
 
 
-def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
+def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float = 0.0) -> tuple[GridMesh, Ints]:
     """Cut a part out of a mesh.
 
     Where a joint of the mesh is not in the part, because it is too close to an end, each rod keeps its own node, unless
@@ -433,23 +433,17 @@ def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
 
     Parameters
     ----------
-    grid : pieces of its rods, cut at nodes, and their joints.
+    rods : pieces of its rods, cut at nodes.
+    margin : joints closer to an end of either rod are not in the part [m].
 
     Returns
     -------
     The part, and its nodes (n,) in `mesh`.
     """
-    rods, count = grid.rods, len(mesh.grid.rods)
+    grid, joints = mesh.grid.cut(rods, margin=margin)
     index = whole_rods(mesh.grid.rods, rods)
-    (a, b), (first, second) = index[grid.crossings.rods].T, mesh.grid.crossings.rods.T
-    pairs = count * np.minimum(a, b) + np.maximum(a, b)
-    known = np.append(count * first + second, -1)  # the last is not a pair: there may be none
-    order = np.argsort(known, kind="stable")
-    found = order[np.minimum(np.searchsorted(known, pairs, sorter=order), len(known) - 1)]
-    kept = known[found] == pairs
-    grid = FlatGrid(rods, grid.crossings.select(kept))
     spans, limits = spans_along(mesh, grid.ends, index), np.full(len(rods), CROWDED * mesh.edge_lengths.max())
-    source = spans, mesh.rod_nodes, mesh.stations, grid.crossings.rods, mesh.joint_nodes[found[kept]], mesh.node_count
+    source = spans, mesh.rod_nodes, mesh.stations, grid.crossings.rods, mesh.joint_nodes[joints], mesh.node_count
     nodes, *part, left_out = _cut(*source, limits)
     if left_out:
         nodes, *part, _ = _cut(*source, CROWDED * _usual_edges(mesh)[index])
@@ -584,7 +578,7 @@ def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
     lengths = np.diff(np.append(mesh.rod_start, len(mesh.rod_nodes)))
     return replace(
         mesh,
-        grid=FlatGrid(rods, crossings),
+        grid=FlatGrid(rods, crossings, mesh.grid.passed),
         flat=mesh.flat + np.append(shift, 0.0),
         stations=mesh.stations + np.repeat(along, lengths),
     )

@@ -163,7 +163,7 @@ def check_shells(
             structure = _locked(popped, ends, loads, stages)
             braced = structure.braced
             vibrations[ends] = structure.frequencies(loads.stability.modes)
-            nodes = LoadedNodes(popped.positions, structure.mass, areas, min(stages.layout.spacing))
+            nodes = LoadedNodes(popped.positions, structure.mass, areas, stages.layout.least_spacing)
             acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
             for name, load in acting.items():
                 said = partial(_said, progress, f"{name}, {ends} ends")
@@ -279,7 +279,7 @@ def tributary_of(stages: PatchForm | PatchedForm) -> Tributary:
         positions, anchor = stages.trimmed.positions, stages.draped.anchor or anchor
     else:
         positions = np.concatenate([patch.trimmed.positions for patch in stages.patches.values()])
-    return tributary_areas(stages.target, positions, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing))
+    return tributary_areas(stages.target, positions, anchor=anchor, rotate=layout.rotate, spacing=layout.least_spacing)
 
 
 def _load(structure: Structure, nodes: LoadedNodes, loads: Loads, factors: Mapping[str, float]) -> Load:

@@ -41,7 +41,7 @@ def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, comb
         raise InputError(f"{wish}: a shell is refined before its joints are locked: leave one out")
     popped = stages.popped[ends]
     mass = popped.shell.mass[: popped.shell.node_count, 2]
-    nodes = LoadedNodes(popped.positions, mass, tributary_of(stages), min(stages.layout.spacing))
+    nodes = LoadedNodes(popped.positions, mass, tributary_of(stages), stages.layout.least_spacing)
     weight, forces = 0.0, np.zeros((len(mass), 3))
     for name, factor in loads.combinations[combination].items():
         load = loads.loads[name]

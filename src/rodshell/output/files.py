@@ -287,12 +287,13 @@ def _rhino(content: Content) -> Files:
 
 
 def _png(content: Content) -> Files:
-    from rodshell.output.grid import shape_of
+    from rodshell.output.grid import shape_names, shape_of
     from rodshell.output.pictures import deployment_picture, picture
     from rodshell.output.png import drawing_png
 
     archive = content.archive
-    for name in ("flat", *((archive.final,) if archive.final else ())) if _meshed(archive) else []:
+    shown = [name for name in shape_names(archive) if name in ("flat", archive.final)]
+    for name in shown if _meshed(archive) else []:
         shape = shape_of(archive, name)
         if shape.gap is not None or shape.stress is None:
             yield f"pictures/{name}.png", drawing_png(picture(archive, name))

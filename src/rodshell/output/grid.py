@@ -1,7 +1,7 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -23,6 +23,7 @@ CAPTIONS = {
 }
 STAGE = "stage_"
 FEWEST = 3  # ends of an outline
+STRAIGHT = 1e-6  # of a rod's length, which it leaves its chord by: it is straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +33,12 @@ class GridRod:
     Parameters
     ----------
     record : what the result knows of it.
-    flat : (2, 2) x, y of its two ends in the flat state [m].
+    course : (k, 2) x, y of points along it in the flat state [m]: its two ends, or more where it bends there.
     nodes : (k,) its nodes in the states, from start to end; empty if the states do not hold them.
     """
 
     record: Rod
-    flat: Floats
+    course: Floats
     nodes: Ints
 
     @property
@@ -77,10 +78,32 @@ class GridRod:
         """Distance from the cut end of the start [m] of what lies at the distance `at` from the start."""
         return at + self.allowance
 
+    @property
+    def flat(self) -> Floats:
+        """(2, 2) x, y of its two ends in the flat state [m]."""
+        return self.course[[0, -1]]
+
+    @cached_property
+    def stations(self) -> Floats:
+        """(k,) distances of the points of its course from the start [m]."""
+        return along(self.course)
+
     def point(self, at: float) -> Floats:
-        """(2,) x, y [m] of the flat point at the distance `at` from the start."""
-        along = self.flat[1] - self.flat[0]
-        return np.asarray(self.flat[0] + at / np.linalg.norm(along) * along)
+        """(2,) x, y [m] of the flat point at the distance `at` from the start, which may lie beyond its ends."""
+        k = int(np.clip(np.searchsorted(self.stations, at) - 1, 0, len(self.stations) - 2))
+        (first, second), start = self.course[k : k + 2], self.stations[k]
+        return np.asarray(first + (at - start) / (self.stations[k + 1] - start) * (second - first))
+
+    @property
+    def as_cut(self) -> Floats:
+        """(k, 2) its course with its allowances at both ends [m]."""
+        ends = self.point(-self.allowance), self.point(self.length + self.allowance)
+        return np.vstack([ends[0], self.course[1:-1], ends[1]])
+
+
+def along(points: Floats) -> Floats:
+    """(k,) distances of points (k, d) of a polyline from its first, along it [m]."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
 
 
 @dataclass(frozen=True)
@@ -149,7 +172,7 @@ def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
     nodes = dict[str, list[int]]()
     if flat is None:
         return nodes
-    stations = [np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[:1]], axis=1) for rod in rods]
+    stations = [along(flat[rod.nodes]) for rod in rods]
     for joint in joints_of(rods):
         if all(len(rods[k].nodes) for k in joint.rods):
             pairs = zip(joint.rods, joint.at, strict=True)
@@ -171,14 +194,17 @@ def _nodes(archive: Archive) -> list[Ints]:
 
 def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
     if rod.family == "u" and rod.offset is not None:
-        ends = np.array([[rod.start, rod.offset], [rod.end, rod.offset]])
+        course = np.array([[rod.start, rod.offset], [rod.end, rod.offset]])
     elif rod.family == "v" and rod.offset is not None:
-        ends = np.array([[rod.offset, rod.start], [rod.offset, rod.end]])
+        course = np.array([[rod.offset, rod.start], [rod.offset, rod.end]])
     elif flat is not None and len(nodes):
-        ends = np.asarray(flat[nodes[[0, -1]], :2], dtype=np.float64)
+        course = np.asarray(flat[nodes, :2], dtype=np.float64)
+        chord, off = course[-1] - course[0], course - course[0]
+        if np.abs(off[:, 0] * chord[1] - off[:, 1] * chord[0]).max() < STRAIGHT * float(chord @ chord):
+            course = course[[0, -1]]
     else:
-        ends = np.array([[rod.start, 0.0], [rod.end, 0.0]])
-    return GridRod(rod, ends, nodes)
+        course = np.array([[rod.start, 0.0], [rod.end, 0.0]])
+    return GridRod(rod, course, nodes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,8 +236,14 @@ class Shape:
 def shape_names(archive: Archive) -> list[str]:
     """All shapes, in the order of the deployment."""
     stages = [f"{STAGE}{k}" for k in range(1, len(archive.states.get("history_share", ())) - 1)]
-    states = archive.states
-    return [name for name in ("flat", *stages, *SHELLS) if name.startswith(STAGE) or name in states]
+    states, flat = archive.states, ("flat",) if lies_flat(archive) else ()
+    return [name for name in (*flat, *stages, *SHELLS) if name.startswith(STAGE) or name in states]
+
+
+def lies_flat(archive: Archive) -> bool:
+    """Whether there is a flat grid to be drawn; else the shell is assembled in place."""
+    flat = archive.results.flat_state
+    return flat is None or flat.lies_flat is not False
 
 
 def caption_of(archive: Archive, state: str) -> str:

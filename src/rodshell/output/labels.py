@@ -266,6 +266,11 @@ def _on_own_line(text: str, end: Floats, other: Floats, size: float) -> Iterable
         yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2)
 
 
+def segments(course: Floats) -> Floats:
+    """(k - 1, 2, 2) the lines of a polyline (k, 2)."""
+    return np.stack([course[:-1], course[1:]], axis=1)
+
+
 def closed_segments(outline: Floats) -> Floats:
     """(k, 2, 2) the lines of a closed curve (k, 2)."""
     return np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)

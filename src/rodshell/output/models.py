@@ -185,12 +185,12 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
         return result
 
     mm = plan.rounding.mm
-    for rod, cut in zip(plan.rods, plan.cuts, strict=True):
+    for rod, course in zip(plan.rods, plan.courses, strict=True):
         figures = {"length_mm": mm(rod.length), "cut_length_mm": mm(rod.cut_length)}
         joints = " ".join(f"{other}:{mm(rod.from_cut_end(at))}" for other, at in rod.joints)
         figures |= {"layer": str(rod.record.layer), "joints_from_cut_end_mm": joints}
-        (x0, y0), (x1, y1) = cut.tolist()
-        model.Objects.AddLine(r.Point3d(x0, y0, 0.0), r.Point3d(x1, y1, 0.0), about("CUT", rod.id, figures))
+        flat = polyline(np.column_stack([course, np.zeros(len(course))]))
+        model.Objects.AddPolyline(flat, about("CUT", rod.id, figures))
         if archive.final and len(rod.nodes) > 1:
             curve = 1e3 * archive.states[archive.final][rod.nodes]
             model.Objects.AddPolyline(polyline(curve), about("FINAL", rod.id, figures))

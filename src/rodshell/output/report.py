@@ -18,7 +18,7 @@ from rodshell.figures.records import Ends, Record
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
-from rodshell.output.grid import CAPTIONS, caption_of
+from rodshell.output.grid import CAPTIONS, caption_of, shape_names
 from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
 from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
@@ -68,7 +68,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
     results, tables = archive.results, _tables(archive)
-    states = [state for state in CAPTIONS if state in archive.states and "rod_nodes" in archive.states]
+    states = [name for name in shape_names(archive) if name in CAPTIONS and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
         name=archive.name,
         note=NOTE,
@@ -86,7 +86,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         loads=loads_page(archive),
         figures=key_figures(results, plan),
         levels=levels_table(results),
-        plan=shown(_on_page(files["plan"])),
+        plan=shown(_on_page(files["plan"])) if "plan" in files else "",
         drawings=[(drawings[name].title, shown(_on_page(files[name]))) for name in IN_PAGE if name in drawings],
         tables=[
             (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables

@@ -22,6 +22,7 @@ from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
 from rodshell.layout.flatgrid import Family
+from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.layout.mesh import CROWDED
 from rodshell.paper.figure import ROD
 from rodshell.paper.genetic_records import GAIN, Evaluate, Generation, Judged, StoredValues, gain
@@ -77,7 +78,7 @@ class Design:
         # rounded, so that a search does not depend on the last digits of the direct result
         lower, upper = (np.round(np.bincount(orbit, bound) / count, MICRON) for bound in (taut, taut + high))
         boundary = Boundary(points, direct.trimmed.boundary.tangents)
-        return Design(target, direct.layout, lines, boundary, orbit, lower, upper)
+        return Design(target, require_chebyshev(direct.layout, "searches"), lines, boundary, orbit, lower, upper)
 
     def footprint(self, variables: Floats) -> Footprint:
         """The flat grid of `variables` (n,), meshed as by the direct method: a node at every line of the lattice."""

@@ -19,6 +19,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Draped, Fall, Gravity, drape, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
+from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.nets import chebyshev_net
 from rodshell.paper.figure import EDGE, HEIGHT, LENGTH, ROD, Chart, Figure, Series, charts_svg
 from rodshell.progress import Progress
@@ -180,7 +181,8 @@ def _line(changed: str, value: str, factor: float, base: Draped, run: Callable[[
     except InputError:  # no rod has three joints on the target
         nothing = float("nan")
         return Line(changed, value, factor, on, nothing, nothing, nothing, nothing, "does not cover the target")
-    first, net = _ends(base), {rod.name: (rod.start, rod.end) for rod in chebyshev_net(TARGET, draped.layout).rods}
+    layout = require_chebyshev(draped.layout, "studies")
+    first, net = _ends(base), {rod.name: (rod.start, rod.end) for rod in chebyshev_net(TARGET, layout).rods}
     change, report = _apart(ends, first), draped.report
     return Line(
         changed, value, factor, on, _rms(change), float(np.abs(change).max()), _rms(_apart(ends, net)),

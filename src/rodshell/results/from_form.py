@@ -268,7 +268,7 @@ def _drape_of_all(parts: list[Drape]) -> Drape:
 
 def _without_joint(grid: FlatGrid) -> int:
     """At how many crossings the rods have no joint."""
-    return len(FlatGrid.of(grid.rods).crossings) - len(grid.crossings)
+    return len(grid.meetings()) - len(grid.crossings)
 
 
 def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, str]], kind: RodModel) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from rodshell.figures.form import (
     Agreement,
     Drape,
     Dropped,
+    FlatState,
     Joint,
     Layout,
     Net,
@@ -146,6 +147,7 @@ class Results(Record, metaclass=_Refusing):
     rods: Rows[Rod] = rows("the rods, cut to their supports")
     crossings_without_joint: Whole | None = key("where rods pass each other too near to an end for a joint, a count")
     dropped: Rows[Dropped] = rows("rods of the layout that are not part of the grid")
+    flat_state: FlatState | None = key("the rods in the plane, where that is not a straight lattice")
     footprint: Rows[Flat] = rows("flat place of each rod's start and end in turn", "m")
     boundary: Rows[Point] = rows("place in space of each rod's start and end in turn", "m")
     end_tangents: Rows[Point] = rows("direction in which each of these rod ends points out of the shell")

@@ -104,8 +104,8 @@ def verdict(results: Results) -> Verdict:
     if in_doubt:
         return _verdict("unknown", [*in_doubt, *to_check])
     if to_check:
-        return _verdict("check", [*to_check, *_perfect(results)])
-    return _verdict("good", [*_merits(results, usable), *_perfect(results)])
+        return _verdict("check", [*to_check, *_flat(results), *_perfect(results)])
+    return _verdict("good", [*_merits(results, usable), *_flat(results), *_perfect(results)])
 
 
 def unknown_below(results: Results) -> float:
@@ -398,7 +398,9 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[Said]:
     """Whether the deployment was checked; what was found there is among a result's warnings."""
-    deployment = results.deployment
+    deployment, flat = results.deployment, results.flat_state
+    if flat is not None and not flat.lies_flat:
+        return  # it is assembled in place
     if not deployment:
         remedy = "" if late else ": this needs pinned ends (pop_up.ends) and checks.stages above 0"
         failed = _status(results.pop_up.get("pinned")) != CONVERGED
@@ -423,6 +425,14 @@ def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
         if ends in usable and near:
             distance, energy = min(near, key=lambda pair: pair[0])
             yield said("other_shape", ends, distance, NEAR, distance=percent(distance), energy=rounded(energy))
+
+
+def _flat(results: Results) -> Iterator[Said]:
+    """Whether rods along curves of the target can be laid out flat, which decides how the shell is erected."""
+    if flat := results.flat_state:
+        strain, limit = flat.in_plane_strain or 0.0, flat.limit or 0.0
+        sentence = "lies_flat" if flat.lies_flat else "in_place" if strain > limit else "in_place: unstable"
+        yield said(sentence, None, strain, limit, bent=percent(strain), withstood=percent(limit))
 
 
 def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:

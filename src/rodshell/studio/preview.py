@@ -104,8 +104,8 @@ def figures(form: "Form") -> Figures:
     """Figures of a form in words, by their names."""
     rods, rounding = form.footprint.rods, rounding_of(form)
     stages = form.stages
-    nets = [laid.net for laid in stages.patch_nets.values()] if isinstance(stages, PatchedForm) else [stages.draped.net]
-    angles = [net.min_angle for net in nets if net is not None]
+    patches = stages.patches.values() if isinstance(stages, PatchedForm) else [stages]
+    angles = [patch.draped.figures.min_angle for patch in patches]
     return lengths([rod.length for rod in rods], rounding) + [
         *(("smallest angle between rods", wording.degrees(degrees(min(angles)))) for _ in angles[:1]),
         *(gap(ends, found.max, found.max_relative, rounding) for ends, found in form.agreement.items()),
@@ -131,7 +131,9 @@ def rounding_of(form: "Form") -> wording.Rounding:
 
 
 def plan(form: "Form") -> list[dict[str, Any]]:
-    """The flat grid: rods by name with both ends (x, y) and the cut length [m]."""
+    """The flat grid: rods by name with both ends (x, y) and the cut length [m]; empty if the rods do not lie flat."""
+    if (flat := form.flat_state) is not None and not flat.lies_flat:
+        return []
     mesh, allowance = form.footprint.mesh, form.options.fabrication.end_allowance
     ends = mesh.flat[mesh.ends.ravel(), :2].reshape(-1, 4).tolist()
     return [

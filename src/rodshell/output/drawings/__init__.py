@@ -24,6 +24,7 @@ from rodshell.output.drawings.shell import (
     rod_curves,
     supports_drawing,
 )
+from rodshell.output.grid import lies_flat
 from rodshell.output.schedules import (
     bracing_table,
     joints_table,
@@ -49,7 +50,8 @@ def drawing_set(archive: Archive) -> dict[str, Drawing]:
     plan = flat_plan(archive)
     block = title_block(archive, plan.summary)
     drawings = {name: layout.detail for name, layout in _layouts(archive).items()}
-    first = {"plan": drawings.pop("plan"), "strips": strips_drawing(plan, plan.text)}
+    first = {"plan": drawings.pop("plan")} if "plan" in drawings else {}
+    first["strips"] = strips_drawing(plan, plan.text)
     return {name: with_title(drawing, block) for name, drawing in (first | drawings).items()}
 
 
@@ -57,7 +59,8 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
     """All sheets in mm of paper, and the paper's size."""
     results, plan, paper = archive.results, flat_plan(archive), _paper(archive)
     layouts, checked = dict(_layouts(archive)), _checked(results)
-    sheets = [*layouts.pop("plan").sheets(paper), *_strips(plan, paper)]
+    first = layouts.pop("plan").sheets(paper) if "plan" in layouts else ()
+    sheets = [*first, *_strips(plan, paper)]
     for name, layout in layouts.items():
         sheets += layout.sheets(paper)
         if name == "supports":
@@ -98,7 +101,9 @@ def _layouts(archive: Archive) -> dict[str, Layout]:
         return flat_drawing(plan, text)
 
     extent = np.ptp(np.concatenate([plan.cuts.reshape(-1, 2), *plan.footprint]), axis=0)
-    layouts = {"plan": laid_out(of_the_plan, extent, paper, plan.text, true_size=True)}
+    layouts = dict[str, Layout]()
+    if lies_flat(archive):
+        layouts["plan"] = laid_out(of_the_plan, extent, paper, plan.text, true_size=True)
     for name, (compose, extent) in _of_the_shell(archive, plan).items():
         layouts[name] = laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
     return layouts

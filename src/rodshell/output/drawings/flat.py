@@ -16,7 +16,7 @@ from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
 from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
-from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, spread, take
+from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, segments, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
 from rodshell.results.archive import made_once
@@ -47,6 +47,7 @@ class FlatPlan:
     rods, joints : as in the result [m].
     lines : (r, 2, 2) start and end of each rod on the footprint [mm].
     cuts : (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
+    courses : (k, 2) of each rod along it, from cut to cut [mm].
     marks : (c, 2) the joints, in the order of `joints` [mm].
     footprint : closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
     boundary : closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if they
@@ -60,6 +61,7 @@ class FlatPlan:
     joints: list[GridJoint]
     lines: Floats
     cuts: Floats
+    courses: list[Floats]
     marks: Floats
     footprint: list[Floats]
     boundary: list[Floats]
@@ -124,13 +126,14 @@ def flat_plan(archive: Archive) -> FlatPlan:
     rods = rods_of(archive)
     joints = joints_of(rods)
     lines = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
-    cuts = np.array([[rod.point(-rod.allowance), rod.point(rod.length + rod.allowance)] for rod in rods])
+    courses = [1e3 * rod.as_cut for rod in rods]
+    cuts = np.array([course[[0, -1]] for course in courses]).reshape(-1, 2, 2)
     marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
     footprint = np.array(archive.results.footprint or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
     boundary = np.array(archive.results.boundary, dtype=float).reshape(-1, 3)
     loops = outlines_of(rods)
     return FlatPlan(
-        archive.name, rods, joints, 1e3 * lines, 1e3 * cuts.reshape(-1, 2, 2), 1e3 * marks,
+        archive.name, rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks,
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
         rounding_of(archive.results), laths_text(archive.results),
@@ -150,7 +153,8 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     for outline in plan.boundary:
         pencil.line(outline, "BOUNDARY-FINAL", closed=True)
     _rods(pencil, plan, text)
-    lines, across = np.concatenate([plan.cuts, *map(closed_segments, plan.footprint)]), plan.across
+    lines = np.concatenate([*map(segments, plan.courses), *map(closed_segments, plan.footprint)])
+    across = plan.across
     _labels(pencil, plan, text, lines)
     room = _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
     for a, b in across:
@@ -161,7 +165,7 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
 
 def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     """Each rod as cut; a dot at the cut end from which its joints are measured, a tick where it is held."""
-    for rod, cut, line in zip(plan.rods, plan.cuts, plan.lines, strict=True):
+    for rod, cut, line in zip(plan.rods, plan.courses, plan.lines, strict=True):
         pen = Pen(FAMILY.get(rod.family, INK), ROD * text)
         pencil.line(cut, "CUT", pen=pen, name=rod.id, note=f"{rod.id}: {plan.rounding.mm(rod.cut_length)} mm")
         pencil.mark(cut[0], min(0.2 * text, 0.08 * plan.spacing), "DIM", pen=Pen(INK, 0.0, fill=INK))

@@ -18,7 +18,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
-from rodshell.output.grid import GridJoint, GridRod, Shape, joints_of, laid_out, rods_of, shape_names, shape_of
+from rodshell.output.grid import GridJoint, GridRod, Shape, along, joints_of, laid_out, rods_of, shape_names, shape_of
 from rodshell.output.models import section_outline, widths_along
 from rodshell.output.pictures import FAMILIES
 from rodshell.output.schedules import Table, heading, joints_table, rods_table
@@ -240,7 +240,7 @@ def _drawn_joints(archive: Archive, rods: list[GridRod]) -> list[tuple[GridJoint
         return []
     starts = np.cumsum([0, *(len(rod.nodes) for rod in rods)])
     flat = archive.states["flat"]
-    stations = [np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[0]], axis=1) for rod in rods]
+    stations = [along(flat[rod.nodes]) for rod in rods]
     found = []
     for joint in joints_of(rods):
         pairs = zip(joint.rods, joint.at, strict=True)

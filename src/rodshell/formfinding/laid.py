@@ -1,0 +1,140 @@
+"""Rods laid on a target along its curves, and the flat state in which their arc lengths fit.
+
+No solve is needed to lay them: each rod lies on its curve. In the plane they find the state of least bending that keeps
+all arc lengths. There laths that lie flat bend about their strong axes; the strain of that says whether the grid can be
+assembled flat, or only in place.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rodshell.arrays import Floats
+from rodshell.errors import InputError
+from rodshell.formfinding.finite_sections import rod_breadth
+from rodshell.formfinding.methods import Bound, Draped, DrapeFigures, FlatState
+from rodshell.geometry.frames import unit
+from rodshell.joints import Joint
+from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout.flatgrid import Crossings
+from rodshell.layout.lattices import Asymptotic, Geodesic
+from rodshell.model.assembly import Freedom
+from rodshell.nets.surface_lattice import SurfaceNet, surface_net
+from rodshell.progress import Progress, silent
+from rodshell.rods.elements import Stretch
+from rodshell.rods.isotropic import IsotropicBend
+from rodshell.rods.section import Rod
+from rodshell.solve.equilibrium import SolveReport, Status, find_stable
+from rodshell.solve.problem import Problem, Supports
+from rodshell.targets import Target
+from rodshell.units import shown
+
+MOST_ITERATIONS = 200  # of the flat state: from the plan of a steep shell it takes some hundred
+PENALTY = 8e4  # stiffness of the edges against that of bending over the size, as of a bound drape
+LETTERS = "UVW"  # of the families
+
+
+def lay(
+    target: Target,
+    lattice: Geodesic | Asymptotic,
+    rod: Rod,
+    *,
+    anchor: tuple[float, float] | None = None,
+    joint: Joint | None = None,
+    progress: Progress = silent,
+) -> Draped:
+    """Lay the rods of a lattice on a target along its curves; see `drape`.
+
+    Parameters
+    ----------
+    anchor : x, y of the point of the target from which the rods are set out [m]; default: its highest point.
+
+    Raises
+    ------
+    NetLimitError : a curve does not reach the end of the target, or there is none; names the place.
+    InputError : no two rods cross; the joints are eccentric.
+    """
+    if joint is not None and joint.eccentricity:
+        raise InputError(
+            f'joints with an eccentricity need two layers of rods, which a lattice "{lattice.kind}" does not have: set '
+            'the eccentricity to 0, or use lattice "chebyshev"'
+        )
+    lattice = lattice.build(target)
+    progress("net", f"following {lattice.kind} curves", 0.0)
+    net = surface_net(target, lattice, anchor=anchor)
+    mesh, positions = _meshed(net)
+    flat = flat_state(mesh, positions, rod, progress=progress)
+    mesh = replace(mesh, flat=np.column_stack([flat.positions, np.zeros(mesh.node_count)]))
+    angle, place = net.smallest_angle
+    value, gradient = target.level(positions)
+    figures = DrapeFigures(
+        max_gap=float(np.abs(value / np.linalg.norm(gradient, axis=1)).max()),
+        contact_pulls=0,
+        min_angle=angle,
+        min_angle_at=place,
+    )
+    report = SolveReport(Status.CONVERGED, 0, 0, 0, 0.0, 0.0, 0.0, 0)
+    return Draped(
+        method=Bound(), target=target, layout=lattice, rod=rod, anchor=anchor, eccentricity=0.0, mesh=mesh,
+        positions=positions, rods=_built(mesh.grid.rods, lattice), levels=(report,), figures=figures, flat_state=flat,
+        warnings=target.warnings,
+    )  # fmt: skip
+
+
+def _built(rods: tuple[FlatRod, ...], lattice: Geodesic | Asymptotic) -> tuple[FlatRod, ...]:
+    """The rods but those that the lattice leaves out."""
+    if unknown := set(lattice.left_out) - {rod.name for rod in rods}:
+        raise InputError(
+            f"layout left_out has {shown(min(unknown))}, which is not the name of a rod on the target: these are "
+            f"{rods[0].name} to {rods[-1].name}"
+        )
+    return tuple(rod for rod in rods if rod.name not in lattice.left_out)
+
+
+def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
+    """The mesh of the rods of a net, side by side in the flat state, and its nodes (n, 3) on the target [m]."""
+    curves, lattice = net.curves, net.lattice
+    ends = curves.ends - curves.ends[:, :1]
+    rods, number = list[FlatRod](), dict[int, int]()
+    for (_, length), family in zip(ends.tolist(), net.family.tolist(), strict=True):
+        number[family] = number.get(family, 0) + 1
+        name, row = f"{LETTERS[family]}{number[family]:02d}", lattice.least_spacing * len(rods)
+        rods.append(FlatRod(name, "free", 0.0, 0.0, length, (0.0, row), (1.0, 0.0)))
+    joined, passed = (Crossings(c.rods, c.at - curves.ends[c.rods, 0]) for c in (net.crossings, net.beyond))
+    mesh = mesh_grid(FlatGrid(tuple(rods), joined, passed), lattice.longest_edge)
+    positions = np.empty((mesh.node_count, 3))
+    positions[mesh.rod_nodes] = curves.at(mesh.rod_of, curves.ends[mesh.rod_of, 0] + mesh.stations)[0]
+    return mesh, positions
+
+
+def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progress = silent) -> FlatState:
+    """The state of least bending in the plane that keeps the rods' lengths and joints.
+
+    Parameters
+    ----------
+    positions : (n, 3) of the mesh's nodes on the target [m], from whose plan the search starts.
+    """
+    start = positions * [1.0, 1.0, 0.0]
+    chords = np.linalg.norm(np.diff(start[mesh.edges], axis=1)[:, 0], axis=1)
+    start *= mesh.edge_lengths.sum() / chords.sum()
+    size, plane = float(np.abs(start - start.mean(axis=0)).max()), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    first, second = mesh.edges[np.argmin(np.linalg.norm(start[mesh.edges].mean(axis=1) - start.mean(axis=0), axis=1))]
+    along = unit(start[second] - start[first])
+    free = Freedom.free(mesh.node_count).with_directions(np.arange(mesh.node_count), *plane)
+    free = free.with_directions(np.array([first])).with_directions(np.array([second]), tuple(along.tolist()))
+    weight = PENALTY * (size / float(mesh.edge_lengths.mean())) ** 2 / size**2
+    bends = IsotropicBend(mesh.bends, 1.0 / mesh.voronoi_lengths)
+    problem = Problem(
+        elements=(bends,),
+        stretch=Stretch.elastic(mesh.edges, mesh.edge_lengths, np.full(len(mesh.edges), weight)),
+        constraint=Supports(free),
+        length=size,
+        inextensible=True,
+        flat_coordinates=start[:, :2],
+    )
+    found = find_stable(
+        problem, start, np.zeros(len(mesh.edges)), limit_steps=True, most_iterations=MOST_ITERATIONS,
+        progress=lambda k, step: progress("drape", f"flat state, iteration {k} of at most {MOST_ITERATIONS}", step),
+    )  # fmt: skip
+    curvature = bends.curvatures(found.state) / mesh.voronoi_lengths
+    return FlatState(found.state[:, :2], 0.5 * rod_breadth(rod) * float(curvature.max(initial=0.0)), found.report)

@@ -1,0 +1,237 @@
+"""Geodesics and asymptotic lines of a target, from end to end, and where such curves cross.
+
+A lath that lies flat on a surface follows a geodesic: it does not bend in its strong direction, and is straight when
+developed [Pottmann et al. 2010, Geodesic patterns]. A strip that stands upright follows an asymptotic line, along which
+the surface has no normal curvature: two lead through each point where K < 0, none where K > 0 [Schling et al. 2018,
+Designing grid structures using asymptotic curve networks].
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.spatial import cKDTree
+
+from rodshell.arrays import Floats, Ints
+from rodshell.errors import NetLimitError
+from rodshell.geometry.frames import cross, dot, unit
+from rodshell.layout.flatgrid import Crossings
+from rodshell.targets import Target
+
+STEP = 0.02  # of the size, between knots
+ACCURACY = 1e-11  # of one step, relative to the size
+LONGEST = 20.0  # sizes that a curve may go without reaching the end
+NEWTON_STEPS = 30
+MET = 1e-4  # steps between curves at a crossing: between their knots both leave the surface by less
+
+Law = Callable[[Target, Floats, Floats], tuple[Floats, Floats]]
+"""How curves of a target continue at points (n, 3) that they reach with unit tangents (n, 3): the tangents asked for
+there, and their rates [1/m], which are 0 where the tangents follow from the points."""
+
+
+def geodesic(target: Target, x: Floats, tangents: Floats) -> tuple[Floats, Floats]:
+    """The `Law` of curves without curvature in the tangent plane: x'' = -(t H t / |g|^2) g."""
+    _, gradient, hessian = target.implicit(x)
+    bent = np.einsum("ni,nij,nj->n", tangents, hessian, tangents) / dot(gradient, gradient)
+    return tangents, -bent[:, None] * gradient
+
+
+def asymptotic(target: Target, x: Floats, tangents: Floats) -> tuple[Floats, Floats]:
+    """The `Law` of curves without normal curvature: of both directions the one nearest to the last.
+
+    Raises
+    ------
+    NetLimitError : there is none, since K >= 0; names the place.
+    """
+    _, gradient, hessian = target.implicit(x)
+    normal = unit(gradient)
+    along = unit(tangents - dot(tangents, normal)[:, None] * normal)
+    across = cross(normal, along)
+    pairs = (along, along), (along, across), (across, across)
+    a, b, c = (np.einsum("ni,nij,nj->n", left, hessian, right) for left, right in pairs)
+    square = b * b - a * c
+    if not (square > 0.0).all():
+        px, py, pz = x[int(np.argmin(square))]
+        raise NetLimitError(
+            f"the target has no asymptotic lines at ({px:.4g}, {py:.4g}, {pz:.4g}) m, where it is not a saddle: "
+            "they need negative Gaussian curvature everywhere"
+        )
+    slope = -a / (b + np.copysign(np.sqrt(square), b))  # the smaller root of a + 2 b q + c q^2 = 0
+    return unit(along + slope[:, None] * across), np.zeros_like(along)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceCurves:
+    """Curves on a target by arc length, with s = 0 at their seeds, as quintics between knots at multiples of a step.
+
+    Parameters
+    ----------
+    step : between knots [m].
+    begin : (m + 1,) where the knots of each curve begin.
+    before : (m,) knots of each curve before its seed.
+    points, tangents : (k, 3) of the knots, the tangents of length 1.
+    ends : (m, 2) s at which the target begins and ends on each curve [m].
+    """
+
+    target: Target
+    step: float
+    begin: Ints
+    before: Ints
+    points: Floats
+    tangents: Floats
+    ends: Floats
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    def __repr__(self) -> str:
+        return f"SurfaceCurves({len(self)} on {self.target})"
+
+    def at(self, curve: Ints, s: Floats) -> tuple[Floats, Floats]:
+        """Points (n, 3) [m] and unit tangents (n, 3) of curves.
+
+        Parameters
+        ----------
+        curve : (n,) indices of curves.
+        s : (n,) arc lengths on them [m].
+        """
+        place = s / self.step + self.before[curve]
+        last = self.begin[curve + 1] - self.begin[curve] - 2
+        interval = np.clip(np.floor(place).astype(np.intp), 0, last)
+        t = (place - interval)[:, None]
+        k, h = self.begin[curve] + interval, self.step
+        start, first, second = self.points[k], h * self.tangents[k], 0.5 * h * h * self.bends[k]
+        rise = self.points[k + 1] - start - first - second  # what is left to the powers 3 to 5 at the next knot
+        turn = h * self.tangents[k + 1] - first - 2 * second
+        bend = h * h * self.bends[k + 1] - 2 * second
+        third, fourth = 10 * rise - 4 * turn + 0.5 * bend, -15 * rise + 7 * turn - bend
+        fifth = 6 * rise - 3 * turn + 0.5 * bend
+        points = start + t * (first + t * (second + t * (third + t * (fourth + t * fifth))))
+        slopes = first + t * (2 * second + t * (3 * third + t * (4 * fourth + t * 5 * fifth)))
+        return points, unit(slopes)
+
+    @cached_property
+    def bends(self) -> Floats:
+        """(k, 3) second derivatives at the knots [1/m], to fourth order; each curve has three knots or more."""
+        x, t, h = self.points, self.tangents, self.step
+        result = np.empty_like(x)
+        result[1:-1] = 2 * (x[2:] - 2 * x[1:-1] + x[:-2]) / h**2 - (t[2:] - t[:-2]) / (2 * h)
+        for k, inward in ((self.begin[:-1], 1), (self.begin[1:] - 1, -1)):
+            near, far = k + inward, k + 2 * inward
+            result[k] = (16 * x[near] + 7 * x[far] - 23 * x[k]) / (2 * h**2)
+            result[k] -= inward * (6 * t[k] + 8 * t[near] + t[far]) / h
+        return result
+
+    def crossings(self, family: Ints) -> Crossings:
+        """Where curves of different families cross, between their ends and up to a step beyond.
+
+        Parameters
+        ----------
+        family : (m,) of each curve.
+        """
+        curve = np.repeat(np.arange(len(self)), np.diff(self.begin))
+        s = self.step * (np.arange(len(self.points)) - (self.begin[:-1] + self.before)[curve])
+        near = cKDTree(self.points).query_pairs(1.01 * self.step, output_type="ndarray")
+        of = curve[near]
+        near = np.where((of[:, 0] < of[:, 1])[:, None], near, near[:, ::-1])
+        pairs = near[family[of[:, 0]] != family[of[:, 1]]]
+        a, b = curve[pairs].T
+        at = s[pairs]
+        for _ in range(NEWTON_STEPS):
+            (p, along), (q, across) = self.at(a, at[:, 0]), self.at(b, at[:, 1])
+            apart, mixed = q - p, dot(along, across)
+            sine = np.maximum(1.0 - mixed * mixed, 1e-12)
+            by_a, by_b = dot(apart, along), dot(apart, across)
+            change = np.column_stack([by_a - mixed * by_b, mixed * by_a - by_b]) / sine[:, None]
+            at = at + np.clip(change, -self.step, self.step)
+        (p, _), (q, _) = self.at(a, at[:, 0]), self.at(b, at[:, 1])
+        low = -self.step * self.before
+        high = low + self.step * (np.diff(self.begin) - 1)
+        met = np.linalg.norm(p - q, axis=1) < MET * self.step
+        for side, each in enumerate((a, b)):
+            met &= (at[:, side] >= low[each]) & (at[:, side] <= high[each])
+        rods, at = np.column_stack([a, b])[met], at[met]
+        order = np.lexsort((at[:, 0], rods[:, 1], rods[:, 0]))
+        rods, at = rods[order], at[order]
+        new = (np.diff(rods, axis=0) != 0).any(axis=1) | (np.diff(at[:, 0]) > MET * self.step)
+        kept = np.append(np.ones(min(len(at), 1), dtype=bool), new)
+        return Crossings(rods[kept], at[kept])
+
+
+def trace(target: Target, law: Law, seeds: Floats, tangents: Floats) -> SurfaceCurves:
+    """Follow curves both ways from their seeds to the end of the target, all at once.
+
+    Parameters
+    ----------
+    law : of the curves, `geodesic` or `asymptotic`.
+    seeds : (m, 3) points of the target inside its end [m].
+    tangents : (m, 3) unit tangents there.
+
+    Raises
+    ------
+    NetLimitError : a curve does not reach the end, or cannot be continued; names the place.
+    """
+    step, count = STEP * target.size, len(seeds)
+    x, t = np.tile(seeds, (2, 1)), np.vstack([tangents, -tangents])
+    t = law(target, x, t)[0]
+    knots = [(np.arange(2 * count), x, t)]
+    going = np.arange(2 * count)
+    tolerance = ACCURACY * np.concatenate([np.full(x.size, target.size), np.ones(x.size)])
+    for _ in range(int(LONGEST / STEP)):
+
+        def rates(_: float, state: Floats, half: int = 3 * len(going)) -> Floats:
+            ahead, turning = law(target, state[:half].reshape(-1, 3), state[half:].reshape(-1, 3))
+            return np.concatenate([ahead.ravel(), turning.ravel()])
+
+        start = np.concatenate([x.ravel(), t.ravel()])
+        found = solve_ivp(
+            rates, (0.0, step), start, method="DOP853", rtol=1e-13, atol=tolerance[: len(start)], first_step=step
+        )
+        x, t = found.y[:, -1].reshape(2, -1, 3)
+        x = target.retract(x)
+        t = law(target, x, t)[0]
+        normal = target.on_surface(x).normal
+        t = unit(t - dot(t, normal)[:, None] * normal)
+        knots.append((going, x, t))
+        margin = target.margin(x)
+        if not np.isfinite(x).all() or not np.isfinite(margin).all():
+            raise NetLimitError("a curve cannot be continued to the end of the target")
+        left = margin > 0.0
+        going, x, t = going[left], x[left], t[left]
+        if len(going) == 0:
+            return _joined(target, step, count, knots)
+    px, py, pz = x[0]
+    raise NetLimitError(
+        f"a curve through ({px:.4g}, {py:.4g}, {pz:.4g}) m does not reach the end of the target within "
+        f"{LONGEST:g} times its size"
+    )
+
+
+def _joined(target: Target, step: float, count: int, knots: list[tuple[Ints, Floats, Floats]]) -> SurfaceCurves:
+    """The curves of which both arms, k and k + count, have these `knots`, one after the other."""
+    arm, number = (
+        np.concatenate([rows for rows, _, _ in knots]),
+        np.repeat(np.arange(len(knots)), [len(k[0]) for k in knots]),
+    )
+    points, tangents = (np.concatenate([knot[k] for knot in knots]) for k in (1, 2))
+    back = arm >= count
+    kept = ~(back & (number == 0))  # the seed is the first knot of both
+    curve, place = (arm % count)[kept], np.where(back, -number, number)[kept]
+    points, tangents = points[kept], np.where(back[:, None], -tangents, tangents)[kept]
+    order = np.lexsort((place, curve))
+    begin = np.searchsorted(curve[order], np.arange(count + 1))
+    before = -place[order][begin[:-1]]
+    ends = np.zeros((count, 2))
+    curves = SurfaceCurves(target, step, begin, before, points[order], tangents[order], ends)
+    last = np.diff(begin) - 1 - before
+    each = np.arange(count)
+    for side, (inside, outside) in enumerate([(1 - before, -before), (last - 1, last)]):
+        near, far = step * inside, step * outside.astype(float)
+        for _ in range(50):
+            middle = 0.5 * (near + far)
+            within = target.margin(curves.at(each, middle)[0]) > 0.0
+            near, far = np.where(within, middle, near), np.where(within, far, middle)
+        ends[:, side] = near
+    return curves

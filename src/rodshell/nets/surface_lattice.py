@@ -1,0 +1,133 @@
+"""The rods of a lattice of geodesics or asymptotic lines on a target, and their joints."""
+
+from dataclasses import dataclass
+from math import cos, sin
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError
+from rodshell.geometry.frames import cross, dot, unit
+from rodshell.layout.flatgrid import Crossings
+from rodshell.layout.lattices import Geodesic, SurfaceLattice
+from rodshell.nets.surface_curves import SurfaceCurves, asymptotic, geodesic, trace
+from rodshell.targets import Target
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceNet:
+    """Rods along curves of a target, joined where rods of different families cross.
+
+    Parameters
+    ----------
+    curves : of the rods, from end to end of the target.
+    family : (m,) of each rod, from 0.
+    crossings : of the rods, with the arc lengths of `curves`.
+    beyond : where they would cross if they were longer.
+    """
+
+    lattice: SurfaceLattice
+    curves: SurfaceCurves
+    family: Ints
+    crossings: Crossings
+    beyond: Crossings
+
+    def __repr__(self) -> str:
+        return f"SurfaceNet({len(self.curves)} rods, {len(self.crossings)} crossings on {self.curves.target})"
+
+    @property
+    def curvatures(self) -> tuple[Floats, Floats]:
+        """(k,) normal and (k,) geodesic curvatures of the rods at the knots of their curves on the target [1/m]."""
+        curves = self.curves
+        curve = np.repeat(np.arange(len(curves)), np.diff(curves.begin))
+        s = curves.step * (np.arange(len(curve)) - (curves.begin[:-1] + curves.before)[curve])
+        built = (curves.ends[curve, 0] <= s) & (s <= curves.ends[curve, 1])
+        bends, normal = curves.bends[built], _normal(curves.target, curves.points[built])
+        return dot(bends, normal), dot(bends, cross(normal, curves.tangents[built]))
+
+    @property
+    def smallest_angle(self) -> tuple[float, tuple[float, float, float]]:
+        """Between rods at a joint [rad], and x, y, z of that joint [m]."""
+        rods, at = self.crossings.rods, self.crossings.at
+        (points, first), (_, second) = (self.curves.at(rods[:, side], at[:, side]) for side in range(2))
+        cosines = np.abs(dot(first, second))
+        k = int(np.argmax(cosines))
+        x, y, z = points[k].tolist()
+        return float(np.arccos(min(cosines[k], 1.0))), (x, y, z)
+
+
+def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float, float] | None = None) -> SurfaceNet:
+    """March the rods of a lattice over a target.
+
+    Parameters
+    ----------
+    anchor : x, y of the point of the target from which the rods are set out [m]; default: the target's highest point.
+
+    Raises
+    ------
+    NetLimitError : a curve does not reach the end of the target, or there is none where it is not a saddle; names the
+        place.
+    InputError : the anchor is outside the target.
+    """
+    place = target.lift(np.array([anchor if anchor is not None else target.summit]))
+    if not target.covers(place)[0]:
+        raise InputError("the anchor is outside the target: choose a point inside its rim")
+    law = geodesic if isinstance(lattice, Geodesic) else asymptotic
+    headings = _of_geodesics(target, place, lattice) if law is geodesic else _of_asymptotes(target, place, lattice)
+    guides = trace(target, law, np.repeat(place, len(headings), axis=0), _across(target, place, headings, law))
+    points, tangents, family = list[Floats](), list[Floats](), list[int]()
+    for k in range(len(headings)):
+        shift = 0.5 if k == 2 else 0.0  # of three families: else three rods nearly meet
+        spacing = lattice.spacings[k]
+        low, high = guides.ends[k] / spacing
+        s = spacing * (np.arange(np.ceil(low - shift), np.floor(high - shift) + 1) + shift)
+        x, along = guides.at(np.full(len(s), k), s)
+        points.append(x)
+        tangents.append(_off(target, x, along, law))
+        family += [k] * len(s)
+    curves = trace(target, law, np.concatenate(points), np.concatenate(tangents))
+    families = np.array(family)
+    crossings = curves.crossings(families)
+    first, last = curves.ends[crossings.rods].transpose(2, 0, 1)
+    inside = ((first <= crossings.at) & (crossings.at <= last)).all(axis=1)
+    return SurfaceNet(lattice, curves, families, crossings.select(inside), crossings.select(~inside))
+
+
+def _normal(target: Target, x: Floats) -> Floats:
+    return target.on_surface(x).normal
+
+
+def _of_geodesics(target: Target, place: Floats, lattice: SurfaceLattice) -> Floats:
+    """(k, 3) unit tangents of the families at the anchor, the first along the heading in plan."""
+    normal = _normal(target, place)[0]
+    plan = np.array([cos(lattice.rotate), sin(lattice.rotate)])
+    first = unit(np.array([*plan * normal[2], -plan @ normal[:2]]))
+    angles = np.pi / lattice.family_count * np.arange(lattice.family_count)[:, None]
+    return np.asarray(np.cos(angles) * first + np.sin(angles) * np.cross(normal, first))
+
+
+def _of_asymptotes(target: Target, place: Floats, lattice: SurfaceLattice) -> Floats:
+    """(2, 3) unit tangents of both families at the anchor, the first the nearer one to the heading in plan."""
+    heading = _of_geodesics(target, place, lattice)[:1]
+    first = asymptotic(target, place, heading)[0]
+    return np.vstack([first, _other(target, place, first)])
+
+
+def _across(target: Target, place: Floats, headings: Floats, law: object) -> Floats:
+    """(k, 3) directions at the anchor of the curves from which the families are set out."""
+    if law is asymptotic:
+        return headings[::-1]
+    return cross(headings, np.repeat(_normal(target, place), len(headings), axis=0))
+
+
+def _off(target: Target, x: Floats, along: Floats, law: object) -> Floats:
+    """(n, 3) directions of rods at points of the curve from which they are set out, `along` being its tangents."""
+    return _other(target, x, along) if law is asymptotic else cross(_normal(target, x), along)
+
+
+def _other(target: Target, x: Floats, along: Floats) -> Floats:
+    """The other asymptotic directions (n, 3) at points where the first ones are `along`, on the left of these."""
+    hessian, across = target.implicit(x).hessian, cross(_normal(target, x), along)
+    mixed, sideways = (np.einsum("ni,nij,nj->n", a, hessian, across) for a in (along, across))
+    other = sideways[:, None] * along - 2 * mixed[:, None] * across
+    return unit(other * np.sign(dot(other, across))[:, None])

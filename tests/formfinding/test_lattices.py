@@ -1,0 +1,168 @@
+"""Shells of rods along geodesics and asymptotic lines: laid, popped up, flat or assembled in place, kept and drawn."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.case import load_case
+from rodshell.errors import InputError
+from rodshell.output.drawings import drawing_set
+from rodshell.output.grid import joints_of, rods_of, shape_names
+from rodshell.results.archive import Archive, read
+
+LOW, HIGH = rs.Cap(radius=2.0, base=1.6), rs.Cap(radius=2.0, base=1.0)
+GFRP = rs.Material.preset("gfrp")
+GEODESIC = rs.Geodesic(spacing=0.3)
+
+
+def lath(width: float) -> rs.Rod:
+    return rs.Rod(rs.RectangularSection(width=0.002, height=width), GFRP)
+
+
+@cache
+def low() -> rs.Form:
+    return rs.find_form(LOW, GEODESIC, lath(0.01), joint=rs.Pin(), ends="pinned")
+
+
+@cache
+def high() -> rs.Form:
+    return rs.find_form(HIGH, GEODESIC, lath(0.04), joint=rs.Pin(), ends="pinned")
+
+
+def kept(form: rs.Form) -> Archive:
+    return form.archive()
+
+
+def test_every_node_lies_on_the_target_and_every_edge_has_its_length() -> None:
+    draped = high().draped
+    assert np.abs(np.linalg.norm(draped.positions, axis=1) - 2.0).max() < 1e-8
+    chords = np.linalg.norm(np.diff(draped.positions[draped.mesh.edges], axis=1)[:, 0], axis=1)
+    arcs = 4.0 * np.arcsin(chords / 4.0)
+    np.testing.assert_allclose(arcs, draped.mesh.edge_lengths, rtol=1e-6)
+
+
+def test_laths_400_times_as_stiff_within_the_shell_stand_along_geodesics_and_not_along_a_net() -> None:
+    form = high()
+    assert form.popped["pinned"].report.stable
+    assert form.agreement["pinned"].max_relative < 1.2e-3
+    net = rs.find_form(HIGH, rs.GridLayout.orthogonal(spacing=0.3), lath(0.04), joint=rs.Pin(), ends="pinned")
+    assert net.status != "converged"
+
+
+def test_a_low_shell_lies_flat_and_a_high_one_is_assembled_in_place() -> None:
+    flat, steep = low().flat_state, high().flat_state
+    assert flat is not None
+    assert steep is not None
+    assert flat.lies_flat is True
+    assert flat.in_plane_strain == pytest.approx(0.00287, rel=0.01)
+    assert flat.limit == pytest.approx(120e6 / 23e9, rel=1e-6)  # design strength for erection over Young's modulus
+    assert steep.lies_flat is False
+    codes = {found.code: found for found in high().verdict.findings}
+    assert "lies_flat" in {found.code for found in low().verdict.findings}
+    assert codes["in_place"].level == "good"
+    assert codes["in_place"].figure == pytest.approx(steep.in_plane_strain)
+    assert not {"lost", "erection_strength", "not_checked"} & codes.keys()
+    assert high().checks.deployment is None
+    assert low().checks.deployment is not None
+
+
+def test_the_strain_of_the_flat_state_grows_with_the_breadth() -> None:
+    wide = rs.find_form(LOW, GEODESIC, lath(0.02), joint=rs.Pin(), ends="pinned").flat_state
+    narrow = low().flat_state
+    assert wide is not None
+    assert narrow is not None
+    assert wide.in_plane_strain == pytest.approx(2.0 * (narrow.in_plane_strain or 0.0), rel=1e-9)
+
+
+def test_rods_keep_their_lengths_and_joints_in_the_flat_state() -> None:
+    mesh = low().footprint.mesh
+    chords = np.linalg.norm(np.diff(mesh.flat[mesh.edges], axis=1)[:, 0], axis=1)
+    np.testing.assert_allclose(chords, mesh.edge_lengths, rtol=2e-6)
+    assert np.ptp(mesh.flat[:, 2]) == 0.0
+
+
+def test_what_does_not_lie_flat_is_not_drawn_flat() -> None:
+    flat, steep = kept(low()), kept(high())
+    assert {"plan", "strips"} <= drawing_set(flat).keys()
+    assert "plan" not in drawing_set(steep)
+    assert "strips" in drawing_set(steep)
+    assert "flat" in shape_names(flat)
+    assert "flat" not in shape_names(steep)
+
+
+def test_a_rod_that_bends_in_the_flat_state_is_drawn_along_its_course() -> None:
+    rods = rods_of(kept(low()))
+    assert max(len(rod.course) for rod in rods) > 10
+    for joint in joints_of(rods):
+        (a, b), (at_a, at_b) = joint.rods, joint.at
+        np.testing.assert_allclose(rods[a].point(at_a), rods[b].point(at_b), atol=1e-5)
+
+
+def test_a_result_is_kept_and_its_case_gives_it_again(tmp_path: Path) -> None:
+    form = low()
+    form.save(tmp_path / "kept", kinds=["csv"])
+    archive = read(tmp_path / "kept")
+    assert archive.results.layout is not None
+    assert archive.results.layout.kind == "geodesic"
+    assert archive.results.flat_state == form.flat_state
+    again = rs.Job.load(tmp_path / "kept" / "case.toml").run(until="pop-up")
+    np.testing.assert_allclose(again.popped["pinned"].positions, form.popped["pinned"].positions, atol=1e-12)
+
+
+def test_the_case_has_the_keys_of_its_lattice_alone() -> None:
+    case = load_case("cap", {"layout.kind": "geodesic", "layout.spacing": "50 mm", "layout.families": "3"})
+    assert case.layout == rs.Geodesic(spacing=0.05, families=3, edge=case.layout.edge)
+    with pytest.raises(InputError, match=r'layout.families = 3: a layout of kind "chebyshev" has no families'):
+        load_case("cap", {"layout.families": 3})
+    with pytest.raises(InputError, match="layout families must be 2 or 3, not 4"):
+        load_case("cap", {"layout.kind": "geodesic", "layout.families": 4})
+
+
+def test_a_spacing_that_is_left_out_follows_from_the_target() -> None:
+    form = rs.find_form(LOW, rs.Geodesic(), lath(0.01), joint=rs.Pin(), ends="pinned")
+    assert form.layout.least_spacing == pytest.approx(LOW.size / 8, rel=0.2)
+    with pytest.raises(InputError, match="depends on the target"):
+        assert rs.Geodesic().least_spacing
+
+
+def test_rods_can_be_left_out_by_name() -> None:
+    names = [rod.name for rod in low().footprint.rods]
+    left_out = rs.Geodesic(spacing=0.3, left_out=(names[0],))
+    form = rs.find_form(LOW, left_out, lath(0.01), joint=rs.Pin(), ends="pinned")
+    assert {rod.name for rod in form.footprint.rods} == set(names) - {names[0]}
+    with pytest.raises(InputError, match='layout left_out has "U99", which is not the name of a rod on the target'):
+        rs.find_form(LOW, rs.Geodesic(spacing=0.3, left_out=("U99",)), lath(0.01), ends="pinned")
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ({"method": rs.Gravity()}, r'a lattice "geodesic" follows curves of the target: bind it there'),
+        ({"joint": rs.Pin(eccentricity=0.004)}, "need two layers of rods"),
+        ({"anchor": "auto"}, "searches for anchor or heading need the lattice"),
+        ({"seams": [[(0.0, -3.0), (0.0, 3.0)]]}, 'a target cut by seams needs "chebyshev"'),
+    ],
+)
+def test_what_such_a_lattice_does_not_have_is_refused_in_one_sentence(keys: dict[str, object], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        rs.find_form(LOW, GEODESIC, lath(0.01), ends="pinned", **keys)  # type: ignore[arg-type]
+
+
+def test_strips_upright_on_a_saddle_stand_and_have_no_curvature_out_of_the_surface() -> None:
+    target = rs.HeightField(formula="0.8*(log(cos(y/0.8)) - log(cos(x/0.8)))", domain=rs.Disc(0.9))
+    strip = rs.Rod(rs.RectangularSection(width=0.02, height=0.002), GFRP)
+    form = rs.find_form(target, rs.Asymptotic(spacing=0.15), strip, joint=rs.Pin(), ends="pinned", anchor=(0.0, 0.0))
+    assert form.popped["pinned"].report.stable
+    assert form.agreement["pinned"].max_relative < 3e-4
+    bent = form.checks.bending["pinned"]
+    assert np.abs(bent.normal_curvature).max() < 0.05 * np.abs(bent.geodesic_curvature).max()
+
+
+def test_three_families_lie_on_the_target_and_stand() -> None:
+    form = rs.find_form(HIGH, rs.Geodesic(spacing=0.3, families=3), lath(0.02), joint=rs.Pin(), ends="pinned")
+    assert {rod.name[0] for rod in form.footprint.rods} == set("UVW")
+    assert form.popped["pinned"].report.stable
+    assert form.checks.contact["pinned"].pairs == 0
