@@ -65,7 +65,7 @@ attack:    ## hostile input of every kind, a hundred times as many tries as in t
 	RODSHELL_ATTACK=$(or $(TRIES),100) python -m pytest -n 2 -m attack tests
 	python -m tests.acceptance.verdict harm
 
-accept-house: ## print the table of results before and after, archives, misuses (ten minutes)
+accept-house: ## print the table of kept results, archives of all formats, misuses, the source tree (a minute)
 	python -m tests.acceptance.house
 
 accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1000 ten minutes)
