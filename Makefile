@@ -76,7 +76,7 @@ ci-full:   ## what .ci/run does, and every acceptance table (hours; DESIGNS=1000
 	$(MAKE) --keep-going test-indices accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
 		accept-house accept-loads accept-refine accept-sweep accept-studio accept-drawn attack
 
-house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
+house:     ## print the source by room, before and after: statements, lines, public names, files; circles, long files
 	python -m tests.acceptance.house_figures
 
 paper:     ## the paper's figures again, into docs/paper/ and docs/paper.md (some minutes)

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from tests.acceptance.house_figures import ROOT, figures
+from tests.acceptance import house_figures
 from tests.acceptance.kept import (
     EARLIER,
     FOUND,
@@ -85,10 +85,24 @@ def misuse_rows(work: Path) -> Iterator[Row]:
 
 
 def tree_rows() -> Iterator[Row]:
-    """Circles of imports, and types that are defined twice."""
-    after = figures(ROOT / "src" / "rodshell")
-    yield Row("source tree", "files in circles of imports", sum(map(len, after.circles)), 0)
-    yield Row("source tree", "definitions of array types outside arrays", after.array_aliases, 0)
+    """What a reader of the source stumbles over; its lengths by room are printed by `make house`."""
+    source = house_figures.read_tree(house_figures.SOURCE)
+    for what, found in (
+        ("modules in circles of imports", house_figures.in_circles(source)),
+        ("definitions of array types outside arrays", house_figures.array_aliases(source)),
+        (f"files over {house_figures.LONG} lines without a reason", house_figures.unexplained(source)),
+    ):
+        yield Row("source tree", what, len(found), 0, note="; ".join(found))
+
+
+def kind_rows() -> Iterator[Row]:
+    """Where kinds are told apart that a new kind would have to be added to."""
+    source = house_figures.read_tree(house_figures.SOURCE)
+    for what, found in (
+        ("kinds of elements told apart outside rods and joints", house_figures.told_apart(source)),
+        ("families told apart outside their lattice", house_figures.families_told_apart(source)),
+    ):
+        yield Row("source tree", what, len(found), 0, note="; ".join(found))
 
 
 def all_rows(work: Path) -> Iterator[Row]:
@@ -98,6 +112,7 @@ def all_rows(work: Path) -> Iterator[Row]:
         yield from export_rows(name, work)
     yield from misuse_rows(work)
     yield from tree_rows()
+    yield from kind_rows()
 
 
 def main() -> int:
