@@ -27,6 +27,13 @@ from tests.acceptance.rows import Row, print_table
 from tests.acceptance.same_results import Difference
 
 KINDS = "dxf,svg,pdf,csv,obj,gltf,vtp,compas,png,report,3dm"
+NAMED = {
+    "energy": "LocalEnergy", "format": "vtp", "goal": "Deflection", "joint": "Rigid", "load": "LineLoad",
+    "material": "bamboo", "section": "RectangularSection", "support": "clamped",
+}  # fmt: skip
+"""By kinds of things that a new one may be added to: the name of one, which stands in as many files as one takes."""
+UNREACHED = ("section", "support")
+"""Those that stand in more than two files still."""
 SUFFIXES = (".dxf", ".svg", ".pdf", ".csv", ".obj", ".gl*", ".vtp", ".json", ".png", ".html", ".3dm")  # one of each
 
 
@@ -103,6 +110,9 @@ def kind_rows() -> Iterator[Row]:
         ("families told apart outside their lattice", house_figures.families_told_apart(source)),
     ):
         yield Row("source tree", what, len(found), 0, note="; ".join(found))
+    for kind, name in NAMED.items():
+        found = house_figures.files_naming(source, name)
+        yield Row(f"a new {kind}", f"files that name {name}", len(found), 2, note=", ".join(found))
 
 
 def all_rows(work: Path) -> Iterator[Row]:

@@ -9,6 +9,7 @@ other module of the source uses. Read with `ast` alone, nothing is imported.
 import ast
 import io
 import json
+import re
 import subprocess
 import sys
 import tarfile
@@ -219,6 +220,18 @@ def families_told_apart(source: Source) -> list[str]:
         if isinstance(node, ast.Compare)
         and {"u", "v"} & {each.value for each in ast.walk(node) if isinstance(each, ast.Constant)}
     ]
+
+
+def files_naming(source: Source, kind: str) -> list[str]:
+    """Files whose code has a kind's name in it; those that only hand it on, and what is said of it, are not counted."""
+    found, name = [], re.compile(rf"(?<![A-Za-z]){kind}(?![a-z])")
+    for file in source.values():
+        said = {node.value for node in ast.walk(file.tree) if is_text(node)}
+        words = (node for node in ast.walk(file.tree) if node not in said)
+        texts = (getattr(node, part, "") for node in words for part in ("id", "attr", "name", "value"))
+        if not file.path.endswith("__init__.py") and any(isinstance(text, str) and name.search(text) for text in texts):
+            found.append(file.path)
+    return found
 
 
 def unexplained(source: Source) -> list[str]:

@@ -10,7 +10,7 @@ A new kind is a class here and a member of `Load`. How long each acts where that
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
 from rodshell.errors import InputError
 from rodshell.quantities import (
@@ -281,6 +281,15 @@ class Temperature:
         return self.change * self.expansion
 
 
+@runtime_checkable
+class Forces(Protocol):
+    """Loads that are forces; one's own, which no case file names, need no more than this (`examples/own_load.py`)."""
+
+    lasting: ClassVar[Duration]
+
+    def forces(self, nodes: "LoadedNodes") -> "Floats":
+        """(n, 3) on each node [N]."""
+        ...
+
+
 Load = SelfWeight | Snow | Wind | PointLoad | LineLoad | Settlement | Temperature
-Forces = SelfWeight | Snow | Wind | PointLoad | LineLoad
-"""Loads that are forces."""
