@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 GRAVITY = 9.81  # [m/s2]
 SAMPLES = 400  # parts of a line load
-LARGEST_COEFFICIENT = 20.0  # of wind on a surface; codes have up to about 3
+_LARGEST_COEFFICIENT = 20.0  # of wind on a surface; codes have up to about 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,10 +140,10 @@ class Wind:
 
     def _require_usual(self, largest: float, where: str) -> None:
         """InputError where that is not the pressure coefficient of any surface."""
-        if largest > LARGEST_COEFFICIENT:
+        if largest > _LARGEST_COEFFICIENT:
             raise InputError(
                 f"the wind's coefficient {shown(self.coefficient)} reaches {largest:.4g}{where}: pressure coefficients "
-                f"lie between -3 and 3, and none above {LARGEST_COEFFICIENT:g} is taken"
+                f"lie between -3 and 3, and none above {_LARGEST_COEFFICIENT:g} is taken"
             )
 
     @cached_property
