@@ -263,8 +263,7 @@ def require_likely_sizes(rod: Rod, width: float, spacing: float) -> None:
     ------
     InputError : the rods are as thick as the spacing or the shell, or far thinner than those of any shell.
     """
-    section = rod.section
-    depth = 2 * max(section.fibre_distances or (0.0,)) if isinstance(section, GivenSection) else section.depth
+    depth = rod.section.depth
     allowed = ""
     if 0 < depth * limit(MOST_SLENDER) < width:
         what = f"thin for the shell of {length_text(width)}, which is more than {limit(MOST_SLENDER):.0f} times as wide"
