@@ -68,7 +68,7 @@ attack:    ## hostile input of every kind, a hundred times as many tries as in t
 	RODSHELL_ATTACK=$(or $(TRIES),100) python -m pytest -n 2 -m attack tests
 	python -m tests.acceptance.verdict harm
 
-accept-house: ## print the table of results before and after, archives, misuses (ten minutes)
+accept-house: ## print the table of kept results, archives of all formats, misuses, the source tree (a minute)
 	python -m tests.acceptance.house
 
 accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1000 ten minutes)
@@ -79,7 +79,7 @@ ci-full:   ## what .ci/run does, and every acceptance table (hours; DESIGNS=1000
 	$(MAKE) --keep-going test-indices accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
 		accept-house accept-loads accept-refine accept-sweep accept-studio accept-drawn accept-lattices attack
 
-house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
+house:     ## print the source by room, before and after: statements, lines, public names, files; circles, long files
 	python -m tests.acceptance.house_figures
 
 paper:     ## the paper's figures again, into docs/paper/ and docs/paper.md (some minutes)

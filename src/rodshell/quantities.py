@@ -17,8 +17,8 @@ from rodshell.units import Kind, read_quantity, require_unit_of_all, shown, si_u
 from rodshell.validation import described, is_auto, not_negative, number, numbers, positive, whole
 
 Auto = Literal["auto"]
-Reader = Callable[[object], Any]
-Sign = Callable[..., float]
+_Reader = Callable[[object], Any]
+_Sign = Callable[..., float]
 T = TypeVar("T")
 MOST_STAGES = 1000  # of a deployment
 
@@ -35,13 +35,13 @@ class Value:
     role : "name": it is text that is not empty; "file": the path of a file to be read; "folder": of one to be written.
     """
 
-    read: Reader
+    read: _Reader
     check: Callable[[str, Any], Any] | None = None
     words: tuple[str, ...] = ()
     role: Literal["", "name", "file", "folder"] = ""
 
 
-def quantity(kind: Kind, sign: Sign = number, unit: str | None = None) -> Value:
+def quantity(kind: Kind, sign: _Sign = number, unit: str | None = None) -> Value:
     """A number with a unit.
 
     Parameters
@@ -60,7 +60,7 @@ def quantity(kind: Kind, sign: Sign = number, unit: str | None = None) -> Value:
     return Value(read, lambda name, value: sign(name, value, si))
 
 
-def or_auto(value: Value) -> Value:
+def _or_auto(value: Value) -> Value:
     def read(given: object) -> object:
         if is_auto(given.strip() if isinstance(given, str) else given):
             return "auto"
@@ -94,7 +94,7 @@ def pair(value: Value, words: str, *, one_for_both: bool = False) -> Value:
     return Value(read, _each(value, words, 2))
 
 
-def triple(kind: Kind) -> Value:
+def _triple(kind: Kind) -> Value:
     """[a, b, c] or "a, b, c"."""
     value = quantity(kind)
 
@@ -197,7 +197,7 @@ def _poisson_ratio(value: object) -> float:
     return found
 
 
-def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
+def _polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
     """Rows of points of the plan: [[[x, y], [x, y]], ...], or "x, y; x, y | x, y; x, y"."""
     rows = value
     if isinstance(value, str):
@@ -210,7 +210,7 @@ def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
 
 def _line(value: object) -> tuple[tuple[float, float], ...]:
     """Points of one line: [[x, y], [x, y]], or "x, y; x, y"."""
-    rows = polylines(value if isinstance(value, str) else [value])
+    rows = _polylines(value if isinstance(value, str) else [value])
     if len(rows) != 1:
         raise ValueError('give one line of two points or more, such as "-1, 0; 1, 0"')
     return rows[0]
@@ -293,7 +293,7 @@ Corners = Annotated[Literal[2, 4], Value(_corners, _checked_corners)]
 Unit = Annotated[float, Value(_unit)]
 Ratio = Annotated[float, Value(_ratio)]
 Numbers = Annotated[tuple[float, ...], Value(_numbers)]
-Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], Value(polylines)]
+Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], Value(_polylines)]
 Line = Annotated[tuple[tuple[float, float], ...], Value(_line)]
 PoissonRatio = Annotated[float, Value(_poisson_ratio, lambda name, value: number(name, value))]
 Stiffness = Annotated[
@@ -305,22 +305,22 @@ Length = Annotated[float, _LENGTH]
 Distance = Annotated[float, quantity("length", not_negative)]
 Coordinate = Annotated[float, quantity("length")]
 Angle = Annotated[float, _ANGLE]
-LengthOrAuto = Annotated[float | Auto, or_auto(_LENGTH)]
-AngleOrAuto = Annotated[float | Auto, or_auto(_ANGLE)]
+LengthOrAuto = Annotated[float | Auto, _or_auto(_LENGTH)]
+AngleOrAuto = Annotated[float | Auto, _or_auto(_ANGLE)]
 Lengths = Annotated[tuple[float, float], _LENGTHS]
-LengthsOrAuto = Annotated[tuple[float, float] | Auto, or_auto(_LENGTHS)]
+LengthsOrAuto = Annotated[tuple[float, float] | Auto, _or_auto(_LENGTHS)]
 Size = Annotated[tuple[float, float], pair(_LENGTH, _TWO)]
 Point = Annotated[tuple[float, float], _POINT]
-PointOrAuto = Annotated[tuple[float, float] | Auto, or_auto(_POINT)]
-Point3 = Annotated[tuple[float, float, float], triple("length")]
-Angles = Annotated[tuple[float, float, float], triple("angle")]
+PointOrAuto = Annotated[tuple[float, float] | Auto, _or_auto(_POINT)]
+Point3 = Annotated[tuple[float, float, float], _triple("length")]
+Angles = Annotated[tuple[float, float, float], _triple("angle")]
 
 Factor = Annotated[float, quantity("number", positive)]
 Share = Annotated[float, quantity("number", not_negative)]
 PerKelvin = Annotated[float, quantity("number", positive, "1/K")]
 Force = Annotated[float, quantity("force", positive)]
-Forces3 = Annotated[tuple[float, float, float], triple("force")]
-ForcePerLength3 = Annotated[tuple[float, float, float], triple("force per length")]
+Forces3 = Annotated[tuple[float, float, float], _triple("force")]
+ForcePerLength3 = Annotated[tuple[float, float, float], _triple("force per length")]
 SlipMoment = Annotated[float, quantity("moment", positive)]
 Stress = Annotated[float, quantity("stress", positive)]
 Pressure = Annotated[float, quantity("pressure", not_negative)]

@@ -29,7 +29,7 @@ from rodshell.validation import choice, either, not_a_choice
 Table = Mapping[str, Any]
 Files = Callable[[object], str]
 T = TypeVar("T")
-EMPTY: Table = MappingProxyType({})
+_EMPTY: Table = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -250,7 +250,7 @@ def _require_known(table: type, given: Any, place: Place, unknown: Callable[...,
             raise InputError(unknown(place, key, given, table))
 
 
-def keys_in(table: type, given: Table = EMPTY) -> Iterator[tuple[Field | None, str]]:
+def keys_in(table: type, given: Table = _EMPTY) -> Iterator[tuple[Field | None, str]]:
     """The keys that a table has; no field for `kind`.
 
     Parameters

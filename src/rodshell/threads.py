@@ -4,14 +4,14 @@ import os
 from collections.abc import Callable
 from threading import Thread
 
-PROCESSORS = os.cpu_count() or 1  # asked once: the answer takes as long as a small front
-MOST_THREADS = 4  # parts of a factorisation stay one thread's work, and memory is as fast as it is
+_PROCESSORS = os.cpu_count() or 1  # asked once: the answer takes as long as a small front
+_MOST_THREADS = 4  # parts of a factorisation stay one thread's work, and memory is as fast as it is
 
 
 def threads() -> int:
-    """Number of threads: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
+    """Number of threads: NUMBA_NUM_THREADS, by default one per processor, at most `_MOST_THREADS`."""
     asked = os.environ.get("NUMBA_NUM_THREADS", "")
-    return max(1, min(int(asked) if asked.isdigit() else PROCESSORS, PROCESSORS, MOST_THREADS))
+    return max(1, min(int(asked) if asked.isdigit() else _PROCESSORS, _PROCESSORS, _MOST_THREADS))
 
 
 def in_threads(work: Callable[[int, int], object], count: int, *, most: int | None = None) -> None:

@@ -65,7 +65,7 @@ def _factors(*groups: str) -> dict[str, Decimal]:
 
 
 LONGEST = 80  # characters of a value in a message
-FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is probably in degrees, its unit forgotten
+_FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is probably in degrees, its unit forgotten
 _DEGREE = Decimal("3.14159265358979323846264338327950288") / 180
 
 _KINDS: dict[Kind, _Units] = {
@@ -200,7 +200,7 @@ def read_quantity(value: object, kind: Kind, *, size: bool = False) -> float:
         raise ValueError(f"must be larger than zero; give {units.wanted}")
     if allowed := out_of_range(number, units.si, size=size):
         raise ValueError(f"must be {allowed}")
-    if kind == "angle" and abs(number) > FULL_TURN:
+    if kind == "angle" and abs(number) > _FULL_TURN:
         if not _unit_of(value):
             raise ValueError(f'a plain number is in radians, and this is more than a full turn; write "{number:g} deg"')
         number = fmod(number, tau)

@@ -18,7 +18,7 @@ from rodshell.units import shown
 FACTOR = "RODSHELL_LIMITS"
 PATIENCE = 30.0  # s until a pipe must have given all its content
 TEXT = 20e6  # bytes of a text, such as a table of rods
-CHUNK = 1 << 20  # bytes
+_CHUNK = 1 << 20  # bytes
 
 
 def limit(usual: float) -> float:
@@ -93,7 +93,7 @@ def _parts(path: Path, descriptor: int, most: float, smaller: str) -> Iterator[b
         if is_pipe and not select([descriptor], (), (), max(0.0, end - monotonic()))[0]:
             raise InputError(f"{path} is a pipe that was not written to its end within {PATIENCE:g} s")
         try:
-            part = os.read(descriptor, CHUNK)
+            part = os.read(descriptor, _CHUNK)
         except BlockingIOError:
             continue
         except OSError as reason:

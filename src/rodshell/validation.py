@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 MOST = 10**12  # of a count
 LARGEST = 1e18  # of the numbers in an array, whatever their unit: see `units.RANGES`
-Choice = TypeVar("Choice", bound=str)
+_Choice = TypeVar("_Choice", bound=str)
 _Scalar = TypeVar("_Scalar", bound="np.generic")
 
 
@@ -45,7 +45,7 @@ def instance(name: str, value: object, kind: type | UnionType, wanted: str = "")
         raise InputError(f"{name} must be {what}, not {described(value)}")
 
 
-def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
+def choice(name: str, value: object, choices: Sequence[_Choice]) -> _Choice:
     """Return `value` if it is one of the words in `choices`; the message suggests the closest of them."""
     for word in choices:
         if isinstance(value, str) and value == word:  # an array is compared with none
@@ -66,7 +66,7 @@ def either(words: Sequence[str]) -> str:
     return f"{', '.join(rest)} or {last}" if rest else last
 
 
-def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice, ...]:
+def choices_of(name: str, value: Any, choices: Sequence[_Choice]) -> tuple[_Choice, ...]:
     """Return `value` as a tuple of different words out of `choices`.
 
     Parameters

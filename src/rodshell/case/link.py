@@ -21,7 +21,7 @@ LARGEST_UPLOAD = 50e6  # bytes of a file that the studio reads
 UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
 SURFACES = {suffix: kind for suffix, kind in BY_SUFFIX.items() if suffix != ".gltf"}  # a .gltf names further files
 OUTLINES = (".dxf", ".obj", ".3dm")  # closed curves that end a surface
-UPLOADS = tuple(dict.fromkeys((*SURFACES, *OUTLINES)))
+_UPLOADS = tuple(dict.fromkeys((*SURFACES, *OUTLINES)))
 
 
 def studio_link(case: Case, *, address: str = ADDRESS) -> str:
@@ -98,6 +98,6 @@ def upload_name(name: str) -> str:
         raise InputError(
             f"{shown(name)} may name further files, which are not uploaded: save it as .glb, a single file"
         )
-    if suffix not in UPLOADS or not Path(plain).stem:
-        raise InputError(f"{shown(name)}: the studio reads {', '.join(UPLOADS)}")
+    if suffix not in _UPLOADS or not Path(plain).stem:
+        raise InputError(f"{shown(name)}: the studio reads {', '.join(_UPLOADS)}")
     return plain

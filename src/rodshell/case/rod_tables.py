@@ -12,7 +12,7 @@ from rodshell.rods.section import Circle, GivenSection, Rod, Section, Sized, Tub
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
-UNSIZED = 1.0  # m, in place of a radius that is still to be found
+_UNSIZED = 1.0  # m, in place of a radius that is still to be found
 
 
 @dataclass(frozen=True)
@@ -97,11 +97,11 @@ class RodTable(Holding):
 
     @property
     def _section(self) -> Section | GivenSection:
-        """The section; one whose radius is still to be found has `UNSIZED`."""
+        """The section; one whose radius is still to be found has `_UNSIZED`."""
         section = self.section
         if isinstance(section, Sized | GivenSection):
             return section
-        radius = UNSIZED if isinstance(section.radius, str) else section.radius
+        radius = _UNSIZED if isinstance(section.radius, str) else section.radius
         return Tube(radius, section.thickness) if isinstance(section, OpenTube) else Circle(radius)
 
     @property

@@ -273,7 +273,7 @@ def require_likely_sizes(
     InputError : the rods are as thick as the spacing or the shell, or far thinner than those of any shell; the spacing
         is wider than the shell.
     """
-    depth = _depth_of(section)
+    depth = 0.0 if section is None else section.depth
     shell, allowed = f"the shell of {length_text(width)}", ""
     if 0 < depth * limit(MOST_SLENDER) < width:
         what = f"thin for {shell}, which is more than {limit(MOST_SLENDER):.0f} times as wide"
@@ -300,18 +300,11 @@ def doubt_of_unit(width: float, section: Section | GivenSection | None, unit: fl
     section : of the rods, if it is given.
     unit : that the target's file was read in [m], if it was.
     """
-    depth = _depth_of(section)
+    depth = 0.0 if section is None else section.depth
     if unit is None or depth * KNOWN < width < depth * limit(MOST_SLENDER):
         return ""
     meant = " or ".join(f"{length_text(wide)} in {name}" for name, wide in as_built(width, unit).items())
     return meant and f" (if that is too {'small' if width < BUILT[0] else 'large'}, check its unit: {meant})"
-
-
-def _depth_of(section: Section | GivenSection | None) -> float:
-    """Its larger dimension [m]; 0 where it has none."""
-    if isinstance(section, GivenSection):
-        return 2 * max(section.fibre_distances or (0.0,))
-    return 0.0 if section is None else section.depth
 
 
 def _other_unit(name: str, size: float, width: float, unit: float | None, usual: tuple[float, float]) -> str:

@@ -8,13 +8,13 @@ from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any, Self
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 PATIENCE = 3  # signals after which the process ends without cleaning up
 
 
 def end_at_once() -> None:
     """Let signals end the process silently except for one line, as long as there is nothing to clean up."""
-    for number in SIGNALS:
+    for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell's background jobs ignore Ctrl-C
             signal.signal(number, _end)
 
@@ -47,7 +47,7 @@ class Interruption:
     def __enter__(self) -> Self:
         Interruption.current = self
         if threading.current_thread() is threading.main_thread():
-            wanted = [number for number in SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
+            wanted = [number for number in _SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
             self._before = {number: signal.signal(number, self._handle) for number in wanted}
         sys.unraisablehook = self._unraisable
         return self

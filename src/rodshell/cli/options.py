@@ -149,8 +149,8 @@ ADDRESS = click.option(
     "answers there can run any program here.",
 )
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
-TIME_LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kinds of files that are not are named.'
+_ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
+_LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kinds of files that are not are named.'
 
 
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -162,8 +162,8 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         options = (
             click.option("--out", "-o", metavar="DIR", help=out),
-            click.option("--only", metavar="KINDS", help=ONLY),
-            click.option("--time-limit", metavar="TIME", help=TIME_LIMIT),
+            click.option("--only", metavar="KINDS", help=_ONLY),
+            click.option("--time-limit", metavar="TIME", help=_LIMIT),
             FORCE,
             click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs."),
             QUIET,

@@ -6,14 +6,14 @@ import click
 
 from rodshell.errors import InputError
 
-HOST = "Address to listen on."
+_HOST = "Address to listen on."
 NO_TOKEN = "Let in all users of this machine, also without the token in the printed address."
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 @click.command()
 @click.argument("name", metavar="[CASE|SURFACE]", default="pavilion")
-@click.option("--host", default="127.0.0.1", show_default=True, help=HOST)
+@click.option("--host", default="127.0.0.1", show_default=True, help=_HOST)
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=8731, show_default=True, help="Port to listen on; 0: any free one."
 )
@@ -45,7 +45,7 @@ def command(
     from rodshell.studio.start import first_case, own_folder, sessions_folder
     from rodshell.untrusted import limit
 
-    loopback = host in LOOPBACK
+    loopback = host in _LOOPBACK
     if no_token and not loopback:
         raise InputError(f"--no-token: other machines reach --host {host}: leave one of the two out")
     case, contents = first_case(name)

@@ -27,7 +27,7 @@ from rodshell.targets import Target
 from rodshell.validation import brief, choice, instance, not_negative
 
 ROUND_OFF = 1e-10  # of the target's size: a node is below the surface only from this depth on
-SUPPORTED = 1e-6  # cosine between normal and free directions below which a node's supports hold it along the normal
+_SUPPORTED = 1e-6  # cosine between normal and free directions below which a node's supports hold it along the normal
 
 Stopped = Literal["all", "normal"]
 
@@ -177,7 +177,7 @@ class ModifiedMass:
         open_nodes = np.flatnonzero(~outside)
         gap = self.target.contact(state[open_nodes])
         new = gap.distance < -ROUND_OFF * self.target.size
-        new &= touching.free_share(open_nodes, gap.normal) > SUPPORTED
+        new &= touching.free_share(open_nodes, gap.normal) > _SUPPORTED
         if not new.any():
             return None
         points = state[open_nodes] - gap.distance[:, None] * gap.normal

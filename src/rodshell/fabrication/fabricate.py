@@ -50,7 +50,7 @@ class Lath:
         return lengths
 
 
-def lath_name(rod: str, number: int) -> str:
+def _lath_name(rod: str, number: int) -> str:
     """What a lath is called: the first as its rod, the second "U07-2".
 
     Parameters
@@ -217,7 +217,7 @@ def _laths(
 def _pieces_of(laths: tuple[Lath, ...], names: Sequence[str]) -> tuple[Piece, ...]:
     """Every piece, named by its rod's name, lath and number."""
     return tuple(
-        Piece(piece=f"{lath_name(names[lath.rod], lath.number)}.{number}", length=length)
+        Piece(piece=f"{_lath_name(names[lath.rod], lath.number)}.{number}", length=length)
         for lath in laths
         for number, length in enumerate(lath.pieces, start=1)
     )

@@ -23,7 +23,7 @@ from rodshell.figures.records import (
 )
 
 Gate = Literal["flat", "from_flat", "remeshed", "tolerance", "stable"]
-FEWEST_STATIONS = 2
+_FEWEST_STATIONS = 2
 
 # What was asked for
 
@@ -272,7 +272,7 @@ class Stiffness(Record):
 
     @model_validator(mode="after")
     def _as_many(self) -> Self:
-        if not len(self.at) == len(self.factors) >= FEWEST_STATIONS or len(self.sizes) not in (0, len(self.at)):
+        if not len(self.at) == len(self.factors) >= _FEWEST_STATIONS or len(self.sizes) not in (0, len(self.at)):
             raise ValueError(
                 f"{len(self.at)} stations, {len(self.factors)} factors and {len(self.sizes)} sizes: there must be as "
                 "many of each, two or more"

@@ -20,7 +20,7 @@ from rodshell.kernels import njit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
+from rodshell.rods.section import GivenSection, Rod
 from rodshell.targets import Target
 from rodshell.units import length_text
 
@@ -103,22 +103,12 @@ def middle_surface(mesh: GridMesh, layered: GridMesh, positions: Floats) -> Floa
 
 def rod_thickness(rod: Rod) -> float:
     """Size of a rod's section along the shell's normal [m]; 0 where the shape of its section is not known."""
-    section = rod.section
-    if isinstance(section, GivenSection):
-        return 0.0
-    if isinstance(section, Circle | Tube):
-        return 2 * section.outer_radius
-    return 2 * section.a if isinstance(section, Ellipse) else section.width
+    return 0.0 if isinstance(rod.section, GivenSection) else 2 * rod.section.half_widths[0]
 
 
 def rod_breadth(rod: Rod) -> float:
-    """Size of a rod's section across its thickness [m]; 0 where the shape of its section is not known."""
-    section = rod.section
-    if isinstance(section, GivenSection):
-        return 0.0
-    if isinstance(section, Circle | Tube):
-        return 2 * section.outer_radius
-    return 2 * section.b if isinstance(section, Ellipse) else section.height
+    """Size of a rod's section within the shell [m]; 0 where the shape of its section is not known."""
+    return 2 * rod.section.half_widths[1] if rod.section.half_widths else 0.0
 
 
 def thickness_warnings(

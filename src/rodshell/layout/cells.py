@@ -100,7 +100,7 @@ def rim_diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     way = ends[pairs[:, 1]] - joints[pairs[:, 0]]
     along = joints[[last for _, last, _ in found]] - joints[pairs[:, 0]]
     across = np.abs(way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0])
-    kept = across > LEAST_ANGLE * np.linalg.norm(way, axis=1) * np.linalg.norm(along, axis=1)
+    kept = across > _LEAST_ANGLE * np.linalg.norm(way, axis=1) * np.linalg.norm(along, axis=1)
     rising = way.prod(axis=1) > 0
     if pattern.ways == 1:
         between = {(start, last) for (start, last, _), used in zip(found, kept.tolist(), strict=True) if used}
@@ -111,7 +111,7 @@ def rim_diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     return np.asarray(pairs[kept])
 
 
-LEAST_ANGLE = 0.2  # sine of that between a diagonal at the rim and the rod that it starts from
+_LEAST_ANGLE = 0.2  # sine of that between a diagonal at the rim and the rod that it starts from
 
 
 def lines(pairs: Ints, points: Floats) -> list[list[int]]:

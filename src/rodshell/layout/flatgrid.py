@@ -20,7 +20,7 @@ from rodshell.validation import LARGEST, finite, instance, listed, number, short
 Family = Literal["u", "v", "free"]
 
 MOST_RODS = 5000  # of a grid, of which all pairs are looked at; they take 0.4 GB
-PARALLEL = 1e-9  # sine of the angle between lines that do not cross
+_PARALLEL = 1e-9  # sine of the angle between lines that do not cross
 TOGETHER = 0.01  # of the usual span: crossings of three rods or more that are nearer to each other are one joint
 
 
@@ -448,12 +448,12 @@ def _crossings(lines, margin):  # type: ignore[no-untyped-def]
     count = 0
     for a in range(len(lines)):
         for b in range(a + 1, len(lines)):
-            count += abs(lines[a, 2] * lines[b, 3] - lines[a, 3] * lines[b, 2]) > PARALLEL
+            count += abs(lines[a, 2] * lines[b, 3] - lines[a, 3] * lines[b, 2]) > _PARALLEL
     rods, at, count = np.empty((count, 2), dtype=np.int64), np.empty((count, 2)), 0
     for a in range(len(lines)):
         for b in range(a + 1, len(lines)):
             sine = lines[a, 2] * lines[b, 3] - lines[a, 3] * lines[b, 2]
-            if abs(sine) > PARALLEL:
+            if abs(sine) > _PARALLEL:
                 x, y, met = lines[b, 0] - lines[a, 0], lines[b, 1] - lines[a, 1], True
                 rods[count, 0], rods[count, 1] = a, b
                 for side in range(2):

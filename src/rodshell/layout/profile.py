@@ -20,8 +20,8 @@ DOUBLE = (0.05, 0.95)  # least and most share of a rod's length that is made dou
 # Gauss and Legendre's five points of a piece, and weights: 1e-5 of the mean of 1/f where f grows eightfold over it
 _NEAR, _FAR = (sqrt(5 + sign * 2 * sqrt(10 / 7)) / 3 for sign in (-1, 1))
 _LIGHT, _HEAVY = ((322 + sign * 13 * sqrt(70)) / 900 for sign in (-1, 1))
-GAUSS_POINTS = np.array([-_FAR, -_NEAR, 0.0, _NEAR, _FAR])
-GAUSS_WEIGHTS = np.array([_LIGHT, _HEAVY, 128 / 225, _HEAVY, _LIGHT])
+_GAUSS_POINTS = np.array([-_FAR, -_NEAR, 0.0, _NEAR, _FAR])
+_GAUSS_WEIGHTS = np.array([_LIGHT, _HEAVY, 128 / 225, _HEAVY, _LIGHT])
 
 
 @dataclass(frozen=True)
@@ -146,9 +146,9 @@ class Profile:
         breaks = np.unique(np.concatenate([self.stations, low, high]))
         width = np.diff(breaks)
         middle = 0.5 * (breaks[1:] + breaks[:-1])
-        at = middle[:, None] + 0.5 * width[:, None] * GAUSS_POINTS
+        at = middle[:, None] + 0.5 * width[:, None] * _GAUSS_POINTS
         values = function(self.at(at.ravel())).reshape(*at.shape, -1)
-        pieces = 0.5 * width[:, None] * np.einsum("pgq,g->pq", values, GAUSS_WEIGHTS)
+        pieces = 0.5 * width[:, None] * np.einsum("pgq,g->pq", values, _GAUSS_WEIGHTS)
         total = np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)])
         first, last = np.searchsorted(breaks, low), np.searchsorted(breaks, high)
         return np.asarray((total[last] - total[first]) / (high - low)[:, None])

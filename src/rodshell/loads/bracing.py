@@ -15,7 +15,7 @@ from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.targets import Target
 from rodshell.units import percent_text
 
-SHARES = (0.25, 0.5, 0.75)  # of a diagonal, where it is looked whether the shell is under it
+_SHARES = (0.25, 0.5, 0.75)  # of a diagonal, where it is looked whether the shell is under it
 STEPS = 8  # in which a prestress is applied that is too much for one
 
 
@@ -94,8 +94,8 @@ def braced_diagonals(
         rim = rim_diagonals(mesh.grid, Pattern.of(pattern))
         pairs = np.vstack([pairs, rim + [0, len(mesh.joint_pairs)]])
     ends = np.vstack([positions[mesh.joint_pairs].mean(axis=1), positions[mesh.ends.ravel()]])[pairs]
-    points = np.concatenate([(1 - share) * ends[:, 0] + share * ends[:, 1] for share in SHARES])
-    outside = (target.margin(target.retract(points)) < 0).reshape(len(SHARES), -1).any(axis=0)
+    points = np.concatenate([(1 - share) * ends[:, 0] + share * ends[:, 1] for share in _SHARES])
+    outside = (target.margin(target.retract(points)) < 0).reshape(len(_SHARES), -1).any(axis=0)
     if outside.any() and across_openings == "refuse":
         x, y, _ = ends[np.argmax(outside)].mean(axis=0)
         raise InputError(

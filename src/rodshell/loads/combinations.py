@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from rodshell.errors import InputError
-from rodshell.loads.kinds import Load
+from rodshell.loads.kinds import Forces, Load
 from rodshell.loads.settings import Bracing, LockedJoints, Stability, Strength
 from rodshell.rods.design_strength import DURATIONS, Duration
 from rodshell.units import shown
@@ -28,7 +28,7 @@ class Loads:
     InputError : a combination names a load that is not there; there is no combination; a factor is not a number.
     """
 
-    loads: dict[str, Load]
+    loads: dict[str, Load | Forces]
     combinations: dict[str, dict[str, float]]
     bracing: Bracing | None = None
     locked_joints: LockedJoints | None = None
@@ -68,7 +68,7 @@ class Loads:
         if self.locked_joints is not None:
             instance("locked_joints", self.locked_joints, LockedJoints, "rodshell.LockedJoints(...)")
         for name, load in self.loads.items():
-            if not isinstance(load, Load):
+            if not isinstance(load, Load | Forces):
                 raise InputError(
                     f"the load {shown(name)} must be a load such as rodshell.Snow(500.0), not {described(load)}"
                 )

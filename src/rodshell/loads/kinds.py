@@ -10,7 +10,7 @@ A new kind is a class here and a member of `Load`. How long each acts where that
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
 from rodshell.errors import InputError
 from rodshell.quantities import (
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 GRAVITY = 9.81  # [m/s2]
 SAMPLES = 400  # parts of a line load
-LARGEST_COEFFICIENT = 20.0  # of wind on a surface; codes have up to about 3
+_LARGEST_COEFFICIENT = 20.0  # of wind on a surface; codes have up to about 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,10 +140,10 @@ class Wind:
 
     def _require_usual(self, largest: float, where: str) -> None:
         """InputError where that is not the pressure coefficient of any surface."""
-        if largest > LARGEST_COEFFICIENT:
+        if largest > _LARGEST_COEFFICIENT:
             raise InputError(
                 f"the wind's coefficient {shown(self.coefficient)} reaches {largest:.4g}{where}: pressure coefficients "
-                f"lie between -3 and 3, and none above {LARGEST_COEFFICIENT:g} is taken"
+                f"lie between -3 and 3, and none above {_LARGEST_COEFFICIENT:g} is taken"
             )
 
     @cached_property
@@ -281,6 +281,15 @@ class Temperature:
         return self.change * self.expansion
 
 
+@runtime_checkable
+class Forces(Protocol):
+    """Loads that are forces; one's own, which no case file names, need no more than this (`examples/own_load.py`)."""
+
+    lasting: ClassVar[Duration]
+
+    def forces(self, nodes: "LoadedNodes") -> "Floats":
+        """(n, 3) on each node [N]."""
+        ...
+
+
 Load = SelfWeight | Snow | Wind | PointLoad | LineLoad | Settlement | Temperature
-Forces = SelfWeight | Snow | Wind | PointLoad | LineLoad
-"""Loads that are forces."""

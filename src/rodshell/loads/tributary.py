@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from rodshell.targets.freeform import Freeform
 
 ACROSS = 240  # triangles' sides across the surface's larger width, at least
-A_SPACING = 24.0  # sides on the distance of two rods, at least
-MOST_ACROSS = 900
-BISECTIONS = 40
-ON_THE_EDGE = 1e-6  # of the size: a vertex of a mesh so near to its end is inside
+_A_SPACING = 24.0  # sides on the distance of two rods, at least
+_MOST_ACROSS = 900
+_BISECTIONS = 40
+_ON_THE_EDGE = 1e-6  # of the size: a vertex of a mesh so near to its end is inside
 STEEP, MOST_HALVINGS = 2.5, 8  # of the step: where the surface is steep longer sides are halved, so many times
-NEEDLE = 4.0  # a triangle's longest side over its height: longer ones are cut across first
-NEIGHBOURS, AS_NEAR = 4, 1e-6  # nodes that may share a corner, and by what share of the size their distances differ
+_NEEDLE = 4.0  # a triangle's longest side over its height: longer ones are cut across first
+_NEIGHBOURS, _AS_NEAR = 4, 1e-6  # nodes that may share a corner, and by what share of the size their distances differ
 
 REACH = 1.0  # distances of two rods: a point load farther from every rod is refused
 
@@ -128,9 +128,9 @@ def tributary_areas(
     vector = 0.5 * cross(b - a, c - a)
     shares = np.column_stack([np.sqrt(dot(vector, vector)), vector]) / 3.0
     at_corners = _sums(faces.T, [shares] * 3, len(corners))
-    wanted = range(1, 1 + min(NEIGHBOURS, len(positions)))
+    wanted = range(1, 1 + min(_NEIGHBOURS, len(positions)))
     distance, nearest = map(np.asarray, cKDTree(positions).query(corners, k=list(wanted)))
-    as_near = distance <= distance[:, :1] + AS_NEAR * target.size
+    as_near = distance <= distance[:, :1] + _AS_NEAR * target.size
     weight = as_near / as_near.sum(axis=1, keepdims=True)
     parts = [weight[:, k, None] * at_corners for k in range(nearest.shape[1])]
     result = _sums(nearest.T, parts, len(positions))
@@ -187,10 +187,10 @@ def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
     step : longest side [m].
     """
     points, faces = _divided(target, target.surface.vertices, target.surface.faces, longest=step)
-    inside = target.margin(points) >= -ON_THE_EDGE * target.size
+    inside = target.margin(points) >= -_ON_THE_EDGE * target.size
     single, double, sides = _across(inside, faces)
     low, high = points[sides[:, 0]], points[sides[:, 1]]
-    for _ in range(BISECTIONS):
+    for _ in range(_BISECTIONS):
         middle = target.retract(0.5 * (low + high))
         within = target.margin(middle)[:, None] >= 0
         low, high = np.where(within, middle, low), np.where(within, high, middle)
@@ -201,8 +201,8 @@ def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
 
 
 def _step(target: Target, spacing: float) -> float:
-    finest = 2.0 * target.size / MOST_ACROSS
-    return max(finest, min(2.0 * target.size / ACROSS, spacing / A_SPACING))
+    finest = 2.0 * target.size / _MOST_ACROSS
+    return max(finest, min(2.0 * target.size / ACROSS, spacing / _A_SPACING))
 
 
 def _lifted(target: Target, plan: Floats) -> tuple[Floats, Bools]:
@@ -272,7 +272,7 @@ def _without_needles(corners: Floats, longest: float) -> Floats:
     would be needlessly small."""
     sides, (a, b, c) = _sides(corners), corners.transpose(1, 0, 2)
     length, double_area = sides.max(axis=1), np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    needle = (length**2 > NEEDLE * double_area) & (length > longest)
+    needle = (length**2 > _NEEDLE * double_area) & (length > longest)
     turned = (sides[needle].argmax(axis=1)[:, None] + np.arange(3)) % 3  # the longest side comes first
     a, b, c = np.take_along_axis(corners[needle], turned[:, :, None], axis=1).transpose(1, 0, 2)
     foot = a + (dot(c - a, b - a) / dot(b - a, b - a))[:, None] * (b - a)  # of the height on the longest side
@@ -328,7 +328,7 @@ def _halved(target: Target, points: Floats, faces: Ints, *, longest: float) -> t
 def _ends_of(target: Target, plan: Floats, z: Floats, inner: Ints, outer: Ints) -> tuple[Floats, Floats]:
     """Where the sides from inner to outer points meet the surface's end: the last points (k, 2) inside, and heights."""
     low, high, height = plan[inner].copy(), plan[outer].copy(), z[inner].copy()
-    for _ in range(BISECTIONS):
+    for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         there, within = _lifted(target, middle)
         low[within], height[within] = middle[within], there[within]

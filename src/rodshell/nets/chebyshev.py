@@ -29,12 +29,12 @@ from rodshell.targets import Target
 from rodshell.units import length_text, shown
 from rodshell.validation import instance, number, point
 
-SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
+_SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
 SEARCHES = (2, 4, 8)  # steps per spacing of the march that finds the lines; more where the net extends further
 LOOSE = 0.05  # spacings: a larger error of a rod end gives a warning
-GRAZING = 0.01  # spacings: a line that is nowhere further inside than this runs along the end, and is ignored
+_GRAZING = 0.01  # spacings: a line that is nowhere further inside than this runs along the end, and is ignored
 SHORTEST = 2.0  # spacings: a rod that is no longer has fewer than three joints, and is not built
-AT_JOINT = 1e-5  # edges: a rod that ends this near a joint ends at it, since round-off bends the edge between them
+_AT_JOINT = 1e-5  # edges: a rod that ends this near a joint ends at it, since round-off bends the edge between them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,7 +161,7 @@ def chebyshev_net(
     if eccentricity:
         _require_room(target, fine, 0.5 * eccentricity)
     angle, where = _smallest_angle(fine)
-    if degrees(angle) < SMALLEST_ANGLE:
+    if degrees(angle) < _SMALLEST_ANGLE:
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
     cuts, error, loosest = _extrapolate(target, lines, (coarse, fine), min(layout.spacing))
     ends = _at_joints(cuts[0], lines.u, layout), _at_joints(cuts[1], lines.v, layout)
@@ -325,7 +325,7 @@ def _extrapolate(
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
         sets.append(Lines(net.u, *_columns(net.points, net.inside, column)))
         sets.append(Lines(net.v, net.points.take(row, axis=0), net.inside.take(row, axis=0)))
-    cuts = cut_lines(target, sets, depth=GRAZING * spacing)
+    cuts = cut_lines(target, sets, depth=_GRAZING * spacing)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
     in_u, errors_u = extrapolated(cuts[0], cuts[2], len(lines.v), step)
     in_v, errors_v = extrapolated(cuts[1], cuts[3], len(lines.u), step)
@@ -344,7 +344,7 @@ def _extrapolate(
 def _at_joints(cuts: Cuts, stations: Floats, layout: GridLayout) -> Cuts:
     """The cuts of one family's lines, those next to one of the `stations` (n,) where they are crossed moved to it."""
     joints = stations[_nearest(stations, cuts.ends)]
-    return Cuts(cuts.line, np.where(np.abs(cuts.ends - joints) < AT_JOINT * layout.edge, joints, cuts.ends))
+    return Cuts(cuts.line, np.where(np.abs(cuts.ends - joints) < _AT_JOINT * layout.edge, joints, cuts.ends))
 
 
 @njit()
@@ -383,18 +383,18 @@ def _name_rods(
                 dropped.append((name, "it never touches the target"))
                 continue
             parts = pieces.pop(offset)
-            names = piece_names(name, len(parts))
+            names = _piece_names(name, len(parts))
             for label, (start, end) in zip(names, parts, strict=True):
                 rods.append(make(label, offset, start, end, virtual=label in layout.left_out))
             if len(parts) > 1:
                 broken[name] = tuple(names)
         for offset, parts in pieces.items():
-            labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
+            labels = _piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
             rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
     return tuple(rods), dropped, broken
 
 
-def piece_names(rod: str, count: int) -> list[str]:
+def _piece_names(rod: str, count: int) -> list[str]:
     """Names of the pieces of a rod: U07, or U07a, U07b, ... if there are several.
 
     Parameters

@@ -24,11 +24,11 @@ from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
-STRIDE = 0.2  # of the target's size: steps of the first march
+_STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # steps of the first march, from the anchor each way
 ROUGH = 5e-2  # of a step: tolerance of the first march, which leaves its square
-FAIR = 1e-2  # of the size: last motion of the march that finds the lines, see `march_near`
-FEWEST_STEPS = 6  # from each line to the next
+_FAIR = 1e-2  # of the size: last motion of the march that finds the lines, see `march_near`
+_FEWEST_STEPS = 6  # from each line to the next
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,7 +90,7 @@ def march_covering(
     net = march_near(target, u, v, start, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged)
     while True:
         found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
-        if not want_nodes(found, 0, u, v, SURELY * margin, wanted):
+        if not _want_nodes(found, 0, u, v, SURELY * margin, wanted):
             return found
         fill_quadrants(target, net, wanted, tolerance=converged**1.5)
 
@@ -110,11 +110,11 @@ def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats
     (nu, nv) booleans.
     """
     wanted = np.zeros((len(u), len(v)), dtype=bool)
-    want_nodes(near, past, u, v, margin, wanted)
+    _want_nodes(near, past, u, v, margin, wanted)
     return wanted
 
 
-def want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats, wanted: Bools) -> bool:
+def _want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats, wanted: Bools) -> bool:
     """Add to the nodes `wanted` (nu, nv) those of `wanted_nodes`; return whether any was not wanted before."""
     if near.inside.any():
         return bool(_want(near.inside, near.u, near.v, past, u, v, *margin, wanted))
@@ -211,7 +211,7 @@ def find_lines(
                 f"{raised(MOST_NODES, 10 * counts.prod())}"
             )
         u, v = (np.arange(-steps[k, 0], steps[k, 1] + 1) * step[k] for k in (0, 1))
-        near = march_covering(target, u, v, start, margin, near, heights=heights, converged=FAIR)
+        near = march_covering(target, u, v, start, margin, near, heights=heights, converged=_FAIR)
         if not near.inside.any():
             raise InputError("no node of the net is inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare
@@ -231,7 +231,7 @@ def _across(layout: GridLayout) -> Floats:
 
 def _stride(target: Target, start: Axes, heights: Heights) -> Covering:
     """The first net, in long steps: its axes, and the nodes between the parts of them that are inside."""
-    s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(STRIDE * target.size)
+    s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(_STRIDE * target.size)
     net = Net(s, s, np.full((len(s), len(s), 3), np.nan), heights=heights)
     lay_axes(target, net, start, tolerance=ROUGH)
     inside = target.margin(np.concatenate([net.points[:, STRIDES], net.points[STRIDES]])).reshape(2, -1) > 0
@@ -297,7 +297,7 @@ def _coarser(target: Target) -> str:
 def _steps(offsets: Floats, edge: float) -> Ints:
     """Steps from line to line: an even number of at least six, as many as edges if these are enough."""
     edges = edge_counts(np.diff(offsets), edge)
-    return np.where(edges < FEWEST_STEPS, 2 * np.maximum(FEWEST_STEPS // 2, edges), edges + edges % 2)
+    return np.where(edges < _FEWEST_STEPS, 2 * np.maximum(_FEWEST_STEPS // 2, edges), edges + edges % 2)
 
 
 @njit()

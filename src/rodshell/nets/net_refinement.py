@@ -35,7 +35,7 @@ from rodshell.targets import Implicit, Target
 ROUNDS = 6
 CONVERGED = 2e-5  # of the size, and of a step on local models: the last motion, of which the third power is left
 EXACT = 1e-13  # of the step, on a local model
-CLEARLY = 1.5  # ratio of the squares of the steps of two nets, above which their difference can be extrapolated
+_CLEARLY = 1.5  # ratio of the squares of the steps of two nets, above which their difference can be extrapolated
 BEYOND = 2.5  # steps of the known net by which a guess may be outside it
 
 
@@ -76,7 +76,7 @@ def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
         (along[-1] - along[0]) * (across[-1] - across[0]) / ((len(along) - 1) * (len(across) - 1))
         for along, across in ((u, v), (near.u, near.v), (coarser.u, coarser.v))
     )
-    if coarse <= CLEARLY * fine:
+    if coarse <= _CLEARLY * fine:
         return near
     points = interpolated(coarser, near.u, near.v)
     _add_change(near.points, points, (fine - requested) / (coarse - fine))

@@ -13,7 +13,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.geometry.bounds import bounds
 
-Anchor = Literal["start", "middle", "end"]
+_Anchor = Literal["start", "middle", "end"]
 T = TypeVar("T", float, Floats)
 
 INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"
@@ -26,8 +26,8 @@ BELOW = 0.2  # of which this much is below its baseline
 # The typeface of PDF and PNG: DejaVu Sans Condensed 2.37, unchanged, under the licence in fonts/LICENSE.txt. It covers
 # Latin, Greek and Cyrillic, and is about as wide as Helvetica, in which browsers and CAD programs show the same
 # drawings. System fonts are never used, so that files are the same on every computer.
-FONTS = pathlib.Path(__file__).with_name("fonts")
-REGULAR, BOLD = (FONTS / f"DejaVuSansCondensed{weight}.ttf" for weight in ("", "-Bold"))
+_FONTS = pathlib.Path(__file__).with_name("fonts")
+REGULAR, BOLD = (_FONTS / f"DejaVuSansCondensed{weight}.ttf" for weight in ("", "-Bold"))
 CAPITAL = 0.729  # height of a capital over the text size
 
 
@@ -134,7 +134,7 @@ class Text(NamedTuple):
     at: Floats
     size: float
     layer: str
-    anchor: Anchor = "start"
+    anchor: _Anchor = "start"
     angle: float = 0.0
     bold: bool = False
     colour: str = ""
@@ -146,7 +146,7 @@ class Text(NamedTuple):
         return np.array(corners(x, y, cos(self.angle), sin(self.angle), self.size, len(self.text), BACK[self.anchor]))
 
 
-BACK: dict[Anchor, float] = {"start": 0.0, "middle": -0.5, "end": -1.0}  # where a text begins, in its widths
+BACK: dict[_Anchor, float] = {"start": 0.0, "middle": -0.5, "end": -1.0}  # where a text begins, in its widths
 
 
 def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[T, T]]:

@@ -12,11 +12,11 @@ from rodshell.arrays import Bools, Floats
 from rodshell.geometry.boxes import boxes_meet, lines_meet, lines_near
 from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
 
-Extent = tuple[float, float, float, float]
+_Extent = tuple[float, float, float, float]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
 CLOSE = 5  # positions that are tried on a label's line
-STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # and next to it
+STEPS, _TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # and next to it
 THIN = 0.1  # what a line takes, over the size of its text
 
 
@@ -56,7 +56,7 @@ class Label(NamedTuple):
         return np.array([(x, y), (a + c * u - s * v, b + s * u + c * v)])
 
 
-MOST_SQUARES = 10_000  # that a box is found by; one that lies in more is compared with all
+_MOST_SQUARES = 10_000  # that a box is found by; one that lies in more is compared with all
 WIDE = ()
 
 
@@ -68,7 +68,7 @@ class Room:
 
     def __init__(self, square: float, within: "Room | None" = None) -> None:
         self._square = square
-        self._taken: dict[tuple[int, ...], list[tuple[Extent, Floats]]] = {}
+        self._taken: dict[tuple[int, ...], list[tuple[_Extent, Floats]]] = {}
         self._boxes = list[Floats]()
         self._within = within
 
@@ -105,15 +105,15 @@ class Room:
         for box in other._boxes:
             self.take(box)
 
-    def _squares(self, extent: Extent) -> list[tuple[int, ...]]:
+    def _squares(self, extent: _Extent) -> list[tuple[int, ...]]:
         (left, low, right, high), square = extent, self._square
-        if (right - left + square) * (high - low + square) > MOST_SQUARES * square**2:
+        if (right - left + square) * (high - low + square) > _MOST_SQUARES * square**2:
             return [WIDE]
         rows = range(int(low // square), int(high // square) + 1)
         return [(x, y) for x in range(int(left // square), int(right // square) + 1) for y in rows]
 
 
-def _extent(box: Floats) -> Extent:
+def _extent(box: Floats) -> _Extent:
     """Lowest x and y, highest x and y."""
     (a, b, c, d), (e, f, g, h) = box.T.tolist()
     return min(a, b, c, d), min(e, f, g, h), max(a, b, c, d), max(e, f, g, h)
@@ -137,7 +137,7 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
     for end in (0, 1):
         for k in np.flatnonzero(wanted[:, end]).tolist():
             choices = _on_own_line(texts[k], rods[k, end], rods[k, 1 - end], size)
-            label = next((label for label in choices if fits(label, size, room, rods)), None)
+            label = next((label for label in choices if _fits(label, size, room, rods)), None)
             if label is not None:
                 placed.append(label)
                 take(label, size, room)
@@ -167,11 +167,11 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
     half = 0.5 * size * np.array([LETTER * len(text), LINE])
     reach = 0.5 * (STEPS + 2) * size + 2 * float(half.max())
     lines = lines_near(lines, end - reach, end + reach)
-    for step, turn in ((step, turn) for step in range(STEPS) for turn in TURNS):
+    for step, turn in ((step, turn) for step in range(STEPS) for turn in _TURNS):
         ray = np.array([np.cos(first + turn), np.sin(first + turn)])
         to_side = float(np.min(half / np.maximum(np.abs(ray), 1e-12)))  # from the box's middle to its rim
         label = Label(text, end + ((0.8 + 0.5 * step) * size + to_side) * ray, 0.0, end, moved=True)
-        if fits(label, size, room, lines):
+        if _fits(label, size, room, lines):
             return label
     return None
 
@@ -189,7 +189,7 @@ def take(label: Label, size: float, room: Room) -> None:
         room.take(thin(label.leader(size), THIN * size))
 
 
-def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
+def _fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
     """Whether a label and the line to it find room; the label must cover none of the lines.
 
     Parameters
@@ -200,11 +200,11 @@ def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
     return (
         room.free(box)
         and not lines_meet(box, lines)
-        and (not label.moved or room.free(off_its_mark(label.leader(size), size)))
+        and (not label.moved or room.free(_off_its_mark(label.leader(size), size)))
     )
 
 
-def off_its_mark(line: Floats, size: float) -> Floats:
+def _off_its_mark(line: Floats, size: float) -> Floats:
     """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is.
 
     Parameters
@@ -285,10 +285,10 @@ def upright(angle: float) -> float:
 
 # Callouts
 
-CALLOUT_SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names: the largest at which all of an outline find room
+_CALLOUT_SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names: the largest at which all of an outline find room
 OFF = 1.3  # from a place to where its name may begin
 GAPS = (1.1, 1.7, np.inf)  # from name to name, or what there is all around; at the wider ones their ways turn evenly
-EVENED = 6  # times
+_EVENED = 6  # times
 MANY = 24  # names: where more find no room, the drawing needs a larger scale, not other places for them
 FARTHEST = 8.0  # from a place to the start of its name's line
 
@@ -329,14 +329,14 @@ def callouts(
     away : (k, 2) unit vectors from each place to the side where its name is to stand.
     """
     best: _Tried | None = None
-    for size, gap in ((text * share, gap) for gap in GAPS for share in CALLOUT_SIZES):
+    for size, gap in ((text * share, gap) for gap in GAPS for share in _CALLOUT_SIZES):
         tried = _tried(names, points, away, size, gap, room, lines)
         best = tried if best is None or tried.missing < best.missing else best
         if not best.missing or (size <= text * SMALL and best.missing > MANY):
             break
     assert best is not None
     room.join(best.room)
-    sizes = [text * share for share in CALLOUT_SIZES if text * share <= best.size]
+    sizes = [text * share for share in _CALLOUT_SIZES if text * share <= best.size]
     found = list[Callout]()
     for label, name, place, way in zip(best.labels, names, points, away, strict=True):
         if label is not None:
@@ -385,7 +385,7 @@ def _slots(points: Floats, away: Floats, size: float, gap: float) -> tuple[Float
 
     gap : from a name to the next, in text sizes; less if the outline is too short.
     """
-    for _ in range(EVENED if gap > GAPS[0] else 0):
+    for _ in range(_EVENED if gap > GAPS[0] else 0):
         away = _unit(np.roll(away, 1, axis=0) + 2 * away + np.roll(away, -1, axis=0))
     aside = points + OFF * size * away
     steps = np.linalg.norm(np.roll(aside, -1, axis=0) - aside, axis=1)  # to the next place, all around
@@ -408,13 +408,13 @@ def _free(name: str, place: Floats, start: Floats, way: Floats, size: float, roo
     """The first free place of a name along its line, taken with the line to it."""
     angle = upright(float(np.arctan2(way[1], way[0])))
     half = (0.3 + 0.5 * LETTER * len(name)) * size
-    foot = off_its_mark(np.array([place, start]), size)
+    foot = _off_its_mark(np.array([place, start]), size)
     near = float(np.linalg.norm(start - place)) < FARTHEST * size
     reach = 2 * half + CLOSE * size
     lines = lines_near(lines, start - reach, start + reach)
     for step in range(CLOSE if near and room.free(foot) else 0):
         label = Label(name, start + (half + 0.5 * step * size) * way, angle, start, moved=True)
-        if fits(label, size, room, lines) and room.free(thin(label.leader(size), THIN * size)):
+        if _fits(label, size, room, lines) and room.free(thin(label.leader(size), THIN * size)):
             room.take(foot)
             take(label, size, room)
             return label

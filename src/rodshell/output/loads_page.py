@@ -18,9 +18,9 @@ from rodshell.results.wording import millimetres, percent, rounded, rounded_down
 from rodshell.units import percent_text
 
 CLOSE = 1.005  # both factors are found within 0.2 %: a larger ratio of theirs says something
-MOST_NAMES = 4  # of joints that slip
-MOST_MODES = 3  # pictures, of the combination that falls first
-BY = {
+_MOST_NAMES = 4  # of joints that slip
+_MOST_MODES = 3  # pictures, of the combination that falls first
+_BY = {
     "bending": "bending and axial force",
     "shear": "torsion and shear force",
     "slip": "slip of a joint",
@@ -96,7 +96,7 @@ def _strength(results: Results, name: str, ends: Ends, shell: LoadedShell) -> li
     where = ""
     if place is not None:
         at = millimetres(place.at, rounding=rounding_of(results))
-        where = f"{BY.get(place.by or '', place.by or '')}: {place.rod}, {at} from its start"
+        where = f"{_BY.get(place.by or '', place.by or '')}: {place.rod}, {at} from its start"
     return [
         name,
         ends,
@@ -156,7 +156,7 @@ def _frequencies(shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[str]:
 def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[tuple[str, Ends, str]]:
     """Caption, ends and state of the pictures: of the combination that falls first."""
     name, ends, shell = min(shells, key=lambda each: np.inf if each[2].limit_factor is None else each[2].limit_factor)
-    for k, factor in enumerate(shell.mode_factors[:MOST_MODES].tolist(), start=1):
+    for k, factor in enumerate(shell.mode_factors[:_MOST_MODES].tolist(), start=1):
         state = f"loaded_buckling_{ends}_{name}_{k}"
         if state in archive.states and not isnan(factor):
             yield (
@@ -195,14 +195,14 @@ def _joints(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     """Moments of locked joints, and which joints slip."""
     largest = float(np.abs(np.nan_to_num(shell.joint_moments)).max(initial=0.0))
     slip = None if shell.utilisations is None else shell.utilisations.slip
-    more = f" and {len(shell.slipping) - MOST_NAMES} more" if len(shell.slipping) > MOST_NAMES else ""
+    more = f" and {len(shell.slipping) - _MOST_NAMES} more" if len(shell.slipping) > _MOST_NAMES else ""
     return [
         name,
         ends,
         rounded(largest),
         shell.joint_moment_at or "",
         "not known" if slip is None else percent(slip),
-        "not known" if slip is None else ", ".join(shell.slipping[:MOST_NAMES]) + more or "none",
+        "not known" if slip is None else ", ".join(shell.slipping[:_MOST_NAMES]) + more or "none",
     ]
 
 

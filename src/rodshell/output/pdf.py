@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 POINTS = 72 / 25.4  # of a millimetre
 QUARTER = 4 / 3 * (sqrt(2) - 1)  # length of the handles of a quarter circle's Bezier curve over the radius
 SANS = {False: "rodshell-sans", True: "rodshell-sans-bold"}
-ONE_AT_A_TIME = Lock()
-MOST_NAMED = 10  # characters without a glyph that a warning shows
+_ONE_AT_A_TIME = Lock()
+_MOST_NAMED = 10  # characters without a glyph that a warning shows
 
 
 def drawings_pdf(sheets: Sequence[Drawing], paper: tuple[float, float], title: str) -> bytes:
@@ -81,7 +81,7 @@ def _settings() -> Iterator[None]:
 
     Both hold for the whole process, so that only one thread at a time writes a file.
     """
-    with ONE_AT_A_TIME:
+    with _ONE_AT_A_TIME:
         before, rl_config.useA85 = rl_config.useA85, 0
         no_date = os.environ.pop("SOURCE_DATE_EPOCH", None) if source_date() is None else None
         try:
@@ -114,9 +114,9 @@ def _warn_of_missing_glyphs(texts: Iterable[str]) -> None:
     glyphs = getFont(SANS[False]).face.charToGlyph
     missing = sorted(letter for letter in set().union(*texts) if ord(letter) not in glyphs)
     if missing:
-        more = f" and {len(missing) - MOST_NAMED} more" if len(missing) > MOST_NAMED else ""
+        more = f" and {len(missing) - _MOST_NAMED} more" if len(missing) > _MOST_NAMED else ""
         warnings.warn(
-            f"the PDF shows boxes for characters that its typeface lacks: {' '.join(missing[:MOST_NAMED])}{more}",
+            f"the PDF shows boxes for characters that its typeface lacks: {' '.join(missing[:_MOST_NAMED])}{more}",
             OutputWarning,
             stacklevel=3,
         )

@@ -12,7 +12,7 @@ import numpy as np
 from rodshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Text
 
 SCALE = "1:1 in mm"  # of a drawing's file, after its title
-FLIP = np.array([1.0, -1.0])
+_FLIP = np.array([1.0, -1.0])
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans Condensed', sans-serif"
 
 
@@ -129,7 +129,7 @@ def _shapes(drawing: Drawing) -> Iterator[str]:
 
 def _data(paths: Sequence[Path]) -> str:
     """Data of paths without names, to 0.01 of a unit; zeros have no sign."""
-    points = np.round(np.concatenate([path.points for path in paths]) * FLIP, 2) + 0.0
+    points = np.round(np.concatenate([path.points for path in paths]) * _FLIP, 2) + 0.0
     return "".join([_data_of(len(path.points), path.closed) for path in paths]) % tuple(points.ravel().tolist())
 
 

@@ -38,12 +38,12 @@ COLUMNS = (
     "changed", "to", "times the base", "on", "G0 change, rms [mm]", "max [mm]", "G0 off the net, rms [mm]",
     "largest strain", "how it rests",
 )  # fmt: skip
-FULL, RING, BOX = "\N{BLACK CIRCLE}", "\N{LARGE CIRCLE}", "\N{WHITE SQUARE}"
+FULL, _RING, BOX = "\N{BLACK CIRCLE}", "\N{LARGE CIRCLE}", "\N{WHITE SQUARE}"
 PARAMETERS = {
     "E": ("#1f5f8b", FULL), "r": ("#a8552a", FULL), "g": ("#2f8f4e", FULL), "H": ("#8a3fa0", FULL),
-    "EA alone": ("#22282f", RING), "EI alone": ("#b8862a", BOX),
+    "EA alone": ("#22282f", _RING), "EI alone": ("#b8862a", BOX),
 }  # fmt: skip
-PENALTIES = {
+_PENALTIES = {
     "C1 explicit": ("#1f5f8b", FULL), "C1 implicit": ("#a8552a", BOX), "C2, 2 linkers": ("#2f8f4e", FULL),
     "C2, 4 linkers": ("#8a3fa0", FULL),
 }  # fmt: skip
@@ -107,12 +107,12 @@ class Studies(Figure):
 
     def pictures(self) -> dict[str, str]:
         """Both charts."""
-        return {"studies": studies_svg(self.lines)}
+        return {"studies": _studies_svg(self.lines)}
 
 
 def make(progress: Progress) -> Studies:
     """All runs."""
-    return Studies((*of_statics(progress), *of_height(progress), *of_penalties(progress)))
+    return Studies((*of_statics(progress), *of_height(progress), *_of_penalties(progress)))
 
 
 def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Line]:
@@ -146,7 +146,7 @@ def of_height(progress: Progress, *, factors: tuple[float, ...] = HEIGHTS) -> It
         yield _line("H", f"{1e3 * height:g} mm", factor, base, partial(_fallen, Fall(drag=DRAG, height=height)))
 
 
-def of_penalties(progress: Progress) -> Iterator[Line]:
+def _of_penalties(progress: Progress) -> Iterator[Line]:
     """C1 and C2, by falls."""
     runs: list[tuple[str, str, float, Coupling, Joint | None]] = []
     for power in range(6, 9):
@@ -212,7 +212,7 @@ def _stiff(EA: float = 1.0, EI: float = 1.0) -> Rod:
     return Rod(section)
 
 
-def studies_svg(lines: Sequence[Line]) -> str:
+def _studies_svg(lines: Sequence[Line]) -> str:
     """Both charts."""
     across = ("(a)  times the base case", "(b)  C1 over 1e6 EI, C2 over GJ/l")
     return charts_svg(
@@ -223,7 +223,7 @@ def studies_svg(lines: Sequence[Line]) -> str:
                 "change of G0, rms [mm]",
                 [(f"{sign} {name}", colour) for name, (colour, sign) in looks.items()],
             )
-            for looks, title in zip((PARAMETERS, PENALTIES), across, strict=True)
+            for looks, title in zip((PARAMETERS, _PENALTIES), across, strict=True)
         ]
     )
 

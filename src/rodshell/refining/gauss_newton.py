@@ -18,9 +18,9 @@ from rodshell.refining.structure import Point
 from rodshell.refining.variables import Variables
 
 ENOUGH = 0.01  # relative decrease of the root of the sum of squares below which a foreseen step is not worth taking
-NEAR_ENOUGH = 1e-5  # relative gap, of which the mesh knows no more
-POOR, GOOD = 0.25, 0.75  # actual over foreseen decrease
-FIRM, LEAST_RADIUS = 0.1, 1e-3  # radius that must not bound a step which says that there is no more to gain; the least
+_NEAR_ENOUGH = 1e-5  # relative gap, of which the mesh knows no more
+_POOR, GOOD = 0.25, 0.75  # actual over foreseen decrease
+FIRM, _LEAST_RADIUS = 0.1, 1e-3  # radius that must not bound a step which says that there is no more to gain; the least
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ def gauss_newton(
     box = variables.box
     here, accepted, steps, factorizations = first, [first], list[Step](), 1
     converged, fresh, stopped = False, True, ""
-    while len(steps) < most and radius >= LEAST_RADIUS:
-        if here.rms < NEAR_ENOUGH:
+    while len(steps) < most and radius >= _LEAST_RADIUS:
+        if here.rms < _NEAR_ENOUGH:
             converged = True
             break
         if fresh:
@@ -116,7 +116,7 @@ def gauss_newton(
             good = allows(there)
         rms = None if there is None else there.rms
         steps.append(Step(len(steps) + 1, rms, lowest, radius, good, tuple(values.tolist())))
-        if not good or gain < POOR:
+        if not good or gain < _POOR:
             radius *= 0.3 if there is None else 0.5
         elif gain > GOOD and reached:
             radius *= 2.0

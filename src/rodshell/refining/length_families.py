@@ -51,7 +51,7 @@ class Stations:
         values : (n,) the design [m].
         """
         mesh, held = self.structure.mesh, len(self.structure.held)
-        before, after = edge_entries(mesh)
+        before, after = _edge_entries(mesh)
         slopes = csc_array(self.shifts[after] - self.shifts[before])
         none = Change.none(len(mesh.edges), held, len(values))
         return replace(none, lengths=slopes @ values, length_slopes=slopes)
@@ -63,7 +63,7 @@ class Stations:
         ----------
         values : (n,) the design [m].
         """
-        return replace(grid, mesh=restationed(grid.mesh, self.shifts @ values, self.across @ values))
+        return replace(grid, mesh=_restationed(grid.mesh, self.shifts @ values, self.across @ values))
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class Holes:
         return Stations(structure, between(mesh, points) @ moved, box, image, none)
 
 
-def edge_entries(mesh: GridMesh) -> tuple[Ints, Ints]:
+def _edge_entries(mesh: GridMesh) -> tuple[Ints, Ints]:
     """(e,) entries of `rod_nodes` at which each edge begins and ends."""
     begins = np.setdiff1d(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
     return begins, begins + 1
@@ -177,7 +177,7 @@ def between(mesh: GridMesh, points: Ints) -> csr_array:
     return csr_array((np.append(1.0 - share, share), (rows, columns)), shape=(len(every), len(every)))
 
 
-def restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
+def _restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
     """A mesh whose nodes are moved along their rods, and whose rods are moved across themselves.
 
     Parameters

@@ -24,7 +24,7 @@ from rodshell.rods.section import Rod
 from rodshell.rods.varied import sizes
 from rodshell.validation import choice
 
-Per = Literal["shell", "family", "rod"]
+_Per = Literal["shell", "family", "rod"]
 PROBE = 1e-4  # of a number of a profile: differences are then exact to 1e-8
 
 
@@ -122,12 +122,12 @@ class Taper:
     """
 
     ratio: float = 8.0
-    per: Per = "shell"
+    per: _Per = "shell"
     stations: int = 5
     varies: Varies = "size"
 
     def __post_init__(self) -> None:
-        choice("per", self.per, get_args(Per))
+        choice("per", self.per, get_args(_Per))
         if not self.ratio > 1.0:
             raise InputError(f"the ratio of a taper must be larger than 1, not {self.ratio}")
         if not self.stations >= 2:
@@ -178,7 +178,7 @@ class DoubleLaths:
         return Profiles(structure, zero, lambda share: Profile.double(float(share[0])), box)
 
 
-RENARD = (0.63, 0.71, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6)  # preferred numbers, series R20 [ISO 3]
+_RENARD = (0.63, 0.71, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6)  # preferred numbers, series R20 [ISO 3]
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ class Sections:
         given = sizes(structure.rod, self.varies, np.ones(1))
         if given is None:
             raise InputError("sections of stock vary the size of a section: this rod has none; use taper")
-        wanted = given[0] * np.array(RENARD) if self.stock is None else np.array(sorted(self.stock))
+        wanted = given[0] * np.array(_RENARD) if self.stock is None else np.array(sorted(self.stock))
         if len(wanted) < 2 or wanted[0] <= 0:
             raise InputError(f"sections of stock are two positive sizes or more in m, not {self.stock}")
         table = np.linspace(-6.0, 6.0, 601)  # of log EI; a size is a power of EI, and so are the values in between

@@ -14,7 +14,7 @@ from rodshell.refining.objectives import Objective, residuals, slopes
 from rodshell.refining.structure import Point
 from rodshell.refining.variables import Design
 
-REPAIRS = 4
+_REPAIRS = 4
 GAIN = 1e-3  # relative decrease of the sum of squares for which a size is changed
 PARTS = (1, 2, 4)  # the way to the rounded design, in so many steps where fewer do not lead there
 
@@ -40,7 +40,7 @@ def rounded(
     stock = variables.stock
     here, made = _towards(variables, found, nearest(stock, found.values))
     best = here if here is not None and allows(here) else None
-    for _ in range(REPAIRS):
+    for _ in range(_REPAIRS):
         if here is None:
             break
         made += 1

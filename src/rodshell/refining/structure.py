@@ -26,7 +26,7 @@ from rodshell.targets import Target
 MOST_ITERATIONS = 10  # from a predicted state
 STRAYED = 0.05  # of the length: an equilibrium further from the prediction may be another one
 SMALLEST_STEP = 0.01  # of a load
-FALLEN = 0.2  # of the length: a step of the load in which a node moves further is a fall
+_FALLEN = 0.2  # of the length: a step of the load in which a node moves further is a fall
 MODES = 3  # of which the lowest may become the lowest of all
 
 
@@ -256,7 +256,7 @@ def under_load(unloaded: Equilibrium, load: Floats) -> tuple[Equilibrium | None,
         problem = replace(here.problem, load=(1.0 - there) * first + there * load)
         found = find_equilibrium(problem, here.state, here.forces, most_iterations=2 * MOST_ITERATIONS)
         made += found.report.factorizations
-        if found.report.stable and farthest(here, found) <= FALLEN * problem.length:
+        if found.report.stable and farthest(here, found) <= _FALLEN * problem.length:
             path.accept()
             here = found
         else:

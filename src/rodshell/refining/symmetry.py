@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.layout import GridMesh
 
-SAME_FLAT, SAME_SHAPE = 1e-6, 1e-4  # of the size: rods are cut to 1e-6, and drapes converge to 1e-5
+_SAME_FLAT, SAME_SHAPE = 1e-6, 1e-4  # of the size: rods are cut to 1e-6, and drapes converge to 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +78,11 @@ def symmetries(mesh: GridMesh, shape: Floats) -> tuple[Operation, ...]:
         for turn in (np.linalg.matrix_power(quarter, turns) @ part for part in (np.eye(2), mirror)):
             there = flat.copy()
             there[:, :2] = flat[:, :2] @ turn.T
-            rods = _rods_there(mesh, there, flat, SAME_FLAT * size)
+            rods = _rods_there(mesh, there, flat, _SAME_FLAT * size)
             if rods is None or np.array_equal(turn, np.eye(2)):
                 continue
             nodes = _nodes_there(mesh, *rods)
-            if nodes is None or np.abs(there - flat[nodes]).max() > SAME_FLAT * size:
+            if nodes is None or np.abs(there - flat[nodes]).max() > _SAME_FLAT * size:
                 continue
             if all(
                 _congruent(part, part[nodes]) < SAME_SHAPE * size for part in np.split(shape, shape.shape[1] // 3, 1)

@@ -12,8 +12,8 @@ from rodshell.rods.materials import Material, PresetName
 
 Duration = Literal["permanent", "long", "medium", "short", "instantaneous"]
 DURATIONS: tuple[Duration, ...] = ("permanent", "long", "medium", "short", "instantaneous")
-ServiceClass = Literal[1, 2, 3]
-COVERED: ServiceClass = 2  # where none is given
+_ServiceClass = Literal[1, 2, 3]
+_COVERED: _ServiceClass = 2  # where none is given
 RESERVED = (
     0.5  # share of a characteristic, short-term strength that rods may use permanently where no factors are known
 )
@@ -90,5 +90,5 @@ def permanent_strength(material: Material, service_class: int | None = None) -> 
     if material.name is None or material.bending_strength is None:
         return None
     factors = DESIGN.get(material.name)
-    share = RESERVED if factors is None else factors.by_duration(service_class or COVERED)["permanent"]
+    share = RESERVED if factors is None else factors.by_duration(service_class or _COVERED)["permanent"]
     return share * material.bending_strength

@@ -61,7 +61,7 @@ def varied(rod: Rod, varies: str, factors: Floats) -> Varied:
     ------
     InputError : the section has no such length.
     """
-    require_varies(rod, varies)
+    _require_varies(rod, varies)
     same = np.ones_like(factors)
     if varies == "laths":
         return Varied(factors, factors, factors, factors, factors, same, same, factors, same, same)
@@ -87,7 +87,7 @@ def varied(rod: Rod, varies: str, factors: Floats) -> Varied:
     return Varied(bend1, bend2, twist, area, rotary, first, second, first, second, lever / unchanged)
 
 
-def require_varies(rod: Rod, varies: str) -> None:
+def _require_varies(rod: Rod, varies: str) -> None:
     """Refuse a length that a rod's section does not have.
 
     Parameters

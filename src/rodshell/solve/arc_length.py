@@ -26,18 +26,18 @@ from rodshell.solve.sparse_ldl import SingularError
 from rodshell.solve.tangent import Tangent, generic, negative_mode, orthonormal, subspace_iteration
 
 MODES = 4  # lowest ones that are looked at
-MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative error of the lowest eigenvalue: modes only say how far to go
-RAMPS = 1, 4, 16  # equal parts of a displacement, until one of them succeeds
-LOSING_CLOSE = 1e-5  # relative error of the eigenvalue of the mode that gives way
+_MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative error of the lowest eigenvalue: modes only say how far to go
+_RAMPS = 1, 4, 16  # equal parts of a displacement, until one of them succeeds
+_LOSING_CLOSE = 1e-5  # relative error of the eigenvalue of the mode that gives way
 MOST_STEPS = 12  # of Newton's method for a point
 STRAYED = 0.3  # of a step: a point so far off its prediction may be on another path. Half of it is aimed at
 NEGLIGIBLE = 1e-6  # of the length: a path no farther off than this is the same
-SETTLED, SETTLED_FORCE = 1e-10, 1e-8  # of the length and of the largest axial force: last change of a point
+SETTLED, _SETTLED_FORCE = 1e-10, 1e-8  # of the length and of the largest axial force: last change of a point
 CHORD, SLOW = 5e-3, 0.2  # as in `newton_step`
 FINE = 1e-3  # of how far a point may stray: steps that small, and no longer smaller, are round-off next to a singular K
-SAME_STIFFNESS = 1e-5, 1e-4  # of length and force: factors from this near are those of the point
-PROBE, PROBE_FACTOR = 1e-5, 0.1  # of the length; at most, of the factor: over which the stiffness's change is taken
-PER_FACTOR = 1e-8  # of the length: what a unit of the factor counts as, so that a load may grow where nothing moves
+_SAME_STIFFNESS = 1e-5, 1e-4  # of length and force: factors from this near are those of the point
+PROBE, _PROBE_FACTOR = 1e-5, 0.1  # of the length; at most, of the factor: over which the stiffness's change is taken
+_PER_FACTOR = 1e-8  # of the length: what a unit of the factor counts as, so that a load may grow where nothing moves
 TINY = 1e-300
 
 
@@ -85,7 +85,7 @@ class ArcLength:
         angles = twist_angles(problem.elements, len(unloaded.state))
         self._unit = np.where(angles, edge, 1.0)[:, None]  # angles count as small lengths
         self._weight = self._unit**2 / max(1, int(self.is_node.sum()))
-        self._per_factor = PER_FACTOR * self.length
+        self._per_factor = _PER_FACTOR * self.length
         self._scale = np.empty(0)
         self.round_off = 0.0  # relative error of the lowest stiffness at t = 0, since the stiffest is rounded
         self._least_force = 1e-6 * float(problem.stretch.stiffness.max(initial=0.0))
@@ -191,7 +191,7 @@ class ArcLength:
         ----------
         motion : from the state at t = 0.
         """
-        for parts in RAMPS:
+        for parts in _RAMPS:
             point = self._displaced_by_parts(motion, parts)
             if point is not None:
                 return point
@@ -261,9 +261,9 @@ class ArcLength:
                 state, forces, factor = state + motion, after, factor + more
                 elements = loaded.load.elements(elements, state, factor)
                 last, chord = moved, moved < CHORD
-                if (moved < SETTLED or at_round_off) and changed < SETTLED_FORCE:
+                if (moved < SETTLED or at_round_off) and changed < _SETTLED_FORCE:
                     since = self.reach(state - at) / length, float(np.abs(forces - axial).max()) / size
-                    if since[0] > SAME_STIFFNESS[0] or since[1] > SAME_STIFFNESS[1]:
+                    if since[0] > _SAME_STIFFNESS[0] or since[1] > _SAME_STIFFNESS[1]:
                         tangent, along = self._tangent(elements, state, forces, factor)
                     return factor, state, forces, elements, tangent, along
         except SingularError:
@@ -300,7 +300,7 @@ class ArcLength:
             return tangent.factors.solve(rows / scale) / scale
 
         start = generic(size, MODES) if point.modes is None else point.modes / scale
-        mode = tangent.freedom.expand(negative_mode(inverse, start, tolerance=LOSING_CLOSE) * scale)
+        mode = tangent.freedom.expand(negative_mode(inverse, start, tolerance=_LOSING_CLOSE) * scale)
         return np.asarray(mode / self.reach(mode))
 
     def alignment(self, a: Floats, b: Floats) -> float:
@@ -343,7 +343,7 @@ class ArcLength:
     def _looking_ahead(self, here: Point, tangent: Tangent, start: Floats | None) -> Point:
         """With its modes and the nearest singular stiffness, as the stiffness of the lowest modes changes here."""
         values, modes = self._lowest_modes(tangent, start)
-        step = min(PROBE * self.length / max(self.reach(here.motion), TINY), PROBE_FACTOR / abs(here.rate))
+        step = min(PROBE * self.length / max(self.reach(here.motion), TINY), _PROBE_FACTOR / abs(here.rate))
         # the difference of both sides: that of one has a stiffness of its own, EA times the square of the step, which
         # outweighs the modes of thin rods
         change = (self._values_near(here, step) - self._values_near(here, -step)) / (2 * step)
@@ -373,7 +373,7 @@ class ArcLength:
             lambda rows: tangent.factors.solve(rows / scale) / scale,
             generic(size, MODES) if start is None else start / scale,
             settled=1,
-            tolerance=MODES_CLOSE,
+            tolerance=_MODES_CLOSE,
             most_sweeps=MOST_SWEEPS,
         )
         return 1.0 / inverse, orthonormal(rows) * scale

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import copysign
 
 LONGER, SHORTER = 1.6, 0.4
-ARRIVED = 1e-9  # of the parameter: a step that ends so near ends there
+_ARRIVED = 1e-9  # of the parameter: a step that ends so near ends there
 
 
 @dataclass
@@ -31,7 +31,7 @@ class Continuation:
     def there(self) -> float:
         """The end of the next step."""
         left = self.stop - self.t
-        return self.stop if abs(left) - self.step < ARRIVED else self.t + copysign(self.step, left)
+        return self.stop if abs(left) - self.step < _ARRIVED else self.t + copysign(self.step, left)
 
     @property
     def length(self) -> float:

@@ -110,7 +110,7 @@ class SolveReport:
 Progress = Callable[[int, float], None]
 
 STRAIN_TOLERANCE = 2e-6
-REPEATED, ALIKE = 12, 1e-3  # steps; and how near to each other
+REPEATED, _ALIKE = 12, 1e-3  # steps; and how near to each other
 MOST_ITERATIONS = 60
 LONGEST_SLIDE = 120  # iterations off a saddle
 NUDGE = 0.01  # motion along the mode of an unstable equilibrium where the search for the lowest energy begins
@@ -242,7 +242,7 @@ def find_equilibrium(
 def _repeats(steps: list[float]) -> bool:
     """Whether the last `REPEATED` steps are as long as those two before: back and forth between two states."""
     last = np.array(steps[-REPEATED - 2 :])
-    return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
+    return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= _ALIKE * last[2:]))
 
 
 def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:

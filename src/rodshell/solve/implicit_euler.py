@@ -41,12 +41,12 @@ from rodshell.validation import array, described, function_of, listed
 
 MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
 
-RELATIVE = 1e-9  # of the step's own motion: what is left once the last simplified step has been taken
+_RELATIVE = 1e-9  # of the step's own motion: what is left once the last simplified step has been taken
 ROUND_OFF = 1e-13  # of the state: a shorter step cannot be distinguished from zero
-CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth continuing
+_CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth continuing
 MOST_ITERATIONS = 20
-LEAST_SHARE = 1 / 64
-MOST_PASSES = 30  # of predictor and corrector, with contact
+_LEAST_SHARE = 1 / 64
+_MOST_PASSES = 30  # of predictor and corrector, with contact
 PART = 1024  # elements evaluated at a time: their Hessians (2 MB) stay in the cache, and memory stays small
 
 
@@ -302,7 +302,7 @@ class ContactEuler:
         rubbing = np.zeros_like(state)
         forces = motion.forces
         iterations = factorizations = 0
-        for _ in range(MOST_PASSES):
+        for _ in range(_MOST_PASSES):
             bound = replace(motion, constraint=touching, forces=forces)
             taken = self._euler.take(bound, state, velocity, time=time, step=step)
             factorizations += taken.factorizations
@@ -322,7 +322,7 @@ class ContactEuler:
             self.last = touching
             landed = law.landed(taken.velocity, touching)
             return Step(taken.state, landed, taken.reactions + rubbing, iterations, factorizations)
-        return Refused(f"contact has not settled in {MOST_PASSES} passes", factorizations)
+        return Refused(f"contact has not settled in {_MOST_PASSES} passes", factorizations)
 
 
 @dataclass(eq=False)
@@ -367,15 +367,15 @@ class _Newton:
                 if left <= (1.0 - 0.25 * share) * length or left <= floor:
                     break
                 share *= 0.5
-                if share < LEAST_SHARE:
+                if share < _LEAST_SHARE:
                     return Refused("Newton's iteration does not contract", iteration)
             moved = trial
             while share == 1.0:
                 state, moved = self._retracted(moved - simplified)
-                bound = RELATIVE * self._size(moved) + floor
+                bound = _RELATIVE * self._size(moved) + floor
                 if left <= bound or 2.0 * left * left <= bound * length:
                     return Step(state, moved / self.step, reactions, iteration, iteration)
-                if not left < CONTRACTION * length:
+                if not left < _CONTRACTION * length:
                     break
                 length = left
                 simplified, reactions = self._simplified(state, moved)

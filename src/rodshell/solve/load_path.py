@@ -25,22 +25,22 @@ from rodshell.solve.load import Load
 Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "lost"]
 
 CLOSE = 2e-3  # of the factor: the last stable point is as near as this to the first unstable one
-ROUNDED = 0.2  # of `close`: where round-off in EA hides more of the lowest stiffness, signs of modes mean nothing
+_ROUNDED = 0.2  # of `close`: where round-off in EA hides more of the lowest stiffness, signs of modes mean nothing
 MOST = 100.0  # times the load: a path is not followed further
 MOST_FACTORIZATIONS = 120
 FARTHEST = 0.1  # of the length that a node moves from point to point
 SHRINKAGE, GROWTH = 0.4, 3.0  # of a step that failed; at most, from one step to the next
-RETURNED = 0.5  # of a step, back from its end: a mode without stiffness there may have been unstable in between
-PASSING = 0.5  # of `close`, of the arc so far: the shortest step past a singular stiffness
-UNEXPLAINED = 4.0  # times the arc to an unstable point: if no mode loses its stiffness nearer, it may be on another
+_RETURNED = 0.5  # of a step, back from its end: a mode without stiffness there may have been unstable in between
+_PASSING = 0.5  # of `close`, of the arc so far: the shortest step past a singular stiffness
+_UNEXPLAINED = 4.0  # times the arc to an unstable point: if no mode loses its stiffness nearer, it may be on another
 APART = 0.5  # path, and is, if it lies so far off the tangent, over the arc to it: a jump of the stiffness leaves none
 UNACCOUNTED = 0.4  # of the factor that a step gains, by the trapezoidal rule: more is another path
 TURNING = 0.5  # of its mean so far: a smaller rate of the factor says that the path turns back
 ALONG = 0.02  # cosine: where the path is less along the mode that gives way, it is left sideways
 NEARBY = 1e-4  # of the length: no other path is so near, and the tangent need not foresee where this one leads
-RECEDING = 1.1  # times as far as it was foreseen: a singular stiffness that moves away as it is approached
+_RECEDING = 1.1  # times as far as it was foreseen: a singular stiffness that moves away as it is approached
 LEAST = 1e-5  # of the arc so far: shorter steps are given up; of the length: the least that counts as the arc so far
-FLAT, MOST_TURNS = 1e-6, 6  # of the factor: a turning point is as near as this; points that are spent on it
+FLAT, _MOST_TURNS = 1e-6, 6  # of the factor: a turning point is as near as this; points that are spent on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ class _Search:
         if here is None or here.negative_modes:
             return LoadPath(0.0, "unstable unloaded", (), None, None, (), self.path.factorizations)
         self.stable.append(here)
-        known = self.path.round_off <= ROUNDED * self.close
+        known = self.path.round_off <= _ROUNDED * self.close
         limit, beyond = self._to_the_loss(here) if known else ("lost", None)
         mode, place, last = None, None, self.stable[-1]
         if beyond is not None:
@@ -239,7 +239,7 @@ class _Search:
     def _follows(self, here: Point, there: Point, step: float) -> bool:
         """Whether a stable point is the next on the stable path: no stiffness vanished in between, as its own change
         shows, and the factor is what its rates at both ends add up to."""
-        if -there.behind < RETURNED * step:
+        if -there.behind < _RETURNED * step:
             return False
         left = there.factor - here.factor - 0.5 * step * (here.rate + there.rate)
         return abs(left) <= UNACCOUNTED * step * max(here.rate, there.rate)
@@ -247,7 +247,7 @@ class _Search:
     def _elsewhere(self, here: Point, beyond: Point) -> bool:
         """Whether an unstable point is not on the path of the stable one before it."""
         span = beyond.arc - here.arc
-        if here.ahead <= UNEXPLAINED * span or here.strayed >= 0.1 * STRAYED:
+        if here.ahead <= _UNEXPLAINED * span or here.strayed >= 0.1 * STRAYED:
             return False
         off = beyond.state - here.state - span * here.motion
         return self.path.reach(off) > APART * self.path.reach(span * here.motion)
@@ -255,7 +255,7 @@ class _Search:
     def _next_step(self, here: Point, beyond: Point | None, share: float) -> float:
         """How far to go: for the singular stiffness ahead, from below until it is near enough to pass."""
         near = here.ahead * here.rate < 0.4 * self.close * here.factor
-        step = max(2.0 * here.ahead, PASSING * self.close * here.arc) if near else share * here.ahead
+        step = max(2.0 * here.ahead, _PASSING * self.close * here.arc) if near else share * here.ahead
         if beyond is not None:
             span = beyond.arc - here.arc
             return float(np.clip(step, 0.05 * span, 0.95 * span)) if here.ahead < span else 0.5 * span
@@ -292,7 +292,7 @@ class _Search:
         if here.rate * there.rate >= 0:
             return []
         best = None
-        for _ in range(MOST_TURNS):
+        for _ in range(_MOST_TURNS):
             span, scale = there.arc - here.arc, max(abs(here.factor), abs(there.factor))
             share, top = _turning(here, there)
             if best is not None and abs(top - best.factor) <= FLAT * scale:
@@ -315,7 +315,7 @@ def _share(now: float, foreseen: float) -> float:
     """
     if not (np.isfinite(now) and np.isfinite(foreseen)):
         return 0.5
-    if now > RECEDING * foreseen:
+    if now > _RECEDING * foreseen:
         return min(now / foreseen, GROWTH)
     return 1.0 - min(0.5, max(0.02, abs(now - foreseen) / now))
 

@@ -34,9 +34,9 @@ DENSE = 24  # unknowns up to which LAPACK solves the whole problem
 SPARE = 2  # modes that are computed beyond those asked for, so that the count has a gap to stand in
 GAP = 1e-6  # relative, between two eigenvalues that are not the same
 TRIES = 3  # with twice as many modes each, until the count agrees
-ACCURACY = 1e-10  # of eigenvalues
+_ACCURACY = 1e-10  # of eigenvalues
 ROUND_OFF = 1e-15  # of the stiffness of each unknown alone
-SOFTEST = 3  # steps of the inverse iteration, after which the softest motion is known within 10 %
+_SOFTEST = 3  # steps of the inverse iteration, after which the softest motion is known within 10 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +154,7 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
         factors = assembly.pattern.solver.factor(shifted)
     start = generic(len(scale), 1)
     values, rows, _ = subspace_iteration(
-        lambda rows: scale * factors.solve(scale * rows), start, settled=1, tolerance=0.0, most_sweeps=SOFTEST
+        lambda rows: scale * factors.solve(scale * rows), start, settled=1, tolerance=0.0, most_sweeps=_SOFTEST
     )
     return 1.0 / float(values[0]), freedom.expand(orthonormal(rows)[0])
 
@@ -256,7 +256,7 @@ def _lanczos(
     vector = generic(size, 1 + start)[-1]
     try:
         with threadpool_limits(limits=1, user_api="blas"):  # others would keep ours from the processors
-            values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=vector, tol=ACCURACY)
+            values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=vector, tol=_ACCURACY)
     except ArpackError as error:
         raise ConvergenceError(f"the modes were not found: {error}; ask for fewer") from None
     return values, vectors

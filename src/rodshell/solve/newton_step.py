@@ -21,21 +21,21 @@ from rodshell.solve.tangent import TangentAssembly, generic
 
 # A motion is measured by `Problem.unit`: shares of the length, or turns
 TOLERANCE = 1e-13  # motion: estimate of the error that is left
-FORCE_TOLERANCE = 1e-9  # of the largest axial force: the same for the forces, of which round-off leaves as much
-LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
-CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
+_FORCE_TOLERANCE = 1e-9  # of the largest axial force: the same for the forces, of which round-off leaves as much
+_LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
+_CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
 MULTIPLIERS = 5e-3  # of the last change is left in forces that are multipliers of a penalty: 2e-4 to 1e-3 measured
-LONGEST_STEP = 0.15  # motion
+_LONGEST_STEP = 0.15  # motion
 PART = 0.25  # of a step that was too long is taken
 LONGER = 2.0  # growth of the longest step after one that was not
 NEAR = 0.02  # motion: a step this short leads to the equilibrium at hand, be it a saddle,
 NEARER = 0.5  # and at most so much of the last ones: past a limit point nothing is near, and steps do not shrink
-STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
-ELASTIC = 1 / 3  # of their last change: the next one of elastic forces after a step of Newton's, at most
+_STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
+_ELASTIC = 1 / 3  # of their last change: the next one of elastic forces after a step of Newton's, at most
 AGAIN = 3.0  # times as much of the last change as that was of the one before: the next one after a chord step, at most
 CHORD = 5e-3  # motion: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
-SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
+_SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
 TINY = 1e-300  # no step is shorter, except zero
 
 
@@ -80,7 +80,7 @@ class Iterate:
     length: float = np.inf
     moved: float = np.inf
     changed: float = np.inf
-    longest: float = LONGEST_STEP
+    longest: float = _LONGEST_STEP
     nearest: float = np.inf
     shifted: bool = False
     chord: bool = False
@@ -129,7 +129,7 @@ class NewtonStep:
         self.assembly = TangentAssembly(problem, state)
         free = problem.constraint.freedom(state)
         self.matrix = ShiftedMatrix(self.assembly.pattern, self._unit[:, 0].repeat(free.count))
-        self._least_force = LEAST_FORCE * float(problem.stretch.stiffness.max())
+        self._least_force = _LEAST_FORCE * float(problem.stretch.stiffness.max())
         self._no_forces = np.zeros(len(problem.stretch.blocks))
         self._factored, self._free = (state, self._no_forces), free  # where the matrix is from
 
@@ -225,7 +225,7 @@ class NewtonStep:
             matrix.shift_until_definite(self._softest, self._generic_motion())
         else:
             shifted = False
-        return matrix.solve(right), replace(here, longest=min(LONGER * here.longest, LONGEST_STEP), shifted=shifted)
+        return matrix.solve(right), replace(here, longest=min(LONGER * here.longest, _LONGEST_STEP), shifted=shifted)
 
     def _after(self, step: Step) -> tuple[Floats, Floats]:
         """State and forces after a step."""
@@ -257,10 +257,10 @@ class NewtonStep:
             float(np.abs(forces - old).max(initial=0.0)) / size for old in (here.forces, self._factored[1])
         )
         shrunk = moved / max(here.moved, TINY), changed / max(here.changed, TINY)
-        rates = shrunk if here.chord else (max(CURVED * moved, changed), MULTIPLIERS if multipliers else changed)
-        settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
-        foreseen = AGAIN * shrunk[1] if here.chord else MULTIPLIERS if multipliers else ELASTIC
-        count_again = since >= STALE > foreseen * changed
+        rates = shrunk if here.chord else (max(_CURVED * moved, changed), MULTIPLIERS if multipliers else changed)
+        settled = moved * rates[0] < TOLERANCE and changed * rates[1] < _FORCE_TOLERANCE and since < _STALE
+        foreseen = AGAIN * shrunk[1] if here.chord else MULTIPLIERS if multipliers else _ELASTIC
+        count_again = since >= _STALE > foreseen * changed
         return replace(
             here, state=state, forces=forces, strains=strains, mismatch=float(np.abs(left).max()),
             step=step, length=moved, moved=moved, changed=changed, settled=settled, was_chord=here.chord,
@@ -285,7 +285,7 @@ def generic_motion(state: Floats, twists: Bools) -> Floats:
     """
     numbers, nodes = generic(state.size, 1).reshape(-1, 3), state[~twists]
     x, y, _ = generic(len(nodes), 1)[0] @ (nodes - nodes.mean(axis=0))
-    x, y = (x, y) if np.hypot(x, y) > SIDEWAYS * np.ptp(nodes[:, 2]) else (1.0, 0.0)  # upright: any
+    x, y = (x, y) if np.hypot(x, y) > _SIDEWAYS * np.ptp(nodes[:, 2]) else (1.0, 0.0)  # upright: any
     axes = np.array([(x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, np.hypot(x, y))]) / np.hypot(x, y)
     return np.where(twists[:, None], numbers, numbers @ axes)
 
@@ -294,8 +294,8 @@ def upwards(mode: Floats) -> Floats:
     """A mode (n, 3) in its units, or its opposite: that which goes up on the whole, or first, where it goes up and
     down by as much; along x or y where it does not go up."""
     size = np.abs(mode).max(axis=0)
-    along = mode[:, 2 if size[2] > SIDEWAYS * size.max() else int(np.argmax(size))]
+    along = mode[:, 2 if size[2] > _SIDEWAYS * size.max() else int(np.argmax(size))]
     whole = float(along.sum())
-    if abs(whole) <= SIDEWAYS * float(np.abs(along).sum()):
+    if abs(whole) <= _SIDEWAYS * float(np.abs(along).sum()):
         whole = float(along[np.argmax(np.abs(along) > 0.5 * np.abs(along).max())])
     return np.asarray(np.copysign(1.0, whole) * mode)

@@ -33,15 +33,15 @@ from rodshell.solve.problem import Problem, Supports
 EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25
 SMALLEST_STEP = 1e-3
-SNAP = 0.01  # step over which a structure may snap
-MOST_OF_ALL = 400  # iterations of the whole path; the paths that arrive take 30 to 100
+_SNAP = 0.01  # step over which a structure may snap
+_MOST_OF_ALL = 400  # iterations of the whole path; the paths that arrive take 30 to 100
 UNACCOUNTED = 0.02  # of the energy: more than the trapezoidal rule leaves of a short step along one branch
-MOST_A_STEP = 8  # iterations of a step along a branch
+_MOST_A_STEP = 8  # iterations of a step along a branch
 SAME = 1e-3  # of the length: equilibria further apart are different ones
 FINER = 10  # steps on the way back after a snap, at most, for each of the shortest ahead
-MOST_BACK = 300  # factorisations of the way back: 2 are usual
+_MOST_BACK = 300  # factorisations of the way back: 2 are usual
 TINY = 1e-300
-DISTURBANCE = 1e-3  # largest motion along the mode of an unstable equilibrium, from where the energy falls
+_DISTURBANCE = 1e-3  # largest motion along the mode of an unstable equilibrium, from where the energy falls
 
 
 def follow(
@@ -96,7 +96,7 @@ def followed(
     slide: bool = True,
     easy: int = EASY,
     most: int = MOST,
-    most_of_all: int | None = MOST_OF_ALL,
+    most_of_all: int | None = _MOST_OF_ALL,
     most_factorizations: int | None = None,
     most_modes: int | None = None,
     progress: Callable[[float, int, float], None] | None = None,
@@ -132,14 +132,14 @@ def followed(
             path.shorten()
         if found.report.status is Status.OUT_OF_TIME:
             break
-        if snap and last is not None and path.step < SNAP and not found.report.converged:
-            short, path.step = path.step, SNAP
+        if snap and last is not None and path.step < _SNAP and not found.report.converged:
+            short, path.step = path.step, _SNAP
             left = None if most_factorizations is None else most_factorizations - _made(reports)
             found = _fallen(going_on(problem_at(path.there), last), last, found, most_factorizations=left)
             reports.append(found.report)
             if found.report.stable:
                 path.accept()
-            last, path.step = (found, 4 * SNAP) if found.report.stable else (last, short)
+            last, path.step = (found, 4 * _SNAP) if found.report.stable else (last, short)
         spent = most_of_all is not None and sum(report.iterations for report in reports) > most_of_all
         if path.lost or spent or (most_factorizations is not None and _made(reports) >= most_factorizations):
             break
@@ -210,7 +210,7 @@ def trace(
         progress(path.t, here)
         t, there = path.t, path.there
         problem = going_on(problem_at(there), here)
-        found = find_stable(problem, here.state, here.forces, most_iterations=MOST_A_STEP)
+        found = find_stable(problem, here.state, here.forces, most_iterations=_MOST_A_STEP)
         reports.append(found.report)
         if not found.report.stable or unaccounted(here, found):
             at_shortest = path.length <= shortest
@@ -225,7 +225,7 @@ def trace(
             if not found.report.stable:
                 break
             back = trace(
-                problem_at, found, there, t, shortest=shortest / FINER, snap=False, most_factorizations=MOST_BACK
+                problem_at, found, there, t, shortest=shortest / FINER, snap=False, most_factorizations=_MOST_BACK
             )
             reports += back.reports
             if back.t != t or farthest(here, back.found) > SAME * problem.length:
@@ -252,11 +252,11 @@ def going_on(problem: Problem, last: Equilibrium) -> Problem:
 
 def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule; parameters as of `surplus`."""
-    return abs(surplus(here, there)) > UNACCOUNTED
+    by the trapezoidal rule; parameters as of `_surplus`."""
+    return abs(_surplus(here, there)) > UNACCOUNTED
 
 
-def surplus(here: Equilibrium, there: Equilibrium) -> float:
+def _surplus(here: Equilibrium, there: Equilibrium) -> float:
     """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell.
 
     Parameters
@@ -287,10 +287,10 @@ def _fallen(
     supports, state, forces = problem.constraint, here.state, here.forces
     assert isinstance(supports, Supports)
     if found.mode is not None:
-        state, forces = found.state + DISTURBANCE * found.mode, found.forces
+        state, forces = found.state + _DISTURBANCE * found.mode, found.forces
         problem = replace(problem, elements=found.elements)
     down = find_equilibrium(problem, state, forces, descend=True)
-    if down.report.stable and surplus(here, down) < UNACCOUNTED:
+    if down.report.stable and _surplus(here, down) < UNACCOUNTED:
         return down
     state = state.copy()
     state[supports.moved] = supports.goals

@@ -8,7 +8,7 @@ from rodshell.solve.sparse_ldl import Factors, SingularError
 from rodshell.solve.tangent import subspace_iteration
 
 GROWTH, MOST_SHIFTS = 8.0, 40
-LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eigenvalues may be round-off
+_LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eigenvalues may be round-off
 
 
 class ShiftedMatrix:
@@ -68,7 +68,7 @@ class ShiftedMatrix:
         """
         shift, tries = max(softest, self._shift / GROWTH), 0
         negative = self._factor_shifted(shift)
-        while down and not negative and shift > LEAST_SHIFT * softest:
+        while down and not negative and shift > _LEAST_SHIFT * softest:
             shift /= GROWTH
             negative = self._factor_shifted(shift)
         while negative and tries < MOST_SHIFTS:

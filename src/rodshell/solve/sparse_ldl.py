@@ -39,11 +39,11 @@ from rodshell.solve.simd_kernels import ROWS, matrix_view
 from rodshell.solve.symbolic import Plan, blocks_of, coupled, plan_of
 from rodshell.threads import in_threads, threads
 
-ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
+_ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
 SURELY = 1e-14  # and after this small a one, no other is looked at
 
 
-NONE_ABOVE = np.empty(0, dtype=np.int64)
+_NONE_ABOVE = np.empty(0, dtype=np.int64)
 
 
 class SingularError(ArithmeticError):
@@ -87,7 +87,7 @@ class LinearSolver(Protocol):
         ...
 
 
-GIVEN_AWAY = "the memory of these factors was given to another factorisation"
+_GIVEN_AWAY = "the memory of these factors was given to another factorisation"
 
 
 class _Scratch(NamedTuple):
@@ -190,7 +190,7 @@ class MultifrontalFactors:
         rows = () if self._surely else zip(x.reshape(-1, x.shape[-1]), right.reshape(-1, x.shape[-1]), strict=True)
         for solution, given in rows:
             residual, left, size = _residual(self._solver.indptr, self._solver.indices, self._data, solution, given)
-            if left > ACCURATE * size:
+            if left > _ACCURATE * size:
                 solution += self._substitute(residual)
             self._surely = 0.0 < left <= SURELY * size
             if self._surely:
@@ -210,7 +210,7 @@ class MultifrontalFactors:
 
     def _solved(self, right: Floats, upwards: Callable[..., None], downwards: Callable[..., None]) -> Floats:
         """(n,) or (n, ROWS), by the kernels for it."""
-        assert self._memory is not None, GIVEN_AWAY
+        assert self._memory is not None, _GIVEN_AWAY
         solver, plan, (panels, pivots) = self._solver, self._solver.plan, self._memory
         x, parts, scratch = right.take(plan.order, axis=0), solver.parts, solver.take_scratch()
         fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
@@ -227,7 +227,7 @@ class MultifrontalFactors:
         if last:
             in_threads(rise, last, most=len(memory))
             x[above] += sums.sum(axis=0)
-        upwards(parts[last], x, NONE_ABOVE, np.empty((0, *x.shape[1:])), *fronts, *memory[0])
+        upwards(parts[last], x, _NONE_ABOVE, np.empty((0, *x.shape[1:])), *fronts, *memory[0])
         descend(last, 0)
         in_threads(descend, last, most=len(memory))
         solver.give_back(scratch)
@@ -451,8 +451,8 @@ def _backward_rows(part, x, first, row_start, rows, panel_start, panels, pivots,
                 x[begin + i, r] = values[r, i]
 
 
-LEAF = 12  # blocks that are not divided further
-UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
+_LEAF = 12  # blocks that are not divided further
+_UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
 NEAREST = 4  # blocks to which one within a span is coupled, two on each side
 SHORT = 3  # blocks within a span that are not worth to be taken together
 
@@ -544,7 +544,7 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
     while height > 0:
         height -= 1
         begin, end = begins[height], ends[height]
-        if end - begin <= LEAF:
+        if end - begin <= _LEAF:
             continue
         here, longest = segment[along[0, begin]], _longest(coordinates, along, begin, end)
         for k in range(begin, end):
@@ -610,7 +610,7 @@ def _best_cut(blocks, segment, here, rank, start, neighbours, first, last, touch
         touching[0, high] -= 1
         touching[1, low] += 1  # behind the cut
         touching[1, k] -= 1
-    margin = max(1, int(UNBALANCED * n))
+    margin = max(1, int(_UNBALANCED * n))
     best, least, joining, before, behind = margin - 1, np.inf, 0, 0, 0
     for k in range(n - margin):
         before += touching[0, k]

@@ -25,7 +25,7 @@ def _status(kept: dict[str, Any]) -> dict[str, Any]:
     return kept
 
 
-STATUS = Annotated[dict[str, Any], AfterValidator(_status)]
+_STATUS = Annotated[dict[str, Any], AfterValidator(_status)]
 
 
 class Jobs:
@@ -48,7 +48,7 @@ class Jobs:
             if not NAME.fullmatch(path.parent.name):
                 continue
             try:
-                status = read_record(path, STATUS)
+                status = read_record(path, _STATUS)
             except InputError as reason:
                 logging.getLogger(__name__).warning("a job is lost: %s", reason)
                 continue
@@ -89,7 +89,7 @@ class Jobs:
             return None
         result = folder / "result"
         try:
-            status: dict[str, Any] = read_record(folder / "status.json", STATUS)
+            status: dict[str, Any] = read_record(folder / "status.json", _STATUS)
             if status["status"] == "done":
                 status["result"] = read_record(result / "result.json", dict[str, Any])
         except InputError:

@@ -29,16 +29,16 @@ from rodshell.untrusted import limit, raised
 
 ALONE = 60.0  # s without a page after which a session's process is ended
 SESSIONS = 50  # with a page or a process at once
-MOST_CASES = 500  # of a session's history
+_MOST_CASES = 500  # of a session's history
 HISTORY = 10e6  # bytes of these cases
-VARIANTS = 100  # of a session
-SCENE = re.compile("[0-9a-f]{16}")
+_VARIANTS = 100  # of a session
+_SCENE = re.compile("[0-9a-f]{16}")
 
 
 def _variant(kept: dict[str, Any]) -> dict[str, Any]:
     """A variant as it is kept; its scene is the name of a file in the session's folder."""
     kinds = {"name": str, "case": dict, "scene": str, "figures": list, "verdict": dict}
-    if not all(isinstance(kept.get(key), kind) for key, kind in kinds.items()) or not SCENE.fullmatch(kept["scene"]):
+    if not all(isinstance(kept.get(key), kind) for key, kind in kinds.items()) or not _SCENE.fullmatch(kept["scene"]):
         raise ValueError("a variant is not as it was kept")
     return kept
 
@@ -163,10 +163,10 @@ class Session:
         if not self._facts or self.state.case is None:
             raise InputError("there is no verdict yet: keep the variant when it is there")
         self._drop(name)
-        if len(self.state.variants) >= limit(VARIANTS):
+        if len(self.state.variants) >= limit(_VARIANTS):
             raise InputError(
-                f"a session keeps {limit(VARIANTS):g} variants at most: forget one first, "
-                f"{raised(VARIANTS, len(self.state.variants) + 1)}"
+                f"a session keeps {limit(_VARIANTS):g} variants at most: forget one first, "
+                f"{raised(_VARIANTS, len(self.state.variants) + 1)}"
             )
         self.room(len(self._scene))
         key = secrets.token_hex(8)
@@ -200,7 +200,7 @@ class Session:
     def _record(self, case: dict[str, Any]) -> None:
         self.room(len(json.dumps(case)))
         state = self.state
-        state.cases = [*state.cases[: state.at + 1], case][-MOST_CASES:]
+        state.cases = [*state.cases[: state.at + 1], case][-_MOST_CASES:]
         sizes = [len(json.dumps(case)) for case in state.cases]
         while sum(sizes) > limit(HISTORY) and len(sizes) > 1:
             del sizes[0], state.cases[0]

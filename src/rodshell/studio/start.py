@@ -15,7 +15,7 @@ from rodshell.errors import InputError, OutputError
 from rodshell.studio.session import presets
 from rodshell.untrusted import read_bytes, read_text
 
-KEY = re.compile("[0-9a-f]{48}")
+_KEY = re.compile("[0-9a-f]{48}")
 
 
 def first_case(name: str) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -63,7 +63,7 @@ def own_folder(folder: Path) -> str:
             part.chmod(0o700)
         if key.is_file() and stat.S_IMODE(key.stat().st_mode) == 0o600:
             with suppress(InputError):
-                if KEY.fullmatch(secret := read_text(key, 1000)):
+                if _KEY.fullmatch(secret := read_text(key, 1000)):
                     return secret
         key.unlink(missing_ok=True)
         secret = secrets.token_hex(24)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from rodshell.job import Job
     from rodshell.progress import Progress
 
-TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
+_TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
 PAUSE = 0.1  # s between two messages of progress at least
 MEMORY = 3_000_000_000  # bytes of a worker's data at most
 
@@ -157,7 +157,7 @@ class _Worker:
             self._send(order, "failed", {"sentence": str(error)})
         except MemoryError:
             self._form = None
-            self._send(order, "failed", {"sentence": TOO_LARGE})
+            self._send(order, "failed", {"sentence": _TOO_LARGE})
         except Exception as error:
             self._send(
                 order,

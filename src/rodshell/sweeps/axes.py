@@ -27,7 +27,7 @@ BASE = "base"
 MOST = 1_000_000  # designs
 METHODS = ("latin-hypercube", "sobol")
 SCALES = ("linear", "log")
-PATHS = {f"{table}.{key}" for table, keys in FILE_KEYS.items() for key in keys}
+_PATHS = {f"{table}.{key}" for table, keys in FILE_KEYS.items() for key in keys}
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ def _placed(key: str, value: Any, folder: Path) -> Any:
     """A value whose files lie in the sweep's folder, unless they are given from the root."""
     if isinstance(value, Mapping):
         return {name: _placed(f"{key}.{name}", item, folder) for name, item in value.items()}
-    return str(folder / value) if key in PATHS and isinstance(value, str) else value
+    return str(folder / value) if key in _PATHS and isinstance(value, str) else value
 
 
 def _plain(base: Job, key: str, given: Any) -> Any:

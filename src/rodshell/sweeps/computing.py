@@ -19,8 +19,8 @@ from rodshell.sweeps.store import ARCHIVES, FOUND, LOST, STORE, Store, replaced
 from rodshell.sweeps.table import CSV, PARQUET, Table, write_parquet
 from rodshell.sweeps.watched import Reply
 
-COPY = "sweep.toml"
-LOOK = 0.2  # s between two calls of progress
+_COPY = "sweep.toml"
+_LOOK = 0.2  # s between two calls of progress
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Computation:
 
     def _collect(self, stage: str, done: int, total: int) -> None:
         """Wait for jobs, and record those that have finished."""
-        for future in wait(self._running, LOOK, FIRST_COMPLETED).done:
+        for future in wait(self._running, _LOOK, FIRST_COMPLETED).done:
             self._record(future)
         rate = self.computed / max(monotonic() - self._begun, 1e-9)
         speed = f", {rate:.3g} a second, {_time_text((total - done) / rate)} left" if self.computed else ""
@@ -162,7 +162,7 @@ def opened_computation(
     _require_own(folder)
     with Store(folder, writing=True) as store:
         if plan.origin.text:
-            with replaced(folder / COPY) as part:
+            with replaced(folder / _COPY) as part:
                 part.write_text(plan.origin.text, encoding="utf-8")
         table = Table(store)
         try:
@@ -183,7 +183,7 @@ def opened_computation(
 def _require_own(folder: Path) -> None:
     """OutputError where there are files of these names that a sweep did not write."""
     if not (folder / STORE).exists():
-        for name in (CSV, PARQUET, REPORT, COPY):
+        for name in (CSV, PARQUET, REPORT, _COPY):
             if (folder / name).exists():
                 raise OutputError(
                     f"will not replace {folder / name}, which is not of a sweep: choose another folder, or move it"

@@ -22,9 +22,9 @@ from rodshell.units import parse_quantity, shown
 from rodshell.untrusted import read_text
 from rodshell.validation import choice, choices_of, file_path
 
-EngineName = Literal["processes", "dask"]
-Keep = Literal["none", "best", "all"]
-Until = Literal["pop-up", "fabrication"]
+_EngineName = Literal["processes", "dask"]
+_Keep = Literal["none", "best", "all"]
+_Until = Literal["pop-up", "fabrication"]
 Source = str | PathLike[str] | Mapping[str, Any]
 GENERATION = "generation"
 TABLES = ("base", "columns", "axes", "sample", "run")
@@ -46,12 +46,12 @@ class Settings:
     time_limit : longest time of one job [s]; memory_limit : largest memory of one job [B]; None: no limit.
     """
 
-    engine: EngineName = "processes"
+    engine: _EngineName = "processes"
     workers: int = 1
-    keep: Keep = "none"
+    keep: _Keep = "none"
     best: str = "rms_pinned"
     without: tuple[str, ...] = ()
-    until: Until = "fabrication"
+    until: _Until = "fabrication"
     time_limit: float | None = None
     memory_limit: float | None = None
 
@@ -256,18 +256,18 @@ def read_settings(given: Mapping[str, Any], columns: Sequence[str]) -> Settings:
             "leave it out, and type --address ADDRESS where you trust what answers there"
         )
     known("run", given, RUN)
-    engine: EngineName = choice("run.engine", given.get("engine", "processes"), get_args(EngineName))
+    engine: _EngineName = choice("run.engine", given.get("engine", "processes"), get_args(_EngineName))
     workers = given.get("workers", 1)
     if type(workers) is not int or not 1 <= workers <= 1024:
         raise InputError(f"run.workers = {shown(workers)}: give a number of processes from 1 to 1024")
-    until = choice("run.until", given.get("until", "fabrication"), get_args(Until))
+    until = choice("run.until", given.get("until", "fabrication"), get_args(_Until))
     without = choices_of("run.without", given.get("without", ()), tuple(CODES))
     if without and until == "pop-up":
         raise InputError('run.without needs the verdict, which run.until = "pop-up" leaves out: leave one out')
     return Settings(
         engine=engine,
         workers=workers,
-        keep=choice("run.keep", given.get("keep", "none"), get_args(Keep)),
+        keep=choice("run.keep", given.get("keep", "none"), get_args(_Keep)),
         best=choice("run.best", given.get("best", "rms_pinned"), (*NUMBERS, *columns)),
         without=without,
         until=until,

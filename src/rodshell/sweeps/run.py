@@ -18,7 +18,7 @@ from rodshell.sweeps.store import FOUND, STORE, Store
 from rodshell.sweeps.table import header_notes, header_of, names_of, table_rows
 from rodshell.validation import file_path
 
-BEST = "best"
+_BEST = "best"
 
 
 @dataclass(frozen=True)
@@ -54,13 +54,13 @@ class Swept:
             lines.append(f"NOT CONVERGED: {self.not_converged} forms; their column status says at which stage")
         lines += [
             f"no form ({count} design{'s' if count != 1 else ''}): {sentence}"
-            for sentence, count in self.failures[:MOST_FAILURES]
+            for sentence, count in self.failures[:_MOST_FAILURES]
         ]
         return "\n".join(map(printable, lines))
 
 
-MOST_FAILURES = 5
-NO_FORM, NOT_CHECKED = "no form", "not checked"
+_MOST_FAILURES = 5
+_NO_FORM, _NOT_CHECKED = "no form", "not checked"
 
 
 def sweep(
@@ -98,7 +98,7 @@ def sweep(
     folder = file_path("out", out)
     if report:
         require_plotly()
-    check_designs(plan)
+    _check_designs(plan)
     with opened_computation(plan, folder, progress, retry=retry, address=address) as computation:
         store, until = computation.store, plan.settings.until
         designs = ((values, job_identity(job, until)) for values, job in plan.designs())
@@ -114,7 +114,7 @@ def sweep(
     return found
 
 
-def check_designs(plan: SweepPlan) -> None:
+def _check_designs(plan: SweepPlan) -> None:
     """Make the case of each design, one by one.
 
     Raises
@@ -145,10 +145,10 @@ def swept(store: Store, computed: int) -> Swept:
     verdicts, failures, lost = Counter[str](), Counter[str](), 0
     for design in store.finished():
         if design.outcome == FOUND:
-            verdicts[design.row.get("verdict") or NOT_CHECKED] += 1
+            verdicts[design.row.get("verdict") or _NOT_CHECKED] += 1
             lost += design.row["status"] != CONVERGED
         else:
-            verdicts[NO_FORM] += 1
+            verdicts[_NO_FORM] += 1
             failures[design.row["status"]] += 1
     return Swept(store.folder, store.count(), computed, dict(verdicts), lost, tuple(failures.most_common()))
 
@@ -161,11 +161,11 @@ def _keep_best(plan: SweepPlan, computation: Computation) -> None:
     """The result folder of the best design, in best/."""
     store = computation.store
     best = next(iter(best_jobs(store, plan.settings)), None)
-    if best is None or (store.note(BEST) == best and (store.folder / BEST / "result.json").is_file()):
+    if best is None or (store.note(_BEST) == best and (store.folder / _BEST / "result.json").is_file()):
         return
     (wanted,) = computation.archived([best])
-    computation.compute([replace(wanted, archive=store.inside(BEST), again=True)], "best design", 1)
-    store.take_note(BEST, best)
+    computation.compute([replace(wanted, archive=store.inside(_BEST), again=True)], "best design", 1)
+    store.take_note(_BEST, best)
 
 
 def best_jobs(store: Store, settings: Settings) -> list[str]:

@@ -28,7 +28,7 @@ from rodshell.sweeps.table import header_notes, in_short, write_csv
 from rodshell.validation import file_path
 
 FRONT = "front.csv"
-MOST_SHOWN = 10  # designs of the front in text
+_MOST_SHOWN = 10  # designs of the front in text
 DIFFERENCE, CROSSED = 0.6, 0.9
 
 
@@ -60,10 +60,10 @@ class Optimised:
         if not self.front:
             return ""
         names = [name for name in self.front[0] if name != JOB]
-        cells = [names, *([in_short(design[name]) for name in names] for design in self.front[:MOST_SHOWN])]
+        cells = [names, *([in_short(design[name]) for name in names] for design in self.front[:_MOST_SHOWN])]
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
-        more = [f"and {len(self.front) - MOST_SHOWN} more in {FRONT}"] if len(self.front) > MOST_SHOWN else []
+        more = [f"and {len(self.front) - _MOST_SHOWN} more in {FRONT}"] if len(self.front) > _MOST_SHOWN else []
         title = "the best of them" if len(self.front) == 1 else "those that no other is better than in all objectives"
         return "\n".join([f"{title}:", *lines, *more])
 

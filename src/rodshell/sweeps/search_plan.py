@@ -18,7 +18,7 @@ from rodshell.units import shown
 from rodshell.validation import choices_of
 
 TABLES = ("base", "columns", "variables", "objectives", "constraints", "search", "run")
-BELOW_ONE = 1 - 1e-12
+_BELOW_ONE = 1 - 1e-12
 FAR = 1e3  # violation of a design without a form: larger than that of any constraint
 
 
@@ -61,7 +61,7 @@ class Constraint:
         return min(max(below, above, 0.0), FAR)
 
 
-def keys_of(variable: Span | Axis) -> tuple[str, ...]:
+def _keys_of(variable: Span | Axis) -> tuple[str, ...]:
     """The keys of a variable, several where they change together."""
     return variable.keys if isinstance(variable, Axis) else (variable.key,)
 
@@ -90,7 +90,7 @@ class SearchPlan(Plan):
             if isinstance(variable, Axis):
                 found += variable.rows[min(int(share * len(variable.rows)), len(variable.rows) - 1)]
             else:
-                found.append(variable.drawn(min(share, BELOW_ONE) if variable.whole else share))
+                found.append(variable.drawn(min(share, _BELOW_ONE) if variable.whole else share))
         return tuple(found)
 
 
@@ -107,7 +107,7 @@ def read_search(source: Source) -> SearchPlan:
         raise InputError(
             '[variables] is missing: give at least one key, such as "layout.spacing" = { from = "25 mm", to = "35 mm" }'
         )
-    keys = (GENERATION, *(key for variable in variables for key in keys_of(variable)))
+    keys = (GENERATION, *(key for variable in variables for key in _keys_of(variable)))
     objectives = _objectives(table(given, "objectives"))
     constraints = tuple(_constraint(key, value) for key, value in _flat_constraints(table(given, "constraints")))
     columns = read_columns(given.get("columns", ()), keys)

@@ -22,8 +22,8 @@ from rodshell.untrusted import limit, raised
 
 STORE, LOCK, ARCHIVES = "sweep.sqlite", "sweep.lock", "archives"  # in the folder of a sweep
 FORMAT = 1
-CACHE = 500  # kB of the coordinator's memory
-LOG = 200  # pages of SQLite's log, which is then merged into the file
+_CACHE = 500  # kB of the coordinator's memory
+_LOG = 200  # pages of SQLite's log, which is then merged into the file
 PAGE = 8192  # B: some rows fit on each, so that little of it is left empty
 TABLES = """
 CREATE TABLE jobs (id TEXT PRIMARY KEY, outcome TEXT NOT NULL, row BLOB NOT NULL);
@@ -33,7 +33,7 @@ CREATE TABLE notes (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 """
 FOUND = "found"
 LOST = ("stopped", "crashed")  # by a limit or with its process: another try may end differently
-OUTCOMES = (FOUND, "refused", "failed", *LOST)
+_OUTCOMES = (FOUND, "refused", "failed", *LOST)
 JOB = re.compile(r"\w+")  # that was found: the name of its folder
 KINDS = {
     "status": str,
@@ -42,7 +42,7 @@ KINDS = {
     "results": dict,
 }  # of what is kept of a job; all else are numbers
 ROW = 20e6  # bytes of what is kept of a job
-MOST_OF_SQLITE = 1e9  # bytes of a value that SQLite can be asked for
+_MOST_OF_SQLITE = 1e9  # bytes of a value that SQLite can be asked for
 REMEDY = "move it to compute all designs again, or choose another folder"
 
 
@@ -110,8 +110,8 @@ class Store:
                 raise OutputError(f"{self.path} was written by another version of rodshell: choose another folder")
             if self.writing:
                 self._connection.execute("PRAGMA synchronous = NORMAL")
-                self._connection.execute(f"PRAGMA cache_size = -{CACHE}")
-                self._connection.execute(f"PRAGMA wal_autocheckpoint = {LOG}")
+                self._connection.execute(f"PRAGMA cache_size = -{_CACHE}")
+                self._connection.execute(f"PRAGMA wal_autocheckpoint = {_LOG}")
 
     def __exit__(self, *_: object) -> None:
         for connection in (self._connection, self._lock):
@@ -233,7 +233,7 @@ class Store:
         query = "SELECT position, job, keys, outcome, row FROM designs JOIN jobs ON job = id ORDER BY position"
         with self.errors():
             for position, job, keys, outcome, row in self._connection.execute(query):
-                if outcome not in OUTCOMES or (outcome == FOUND and not JOB.fullmatch(job)):
+                if outcome not in _OUTCOMES or (outcome == FOUND and not JOB.fullmatch(job)):
                     raise ValueError(f"its design {position} is of no job")
                 yield Finished(position, job, read_json(keys, list), outcome, _read_row(row))
 
@@ -275,7 +275,7 @@ class Store:
 def _opened(path: Path, mode: str) -> sqlite3.Connection:
     """A database; `mode` as of its URIs."""
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", isolation_level=None, uri=True, timeout=30)
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, int(min(limit(ROW), MOST_OF_SQLITE)))
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, int(min(limit(ROW), _MOST_OF_SQLITE)))
     return connection
 
 
@@ -325,7 +325,7 @@ def _whole(text: str) -> int:
 def _read_row(packed: bytes) -> dict[str, Any]:
     """What is kept of a job."""
     unpacking = zlib.decompressobj()
-    content = unpacking.decompress(packed, int(min(limit(ROW), MOST_OF_SQLITE)))
+    content = unpacking.decompress(packed, int(min(limit(ROW), _MOST_OF_SQLITE)))
     if unpacking.unconsumed_tail:
         raise ValueError(f"a job has more than {limit(ROW) / 1e6:.4g} MB, {raised(ROW, 2 * limit(ROW))}")
     row: dict[str, Any] = read_json(content, dict)

@@ -150,10 +150,10 @@ def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pya
         keys, columns_of_sweep = header_of(store)
         there = [column.name for column in columns_of_sweep]
         asked = [*columns_of_sweep, *(read_column(name) for name in columns if name not in there)]
-        return arrow_table(names_of(keys, asked), table_rows(store, asked))
+        return _arrow_table(names_of(keys, asked), table_rows(store, asked))
 
 
-def arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Table":
+def _arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Table":
     """Rows as an Arrow table.
 
     Parameters
@@ -198,4 +198,4 @@ def write_parquet(store: Store) -> None:
         keys, columns = header_of(store)
         names = names_of(keys, columns)
         with replaced(store.folder / PARQUET) as part:
-            pyarrow.parquet.write_table(arrow_table(names, table_rows(store, columns)), part)
+            pyarrow.parquet.write_table(_arrow_table(names, table_rows(store, columns)), part)

@@ -14,9 +14,9 @@ from rodshell.targets.polygon_files import obj_content
 from rodshell.targets.trianglemesh import FARTHEST
 from rodshell.untrusted import limit, raised
 
-CURVE_FILES = (".obj", ".dxf", ".3dm")
+_CURVE_FILES = (".obj", ".dxf", ".3dm")
 MOST_STROKES = 5_000  # curves of a drawing: they are joined end to end
-SAG = 2e-5  # of a curve's extent: how finely arcs and splines of a DXF are divided
+_SAG = 2e-5  # of a curve's extent: how finely arcs and splines of a DXF are divided
 
 
 def read_curves(path: Path, unit: float) -> list[Floats]:
@@ -64,8 +64,8 @@ def read_lines(path: Path, unit: float) -> list[Floats]:
 def _strokes(path: Path, unit: float) -> list[Floats]:
     """Polylines (n, 3) [m] in the order of the file."""
     data, kind = file_bytes(path), path.suffix.lower()
-    if kind not in CURVE_FILES:
-        raise InputError(f"{path}: curves are read from {', '.join(CURVE_FILES)} files")
+    if kind not in _CURVE_FILES:
+        raise InputError(f"{path}: curves are read from {', '.join(_CURVE_FILES)} files")
     if kind == ".3dm":
         strokes, unit = _of_3dm(path, data, unit)
     else:
@@ -96,7 +96,7 @@ def _lines_of_obj(path: Path, data: bytes) -> list[Floats]:
 
 
 def _of_dxf(path: Path, data: bytes, farthest: float) -> list[Floats]:
-    request = {"sag": SAG, "most": limit(MOST_STROKES), "farthest": farthest}
+    request = {"sag": _SAG, "most": limit(MOST_STROKES), "farthest": farthest}
     found = read_apart(Path(__file__).with_name("dxf_curves.py"), path, data, "a drawing of curves", **request)
     _require_few_strokes(path, int(found["count"]))
     if "points" not in found:

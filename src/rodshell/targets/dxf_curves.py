@@ -6,7 +6,7 @@ import ezdxf
 import numpy as np
 from ezdxf import path as curves
 
-ARCS = 8  # cubics for a circle: within 4e-6 of the radius; with the four of ezdxf within 3e-4
+_ARCS = 8  # cubics for a circle: within 4e-6 of the radius; with the four of ezdxf within 3e-4
 KINDS = "LINE LWPOLYLINE POLYLINE ARC CIRCLE ELLIPSE SPLINE"
 
 
@@ -26,7 +26,7 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
     found = ezdxf.readfile(request["path"]).modelspace().query(KINDS)
     if len(found) > request["most"]:
         return {"count": len(found)}
-    paths = [(item, path) for item in found if len(path := curves.make_path(item, segments=ARCS))]
+    paths = [(item, path) for item in found if len(path := curves.make_path(item, segments=_ARCS))]
     far = max((float(np.abs([tuple(x) for x in path.control_vertices()]).max()) for _, path in paths), default=0.0)
     if not far <= request["farthest"]:  # ezdxf never ends, or crashes, where it divides such curves
         return {"count": len(found), "far": far}

@@ -25,7 +25,7 @@ from rodshell.targets.wall_below_rim import WalledTarget
 from rodshell.units import shown
 from rodshell.validation import instance
 
-FUNCTIONS: dict[str, Callable[[Any], Any]] = {
+_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "sqrt": np.sqrt,
     "exp": np.exp,
     "log": np.log,
@@ -40,15 +40,15 @@ FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "tanh": np.tanh,
     "abs": np.abs,
 }
-CONSTANTS = {"pi": pi, "e": e}
-OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+_CONSTANTS = {"pi": pi, "e": e}
+_OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-ALLOWED = "x, y, numbers, pi, e, + - * / ^, parentheses and " + ", ".join(FUNCTIONS)
+ALLOWED = "x, y, numbers, pi, e, + - * / ^, parentheses and " + ", ".join(_FUNCTIONS)
 
 FOREIGN = {"−": "-", "·": "*", "×": "*", "÷": "/", "²": "^2", "³": "^3", "=": "only the part after it"}
 LONGEST = 4000  # characters; Python's parser is safe with texts of this length
@@ -57,8 +57,8 @@ TIE = 1e-6  # of the size: peaks this close in height count as equally high
 SAME = 1e-3  # of the size: refined peaks this close are the same
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/^() ]|//|__")
 
-Slot = int
-Step = tuple[Callable[..., Any], Slot, Slot | None]
+_Slot = int
+Step = tuple[Callable[..., Any], _Slot, _Slot | None]
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def parse_formula(text: str) -> Formula:
 
     Parameters
     ----------
-    text : numbers, x, y, pi, e, + - * / ^ (or **), parentheses and `FUNCTIONS`.
+    text : numbers, x, y, pi, e, + - * / ^ (or **), parentheses and `_FUNCTIONS`.
 
     Raises
     ------
@@ -136,7 +136,7 @@ class _Compiler:
             self._step(operator.pos, result)
         constants = dict.fromkeys(a for step in self.steps for a in step[1:] if isinstance(a, float))
         operands: list[_Operand] = ["x", "y", *constants, *self.steps.values()]
-        slot_of: dict[_Operand | None, Slot | None] = {None: None}
+        slot_of: dict[_Operand | None, _Slot | None] = {None: None}
         slot_of |= {operand: slot for slot, operand in enumerate(operands)}
         steps = tuple((function, slot_of[a] or 0, slot_of[b]) for function, a, b in self.steps)
         return Formula(self.text, tuple(constants), steps)
@@ -169,17 +169,17 @@ class _Compiler:
 
     def _operands(self, node: ast.expr) -> list[ast.expr]:
         match node:
-            case ast.BinOp(left, op, right) if type(op) in OPERATORS:
+            case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
                 return [left, right]
             case ast.UnaryOp(ast.USub() | ast.UAdd(), inner):
                 return [inner]
-            case ast.Call(ast.Name(name), args, []) if name in FUNCTIONS:
+            case ast.Call(ast.Name(name), args, []) if name in _FUNCTIONS:
                 if len(args) != 1:
                     raise self._wrong(node, f"has {len(args)} values: write {name}(...) with one")
                 return args
-            case ast.Name(name) if name in FUNCTIONS:
+            case ast.Name(name) if name in _FUNCTIONS:
                 raise self._wrong(node, f"has no value: write {name}(...)")
-            case ast.Name(name) if name in ("x", "y") or name in CONSTANTS:
+            case ast.Name(name) if name in ("x", "y") or name in _CONSTANTS:
                 return []
             case ast.Constant(value) if type(value) in (int, float):
                 return []
@@ -190,7 +190,7 @@ class _Compiler:
         operands: tuple[_Operand, ...]
         match node:
             case ast.Name(name):
-                return CONSTANTS.get(name, name)
+                return _CONSTANTS.get(name, name)
             case ast.UnaryOp(ast.UAdd(), inner):
                 return done[inner]
             case ast.Constant(int() | float() as value):
@@ -198,11 +198,11 @@ class _Compiler:
             case ast.UnaryOp(_, inner):
                 function, operands = operator.neg, (done[inner],)
             case ast.BinOp(left, op, right):
-                function, operands = OPERATORS[type(op)], (done[left], done[right])
+                function, operands = _OPERATORS[type(op)], (done[left], done[right])
                 if function is operator.truediv and operands[1] == 0.0:
                     raise self._wrong(node, "divides by zero: write a divisor other than 0")
             case ast.Call(ast.Name(name), [inner]):
-                function, operands = FUNCTIONS[name], (done[inner],)
+                function, operands = _FUNCTIONS[name], (done[inner],)
         numbers = [np.float64(operand) for operand in operands if isinstance(operand, float)]
         if len(numbers) < len(operands):
             return self._step(function, *operands)
@@ -235,7 +235,7 @@ def _meant(node: ast.expr) -> str | None:
     match node:
         case ast.Call(ast.Attribute(_, name) | ast.Name(name)) | ast.Attribute(_, name) | ast.Name(name):
             spelt = {"ln": "log"}.get(name, name.lower().replace("arc", "a"))
-            return next(iter(get_close_matches(spelt, ["x", "y", *CONSTANTS, *FUNCTIONS], n=1)), None)
+            return next(iter(get_close_matches(spelt, ["x", "y", *_CONSTANTS, *_FUNCTIONS], n=1)), None)
     return None
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from rodshell.arrays import Floats
 
-Part = Any
+_Part = Any
 """A part of a jet: an array, a float where it is constant, or a jet."""
 
-LN2, LN10 = float(np.log(2.0)), float(np.log(10.0))
+LN2, _LN10 = float(np.log(2.0)), float(np.log(10.0))
 
 
 class Jet:
@@ -30,17 +30,17 @@ class Jet:
 
     def __init__(
         self,
-        value: Part,
-        dx: Part = 0.0,
-        dy: Part = 0.0,
-        dxx: Part = 0.0,
-        dxy: Part = 0.0,
-        dyy: Part = 0.0,
+        value: _Part,
+        dx: _Part = 0.0,
+        dy: _Part = 0.0,
+        dxx: _Part = 0.0,
+        dxy: _Part = 0.0,
+        dyy: _Part = 0.0,
     ) -> None:
         self.value, self.dx, self.dy, self.dxx, self.dxy, self.dyy = value, dx, dy, dxx, dxy, dyy
 
     @staticmethod
-    def variables(x: Part, y: Part) -> tuple["Jet", "Jet"]:
+    def variables(x: _Part, y: _Part) -> tuple["Jet", "Jet"]:
         """The variables `x` and `y` (n,) as jets."""
         return Jet(x, dx=1.0), Jet(y, dy=1.0)
 
@@ -82,7 +82,7 @@ class Jet:
         return _chain(self, np.abs(self.value), np.sign(_plain(self.value)), 0.0)
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        rule = RULES.get(ufunc)
+        rule = _RULES.get(ufunc)
         if rule is None or method != "__call__" or options:
             return NotImplemented
         return rule(*inputs)
@@ -99,7 +99,7 @@ class Jet:
     __hash__ = None  # type: ignore[assignment]
 
 
-def _times(a: Part, b: Part) -> Part:
+def _times(a: _Part, b: _Part) -> _Part:
     """a b, without arithmetic where a factor is a plain 0 or 1: a part that is zero everywhere stays so."""
     if a.__class__ is float:
         if a == 0.0:
@@ -114,7 +114,7 @@ def _times(a: Part, b: Part) -> Part:
     return a * b
 
 
-def _plus(a: Part, b: Part) -> Part:
+def _plus(a: _Part, b: _Part) -> _Part:
     if a.__class__ is float and a == 0.0:
         return b
     if b.__class__ is float and b == 0.0:
@@ -122,7 +122,7 @@ def _plus(a: Part, b: Part) -> Part:
     return a + b
 
 
-def _minus(a: Part, b: Part) -> Part:
+def _minus(a: _Part, b: _Part) -> _Part:
     if b.__class__ is float and b == 0.0:
         return a
     if a.__class__ is float and a == 0.0:
@@ -130,11 +130,11 @@ def _minus(a: Part, b: Part) -> Part:
     return a - b
 
 
-def _over(a: Part, b: Part) -> Part:
+def _over(a: _Part, b: _Part) -> _Part:
     return 0.0 if a.__class__ is float and a == 0.0 else a / b
 
 
-def _plain(part: Part) -> Any:
+def _plain(part: _Part) -> Any:
     """The array in a jet of jets."""
     while part.__class__ is Jet:
         part = part.value
@@ -219,7 +219,7 @@ def _power(a: Any, b: Any) -> Any:
     return _chain(a, u**c, c * u ** (c - 1.0), c * (c - 1.0) * u ** (c - 2.0))
 
 
-def _chain(u: Jet, value: Part, d1: Part, d2: Part) -> Jet:
+def _chain(u: Jet, value: _Part, d1: _Part, d2: _Part) -> Jet:
     """f(u) from f, f' and f'' at u's value."""
     p, q = u.dx, u.dy
     dx, dy = _times(d1, p), _times(d1, q)
@@ -311,7 +311,7 @@ def _hypot(a: Any, b: Any) -> Jet:
     return _sqrt(_add(a * a, b * b))
 
 
-RULES: dict[np.ufunc, Callable[..., Any]] = {
+_RULES: dict[np.ufunc, Callable[..., Any]] = {
     np.add: _add,
     np.subtract: _subtract,
     np.multiply: _multiply,
@@ -331,7 +331,7 @@ RULES: dict[np.ufunc, Callable[..., Any]] = {
     np.expm1: _expm1,
     np.log: _log,
     np.log2: lambda u: _divide(_log(u), LN2),
-    np.log10: lambda u: _divide(_log(u), LN10),
+    np.log10: lambda u: _divide(_log(u), _LN10),
     np.log1p: _log1p,
     np.sin: _sin,
     np.cos: _cos,

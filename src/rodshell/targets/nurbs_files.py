@@ -17,10 +17,10 @@ from rodshell.targets.mesh_files import file_bytes
 from rodshell.units import shown
 
 GRID = 64  # quads each way: the field through them is accurate to 4e-5 of the size on a whole sphere
-PER_SPAN = 4  # quads per span of a NURBS with many knots
+_PER_SPAN = 4  # quads per span of a NURBS with many knots
 FINEST = 400  # quads each way, at most
-ALONG_EDGES = 400  # straight pieces of each trimming edge
-LISTED = 12  # faces named in a message
+_ALONG_EDGES = 400  # straight pieces of each trimming edge
+_LISTED = 12  # faces named in a message
 MOST = 1e15  # of a control point, in the unit of its file
 
 RHINO_FILES = (".3dm",)
@@ -31,10 +31,10 @@ RHINO_UNITS = {
 
 STEP_FILES = (".step", ".stp")
 MILLIMETRE = 1e-3  # m: OpenCASCADE converts every unit to millimetres
-LAST_LINE = b"END-ISO-10303-21"
-ABSURD = re.compile(rb"-?\d\.\d*E\+?\d{3,}")  # OpenCASCADE does not terminate with such coordinates
+_LAST_LINE = b"END-ISO-10303-21"
+_ABSURD = re.compile(rb"-?\d\.\d*E\+?\d{3,}")  # OpenCASCADE does not terminate with such coordinates
 READERS = Path(__file__).parent
-HIGHEST = 25  # degree: of splines beyond it, no digit of a point is known
+_HIGHEST = 25  # degree: of splines beyond it, no digit of a point is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,8 @@ class Nurbs:
     def fault(self) -> str:
         """Why there is no such surface; empty for one that is sound."""
         for degree, knots, count in zip(self.degrees, self.knots, self.controls.shape, strict=False):
-            if not 1 <= degree <= HIGHEST:
-                return f"its degree is {degree}, and {HIGHEST} at most is read"
+            if not 1 <= degree <= _HIGHEST:
+                return f"its degree is {degree}, and {_HIGHEST} at most is read"
             if len(knots) != count + degree + 1 or count <= degree:
                 return f"it has {len(knots)} knots for {count} control points of degree {degree}"
             if not (np.isfinite(knots).all() and (np.diff(knots) >= 0).all() and knots[degree] < knots[-degree - 1]):
@@ -77,7 +77,7 @@ class Nurbs:
         sides = []
         for knots, degree in zip(self.knots, self.degrees, strict=True):
             within = knots[degree : len(knots) - degree]
-            count = min(max(GRID, PER_SPAN * (len(np.unique(within)) - 1)), FINEST)
+            count = min(max(GRID, _PER_SPAN * (len(np.unique(within)) - 1)), FINEST)
             sides.append(np.linspace(within[0], within[-1], count + 1))
         return self.points(*sides).reshape(-1, 3), grid_triangles(len(sides[0]), len(sides[1]))
 
@@ -153,7 +153,7 @@ def rhino_content(path: Path, data: bytes, **request: object) -> dict[str, Any]:
     """
     if find_spec("rhino3dm") is None:
         raise InputError(f'{path}: 3dm files need rhino3dm: pip install "rodshell[rhino]"')
-    found = read_apart(READERS / "opennurbs.py", path, data, "3DM", along_edges=ALONG_EDGES, **request)
+    found = read_apart(READERS / "opennurbs.py", path, data, "3DM", along_edges=_ALONG_EDGES, **request)
     if not found:
         raise InputError(f"{path} cannot be read as 3DM: save it again from Rhino")
     return found
@@ -175,10 +175,10 @@ def _no_single_surface(
         return InputError(f"{path}: the surface has {faces[0]} faces: merge them, or export a mesh")
     listed = [
         f"{k}, {shown(label or layer)}" if label or layer else f"{k}"
-        for k, (label, layer, _) in enumerate(surfaces[:LISTED], start=1)
+        for k, (label, layer, _) in enumerate(surfaces[:_LISTED], start=1)
     ]
     what = "surfaces" if name is None else f"surfaces named {shown(name)}"
-    more = "; ..." if len(surfaces) > LISTED else ""
+    more = "; ..." if len(surfaces) > _LISTED else ""
     return InputError(
         f"{path} has {len(faces)} {what}: choose one by its number, or by its object or layer name (available: "
         f"{'; '.join(listed)}{more})"
@@ -203,11 +203,11 @@ def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[F
     if find_spec("OCP") is None:
         raise InputError(f'{path}: STEP files need OpenCASCADE: pip install "rodshell[step]"')
     data = file_bytes(path)
-    if LAST_LINE not in data[-1000:]:
-        raise InputError(f"{path} is truncated: its last line, {LAST_LINE.decode()}, is missing; export it again")
-    if far := ABSURD.search(data):
+    if _LAST_LINE not in data[-1000:]:
+        raise InputError(f"{path} is truncated: its last line, {_LAST_LINE.decode()}, is missing; export it again")
+    if far := _ABSURD.search(data):
         raise InputError(f"{path} is damaged: it has a coordinate {far[0].decode()}; export it again")
-    samples = {"grid": GRID, "per_span": PER_SPAN, "finest": FINEST, "along_edges": ALONG_EDGES}
+    samples = {"grid": GRID, "per_span": _PER_SPAN, "finest": FINEST, "along_edges": _ALONG_EDGES}
     parts = read_apart(READERS / "opencascade.py", path, data, "STEP", name=name, **samples)
     if "points" not in parts:
         raise _no_single_face(path, json.loads(str(parts["names"])), name)
@@ -222,6 +222,6 @@ def _no_single_face(path: Path, faces: list[list[str]], name: str | None) -> Inp
     what = f"{len(faces)} faces"
     if name is not None:
         what = f"{sum(name in names for names in faces)} faces named {shown(name)}"
-    listed = [", ".join([str(k), *map(shown, names)]) for k, names in enumerate(faces[:LISTED], start=1)]
-    available = "; ".join(listed) + ("; ..." if len(faces) > LISTED else "")
+    listed = [", ".join([str(k), *map(shown, names)]) for k, names in enumerate(faces[:_LISTED], start=1)]
+    available = "; ".join(listed) + ("; ..." if len(faces) > _LISTED else "")
     return InputError(f"{path} has {what}: choose one by its name or number (available: {available})")

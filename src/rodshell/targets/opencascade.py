@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-ON_BORDER = 1e-6  # of the range of a parameter
+_ON_BORDER = 1e-6  # of the range of a parameter
 
 
 def read(path: str) -> list[tuple[Any, list[str]]]:
@@ -49,7 +49,7 @@ def parts(whole: Any, kind: Any) -> Iterator[Any]:
         explorer.Next()
 
 
-def points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
+def _points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
     """Points (k, l, 3) of a surface on a lattice of its parameters [mm].
 
     Parameters
@@ -82,7 +82,7 @@ def edges(face: Any) -> list[Any]:
     return [TopoDS.Edge(edge) for edge in parts(face, TopAbs_EDGE)]
 
 
-def is_untrimmed(face: Any, surface: Any) -> bool:
+def _is_untrimmed(face: Any, surface: Any) -> bool:
     """Whether all edges run along the bounds of the surface's parameters."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 
@@ -93,7 +93,7 @@ def is_untrimmed(face: Any, surface: Any) -> bool:
         t = np.linspace(curve.FirstParameter(), curve.LastParameter(), 9)
         uv = np.array([(p.X(), p.Y()) for p in map(curve.Value, t.tolist())])
         away = np.minimum(np.abs(uv - low), np.abs(uv - high))
-        if not (away.max(axis=0) <= ON_BORDER * (high - low)).any():
+        if not (away.max(axis=0) <= _ON_BORDER * (high - low)).any():
             return False
     return True
 
@@ -132,8 +132,8 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
     wanted = [face for k, (face, names) in enumerate(faces) if request["name"] in (None, str(k + 1), *names)]
     if len(wanted) == 1:
         surface = BRepAdaptor_Surface(wanted[0], True)
-        found["points"] = points_of(surface, request["grid"], request["per_span"], request["finest"])
+        found["points"] = _points_of(surface, request["grid"], request["per_span"], request["finest"])
         along = request["along_edges"]
-        untrimmed = is_untrimmed(wanted[0], surface)
+        untrimmed = _is_untrimmed(wanted[0], surface)
         found["trims"] = np.empty((0, along + 1, 3)) if untrimmed else trims_of(wanted[0], along)
     return found

@@ -33,13 +33,13 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
         return {}
     found: dict[str, Any] = {"unit": model.Settings.ModelUnitSystem.name}
     if "most" in request:
-        curves = curves_of(model)
+        curves = _curves_of(model)
         drawn = [divided(curve, request["along_edges"]) for curve in curves[: int(request["most"])]]
         ends = np.cumsum([0, *map(len, drawn)])
         return found | {"count": len(curves), "points": np.vstack([np.empty((0, 3)), *drawn]), "ends": ends}
-    surfaces = list(surfaces_of(model))
+    surfaces = list(_surfaces_of(model))
     found["names"] = json.dumps([names for *names, _ in surfaces])
-    found["others"] = json.dumps(numbers_of(model))
+    found["others"] = json.dumps(_numbers_of(model))
     wanted = [(shape, faces) for name, layer, faces, shape in surfaces if request["name"] in (None, name, layer)]
     number = request["name"] or ""
     if not wanted and number.isdecimal() and 0 < int(number) <= len(surfaces):
@@ -49,18 +49,18 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
         shape = wanted[0][0]
         whole = shape if isinstance(shape, rhino3dm.Surface) else shape.Faces[0].UnderlyingSurface()
         trims = [] if whole is shape or shape.IsSurface else trims_of(shape, request["along_edges"])
-        found |= nurbs_of(whole) | {"trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
+        found |= _nurbs_of(whole) | {"trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
     return found
 
 
-def curves_of(model: Any) -> list[Any]:
+def _curves_of(model: Any) -> list[Any]:
     """Every curve object."""
     import rhino3dm
 
     return [item.Geometry for item in model.Objects if isinstance(item.Geometry, rhino3dm.Curve)]
 
 
-def numbers_of(model: Any) -> list[int]:
+def _numbers_of(model: Any) -> list[int]:
     """How many meshes, SubDs and curves a file has."""
     import rhino3dm
 
@@ -68,7 +68,7 @@ def numbers_of(model: Any) -> list[int]:
     return [sum(isinstance(item.Geometry, kind) for item in model.Objects) for kind in kinds]
 
 
-def surfaces_of(model: Any) -> Any:
+def _surfaces_of(model: Any) -> Any:
     """Name, layer, number of faces and shape of every surface object."""
     import rhino3dm
 
@@ -81,7 +81,7 @@ def surfaces_of(model: Any) -> Any:
             yield attributes.Name, layers.get(attributes.LayerIndex, ""), len(getattr(shape, "Faces", "1")), shape
 
 
-def nurbs_of(surface: Any) -> dict[str, Any]:
+def _nurbs_of(surface: Any) -> dict[str, Any]:
     """Any surface as a NURBS."""
     form = surface.ToNurbsSurface()
     knots = [np.array(list(side), dtype=float) for side in (form.KnotsU, form.KnotsV)]

@@ -19,7 +19,7 @@ AT_ONCE = 1_000_000  # samples that are held before they are merged
 # openings
 STEEPEST = 0.35  # cosine between an opening's axis and the normals around it: beyond it no cap fits, as on a tube
 BAND = 0.6  # of the opening's radius: width of the band around it to which a cap is fitted
-CAP_POINTS = 1500  # most points to which a cap is fitted
+_CAP_POINTS = 1500  # most points to which a cap is fitted
 DEEP, WIDEST = 0.3, 0.5  # a door: least depth over its width, and largest width over the surface's extent
 PITCH = 0.5  # spacings between the samples of a cap
 
@@ -167,7 +167,7 @@ def _cap(rim: Floats, samples: Samples, spacing: float) -> tuple[Floats, Floats]
     around, facing = samples.points[near], samples.normals[near]
     if len(around) < 12 or dot(facing, axis).min() < STEEPEST:
         return None
-    chosen = np.unique(np.linspace(0, len(around) - 1, CAP_POINTS).astype(int))
+    chosen = np.unique(np.linspace(0, len(around) - 1, _CAP_POINTS).astype(int))
     first = unit(cross(axis, np.array([0.0, 1.0, 0.0]) if abs(axis[0]) > 0.7 else np.array([1.0, 0.0, 0.0])))
     plane = np.stack([first, cross(axis, first)])
     height = RBFInterpolator((around[chosen] - centre) @ plane.T, (around[chosen] - centre) @ axis, kernel="cubic")

@@ -18,7 +18,7 @@ OF_PLAN = {"height_at", "lift"}  # methods of points of the plan, and of points 
 OF_SPACE = {"implicit", "level", "margin", "covers", "retract", "on_surface", "outside", "contact"}
 OF_SPACE |= {"closest", "distance", "gap"}
 NO_FORCES = np.empty((0, 3))
-NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
+_NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
 
 
 class Implicit(NamedTuple):
@@ -188,7 +188,7 @@ class Target(ABC):
         x = np.ascontiguousarray(x)
         for _ in range(steps):
             x, furthest = along_gradient(x, *self.level(x))
-            if furthest <= NEARLY * self.size:
+            if furthest <= _NEARLY * self.size:
                 break
         return x
 
@@ -212,7 +212,7 @@ class Target(ABC):
             y, gradient, left = self.retract(x, 1), np.empty_like(x), np.arange(len(x))
             for _ in range(12):
                 length = self._newton_to_closest(x, y, gradient, left, longest=0.3 * self.size)
-                left = left[~(length <= NEARLY * self.size)]
+                left = left[~(length <= _NEARLY * self.size)]
                 if len(left) == 0:
                     return y, gradient
             y[left] = self._descend_to_closest(x[left])

@@ -24,13 +24,13 @@ from rodshell.results.laths import laths_text
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
-FLAT_TITLE = "Flat plan"
+_FLAT_TITLE = "Flat plan"
 ROD = 0.18  # width of a rod's line, in text sizes
 LARGEST = 0.85  # size of a joint's id at most, in text sizes
 GAP = 0.06  # from an id to a rod, in text sizes
 CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
-STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
-STRIPS_LEGEND = (
+_STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
+_STRIPS_LEGEND = (
     "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice; "
     "S2: of the second lath.",
     "Open triangle: support. Arrow: the section's size there [mm], or from there on the number of laths (L).",
@@ -160,7 +160,7 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     for a, b in across:
         _dimension(pencil, plan, a, b, text, room)
     _axes(pencil, plan, text)
-    return pencil.done("plan", FLAT_TITLE, text)
+    return pencil.done("plan", _FLAT_TITLE, text)
 
 
 def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
@@ -329,9 +329,9 @@ def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None =
     chosen = plan.rods if rods is None else rods
     for k, rod in enumerate(chosen):
         _strip(pencil, rod, -k * TALL * text, text, layer, plan.rounding.mm)
-    for row, line in enumerate(STRIPS_LEGEND):
+    for row, line in enumerate(_STRIPS_LEGEND):
         pencil.write(line, (0.0, -len(chosen) * TALL * text + (9.0 - 1.4 * row) * text), text, "DIM")
-    return pencil.done("strips", STRIPS_TITLE, text)
+    return pencil.done("strips", _STRIPS_TITLE, text)
 
 
 def per_sheet(height: float, text: float) -> int:

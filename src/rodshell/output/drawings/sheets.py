@@ -28,7 +28,7 @@ from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, rounding_of, stress
 
 NOTE = "Design aid, not code compliance"
-NOT_GIVEN = "not given"
+_NOT_GIVEN = "not given"
 MORE = " (more: report.html)"  # after a verdict that is shortened or has several reasons
 WARNING = "#b3372c"
 COLUMNS = 4  # of entries, side by side
@@ -40,9 +40,9 @@ SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200
 FINE = SMALL * TEXT  # of tables and of the title block: capitals of 1.9 mm, the least on a sheet
 MARGIN, BLOCK = 10.0, 34.0  # around the frame; height of the title block
 ROW = 1.45 * FINE  # from line to line of the title block
-LEADING = 1.9 * FINE  # from line to line of a table
+_LEADING = 1.9 * FINE  # from line to line of a table
 OVERLAP = 10.0  # mm of paper that a sheet shows beyond its match lines
-MOST_TILES = 12  # sheets that the parts of one drawing may take
+_MOST_TILES = 12  # sheets that the parts of one drawing may take
 
 
 @dataclass(frozen=True)
@@ -85,16 +85,16 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
     kept = results.plain()
     source = archive.case_toml or json_text({key: kept.get(key) for key in ("rods", "boundary")})
     entries = (
-        ("Project", given.project or NOT_GIVEN),
-        ("Drawn by", given.author or NOT_GIVEN),
-        ("Date", given.date or today().isoformat()),
+        ("Project", given.project or _NOT_GIVEN),
+        ("Drawn by", given.author or _NOT_GIVEN),
+        ("Date", given.date or _today().isoformat()),
         ("Revision", given.revision or "-"),
-        ("Section", _section(rod.section) or NOT_GIVEN),
-        ("Material", _material(rod.material) or NOT_GIVEN),
+        ("Section", _section(rod.section) or _NOT_GIVEN),
+        ("Material", _material(rod.material) or _NOT_GIVEN),
         ("Joints", _joint(results.joint)),
         ("Rods", f"{len(results.rods)}"),
         ("Units", f"mm, shown to {rounding_of(results).words}"),
-        ("Tolerance", NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
+        ("Tolerance", _NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
         ("Input", input_hash(source, archive.inputs)),
         ("Made by", f"rodshell {results.version_rodshell or '(version unknown)'}"),
     )
@@ -111,7 +111,7 @@ def source_date() -> datetime | None:
         return None
 
 
-def today() -> date:
+def _today() -> date:
     """The date of writing in UTC, or that of `source_date`."""
     return (source_date() or datetime.now(UTC)).date()
 
@@ -160,11 +160,11 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
         lines.append(block.verdict_within(max(right - left, max(map(len, lines)) * LETTER * size), size))
         pencil.write(lines[-1], (left, y - 1.5 * len(lines) * size), size, "TITLE", bold=True, colour=WARNING)
     end = left + max(right - left, 0.25 * (right - left) + 4 * size)
-    scale_bar(pencil, end, y - (1.5 * len(lines) + 2) * size, 0.25 * (right - left), size, 1.0)
+    _scale_bar(pencil, end, y - (1.5 * len(lines) + 2) * size, 0.25 * (right - left), size, 1.0)
     return drawing + pencil.done("", "", size)
 
 
-def write_entries(
+def _write_entries(
     pencil: Pencil, block: TitleBlock, left: float, y: float, width: float, size: float, line: float
 ) -> float:
     """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line.
@@ -195,17 +195,17 @@ def shortened(text: str, width: float, size: float) -> str:
     return text if len(text) <= letters else text[: letters - 1].rstrip() + "\N{HORIZONTAL ELLIPSIS}"
 
 
-def bar_length(longest: float, scale: float) -> float:
+def _bar_length(longest: float, scale: float) -> float:
     """The round length of a scale bar [mm of the sheet].
 
     Parameters
     ----------
-    longest, scale : as of `scale_bar`.
+    longest, scale : as of `_scale_bar`.
     """
     return nice_step(scale * longest, 2) * 2 / scale
 
 
-def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
+def _scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
     """A bar of a round length of at most about `longest` [mm of the sheet], ending at `right`, at 1:`scale`.
 
     Parameters
@@ -215,7 +215,7 @@ def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: floa
     text : size of its numbers [mm of the sheet].
     scale : lengths of the object over those of the sheet.
     """
-    length = bar_length(longest, scale)
+    length = _bar_length(longest, scale)
     for k in range(4):
         x = right - length + k * length / 4
         corners = np.array([[x, y], [x + length / 4, y], [x + length / 4, y + 0.4 * text], [x, y + 0.4 * text]])
@@ -339,7 +339,7 @@ def _tiles(extent: Floats, paper: tuple[float, float]) -> Ints:
 
 def _fits_on(extent: Floats, paper: tuple[float, float]) -> bool:
     """Whether an extent (2,) of a drawing [mm of paper] takes no more sheets than it may."""
-    return bool(_tiles(extent, paper).prod() <= MOST_TILES)
+    return bool(_tiles(extent, paper).prod() <= _MOST_TILES)
 
 
 def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
@@ -355,7 +355,7 @@ def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Ite
     drawing = drawing.placed(1 / scale, np.zeros(2))
     bottom, top = drawing.box()
     size, count = high - low - 2 * OVERLAP, _tiles(top - bottom, paper)
-    if not 1 < count.prod() <= MOST_TILES:
+    if not 1 < count.prod() <= _MOST_TILES:
         return
     origin = 0.5 * (bottom + top) - 0.5 * count * size  # the tiles' common corner
     for row in range(count[1]):
@@ -388,7 +388,7 @@ def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sh
     steps = FINE * (LETTER * np.array(widths) + 1.2)
     width = float(steps.sum()) + 2 * FINE
     abreast = max(int((high[0] - low[0] + 2 * FINE) // width), 1)
-    tall = int((high[1] - low[1]) // LEADING) - max(map(len, heads)) - 1
+    tall = int((high[1] - low[1]) // _LEADING) - max(map(len, heads)) - 1
     per_sheet = tall * abreast
     pages = max(ceil(len(rows) / per_sheet), 1)
     for page in range(pages):
@@ -430,7 +430,7 @@ def _block(
     numeric = [all(_number(row[k]) or not row[k] for row in rows) for k in range(len(heads))]
     lines = zip(*([""] * (deep - len(words)) + list(words) for words in heads), strict=True)
     for k, cells in enumerate((*lines, *rows), start=1):
-        y = top - k * LEADING
+        y = top - k * _LEADING
         for j, cell in enumerate(cells):
             x, anchor = (edges[j + 1] - 1.2 * FINE, "end") if numeric[j] else (edges[j], "start")
             if cell:
@@ -456,8 +456,8 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
     title = shortened(f"{block.name}: {sheet.title}", right - left - 80, 5.0)
     pencil.write(title, (left, y), 5.0, "TITLE", bold=True)
     pencil.write(f"Sheet {number} of {count}", (right, y), TEXT, "TITLE", anchor="end")
-    y = write_entries(pencil, block, left, y - 5.9, right - left, FINE, ROW)
-    room = right - left - (bar_length(BAR, sheet.scale) + 3 * TEXT if sheet.scale else 0.0)
+    y = _write_entries(pencil, block, left, y - 5.9, right - left, FINE, ROW)
+    room = right - left - (_bar_length(BAR, sheet.scale) + 3 * TEXT if sheet.scale else 0.0)
     for k, line in enumerate(block.notes(sheet.content)):
         written = shortened(line, room, FINE)
         pencil.write(written, (left, y - 0.3 - ROW * k), FINE, "TITLE", colour=SOFT if k == 0 else WARNING)
@@ -468,7 +468,7 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
         )
     if sheet.scale:
         pencil.write(f"Scale 1:{sheet.scale:g}", (right - 38, top - 7.0), TEXT, "TITLE", anchor="end")
-        scale_bar(pencil, right, MARGIN + 5.2, BAR, TEXT, sheet.scale)
+        _scale_bar(pencil, right, MARGIN + 5.2, BAR, TEXT, sheet.scale)
     return pencil.done("", "", TEXT)
 
 

@@ -32,13 +32,13 @@ from rodshell.results import Archive, Results
 from rodshell.results.verdict import unknown_below
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of, whole_percent
 
-SUPPORTS_LEGEND = (
+_SUPPORTS_LEGEND = (
     "Red: where each rod ends and how it continues. A thin line leads to its name: rod.0 its start, rod.1 its end.",
     "Blue: straight lines from rod end to rod end{seams}; the edge itself may run outside them.",
 )
 RADIUS, TICK = 0.3, 0.8  # radius of a support's mark, and how far its rod's direction is drawn, in text sizes
-NUMBER_SIZES = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
-NARROW = 40  # letters in a line below the paths of the rod ends
+_NUMBER_SIZES = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
+_NARROW = 40  # letters in a line below the paths of the rod ends
 SAME = 0.01  # mm: lines as near as this to each other are drawn once
 CLEAR = 0.2  # of its size, between a number and the middle of its cell
 SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, and its baseline off it in its sizes
@@ -75,7 +75,7 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
         flat = [np.column_stack([curve[:, axis], curve[:, 2] - heights.min() + k * tall]) for curve in curves]
         pen = Pen(INK, 0.08 * text)
-        for curve in apart(map(thinned, flat)):
+        for curve in apart(map(_thinned, flat)):
             pencil.line(curve, "CUT", pen=pen)
         cloud = np.concatenate(flat)
         low, high = bounds(cloud)
@@ -111,7 +111,7 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     low, high = bounds(ways.reshape(-1, 2))
     pencil.write("Paths of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
     pencil.write("Closed lines: the ends at each stage", (low[0], low[1] - 4.8 * text), text, "LABEL")
-    for k, line in enumerate(wrap(_not_known(archive.results), NARROW)):
+    for k, line in enumerate(wrap(_not_known(archive.results), _NARROW)):
         pencil.write(line, (low[0], low[1] - (6.6 + 1.4 * k) * text), text, "LABEL", bold=True, colour="#b3372c")
     left, top = high[0] + 8 * text, high[1]
     for k, (stage, positions) in enumerate(zip(stages, history, strict=True)):
@@ -121,7 +121,7 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
         cloud = np.concatenate(curves)
         tall = float(np.ptp(cloud[:, 1]))
         shift = np.array([left - low[0], top - tall - cloud[:, 1].min()])
-        for curve in apart(map(thinned, curves)):
+        for curve in apart(map(_thinned, curves)):
             pencil.line(curve + shift, "CUT", pen=pen)
         words = f"{k}: deployment {100 * stage.share:.0f} %, {mm(stage.height)} mm high"
         pencil.write(words, (left, top - tall - 1.8 * text), text, "LABEL")
@@ -146,7 +146,7 @@ def _not_known(results: Results) -> str:
     return " ".join(said)
 
 
-def thinned(curve: Floats) -> Floats:
+def _thinned(curve: Floats) -> Floats:
     """A curve by about every third of its nodes, its ends kept.
 
     Parameters
@@ -166,7 +166,7 @@ def apart(curves: Iterable[Floats]) -> list[Floats]:
     return list({(np.rint(curve / SAME) + 0.0).tobytes(): curve for curve in curves}.values())
 
 
-def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
+def _seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
     """The rods of the final shape, pale.
 
     Parameters
@@ -176,7 +176,7 @@ def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
     """
     assert archive.final is not None
     for curve in rod_curves(archive, archive.states[archive.final]):
-        pencil.line(thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
+        pencil.line(_thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
 
 
 def _span(
@@ -226,7 +226,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     """
     pencil, final = Pencil(), archive.final
     assert final is not None
-    seen_from_above(pencil, archive, text)
+    _seen_from_above(pencil, archive, text)
     drawn = [rod for rod in plan.rods if len(rod.nodes) > 1]
     curves = [curve[:, :2] for curve in rod_curves(archive, archive.states[final])]
     ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
@@ -238,7 +238,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
         pencil.mark(end, RADIUS * text, "MARK", note=name)
         pencil.line([end, end + TICK * text * way], "MARK", pen=tick)
         room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
-    lines = np.concatenate([_segments(thinned(thinned(curve))) for curve in curves])  # what names keep clear of
+    lines = np.concatenate([_segments(_thinned(_thinned(curve))) for curve in curves])  # what names keep clear of
     alone = ~np.isin(names, list(_sewn(archive)))
     for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
@@ -259,7 +259,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     _meetings(pencil, archive, text, room)
     axes(pencil, text)
     low, _ = pencil.done("", "", text).box()
-    for k, line in enumerate(SUPPORTS_LEGEND, start=1):
+    for k, line in enumerate(_SUPPORTS_LEGEND, start=1):
         written = line.format(seams="" if alone.all() else ", and seams")
         pencil.write(written, low - (0.0, 1.5 * k * text), text, "DIM")
     return pencil.done("supports", f"Support plan{_stopped(archive)}", text)
@@ -333,7 +333,7 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     """
     pencil, final = Pencil(), archive.final
     assert final is not None
-    seen_from_above(pencil, archive, text)
+    _seen_from_above(pencil, archive, text)
     joints = joint_places(archive, archive.states[final])
     supports = [f"{rod.id}.{end}" for rod in archive.results.rods for end in (0, 1)]
     joints |= {name: np.array(place) for name, place in zip(supports, archive.results.boundary, strict=False)}
@@ -370,7 +370,7 @@ def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list
     along, above = (np.column_stack(pair) for pair in ((np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))))
     middle, centred = 0.5 * (a + b), np.full(len(words), BACK["middle"])
     room, found = Room(3 * text), dict[int, Text]()
-    for size, (side, up) in ((text * share, side) for share in NUMBER_SIZES for side in SIDES):
+    for size, (side, up) in ((text * share, side) for share in _NUMBER_SIZES for side in SIDES):
         at = middle + (side * (CLEAR + 0.5 * LETTER * letters) * size)[:, None] * along + up * size * above
         (x, y), (cosine, sine), sizes = at.T, along.T, np.full(len(words), size)
         boxes = np.array(corners(x, y, cosine, sine, sizes, letters, centred)).transpose(2, 0, 1).copy()

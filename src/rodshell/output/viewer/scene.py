@@ -28,7 +28,7 @@ from rodshell.results.wording import nice_ticks, rounding_of
 STEPS = 65535  # of a coordinate: 16 bits
 COLOURS: tuple[Colour, ...] = ("stress", "gap", "curvature", "force")
 UNKNOWN = 255  # in place of the index of a colour
-SEGMENTS = 14000  # of rods at most, so that pages stay small
+_SEGMENTS = 14000  # of rods at most, so that pages stay small
 VERSION = 1
 
 
@@ -253,7 +253,7 @@ def _entries(counts: Ints, meeting: Ints) -> Ints:
     """Entries that are drawn, of all rods: of very many some, those of ends and joints among them."""
     stop = np.cumsum(counts)
     along = np.arange(stop[-1]) - np.repeat(stop - counts, counts)
-    drawn = along % max(1, -(-int(stop[-1]) // SEGMENTS)) == 0
+    drawn = along % max(1, -(-int(stop[-1]) // _SEGMENTS)) == 0
     drawn[stop - 1] = drawn[meeting.ravel()] = True
     return np.flatnonzero(drawn)
 
