@@ -70,14 +70,19 @@ def _imbalance(parts: Floats) -> float:
 
 
 def reactions(shell: Shell, found: Equilibrium) -> Reactions:
-    """Reactions of a shell without loads whose ends are held.
+    """Reactions of a shell without loads, whose ends are held or pushed by the springs of supports.
 
     Parameters
     ----------
     shell : with its source frames at the equilibrium.
-    found : the equilibrium; its gradient at the held ends is what the supports exert.
+    found : the equilibrium; its gradient at the ends, without that of the springs, is what the supports exert.
     """
     state, gradient = found.state, found.gradient
+    if shell.springs:  # their forces are the supports'
+        pushes = np.zeros_like(gradient)
+        for spring in shell.springs:
+            spring.evaluate(state, pushes)
+        gradient = gradient - pushes
     points = state[shell.ends]
     forces, moments = gradient[shell.ends], np.zeros_like(points)
     if len(shell.ghosts):

@@ -23,10 +23,9 @@ from rodshell.figures import loads as figures
 from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.loads import Governs, Utilisations
-from rodshell.figures.records import Found
+from rodshell.figures.records import Ends, Found
 from rodshell.formfinding import PatchForm, PopUp, pop_up
 from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.popup import Ends
 from rodshell.layout import GridMesh
 from rodshell.loads.bracing import stressed
 from rodshell.loads.combinations import Loads

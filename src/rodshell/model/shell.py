@@ -10,9 +10,10 @@ mass of that block is divided equally among its copies, so that none is counted 
 Eccentric joints lay the rods in two layers, whose mesh gives each rod its own nodes (`GridMesh.in_layers`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 from typing import Any, TypeVar
 
 import numpy as np
@@ -44,11 +45,13 @@ from rodshell.rods.elements import Elements, Stretch, turned, with_frames
 from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.joints import Elastic
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import CLAMPED, PINNED
 from rodshell.validation import flag, instance
 
 UP = (0.0, 0.0, 1.0)
 OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
 ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
+Direction = tuple[float, float, float]
 Item = TypeVar("Item")
 COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
 
@@ -72,6 +75,8 @@ class Shell:
     edge_mass : (e,) mass of each edge [kg].
     edge_inertia : (e,) moment of inertia of each edge about its tangent [kg m2].
     joint_mass : (c,) mass of each crossing's joint [kg].
+    springs : energies of the supports, which act on the rods' ends.
+    slides : orthonormal directions along which rod ends may move, by the number of the end; others are held.
     turn : (2, 2) how the flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
 
@@ -89,10 +94,12 @@ class Shell:
     edge_mass: Floats
     edge_inertia: Floats
     joint_mass: Floats
+    springs: tuple[Elements, ...] = ()
+    slides: Mapping[int, Sequence[Direction]] = field(default_factory=dict)
     turn: Floats = field(default_factory=lambda: np.eye(2))
 
     def __repr__(self) -> str:
-        ends = "clamped" if len(self.ghosts) else "pinned"
+        ends = CLAMPED if len(self.ghosts) else PINNED
         coupled = "" if isinstance(self.coupling, SharedDofs) else f", {self.coupling.name} coupling"
         return f"Shell({self.node_count} nodes, {len(self.stretch.blocks)} edges, {ends}{coupled})"
 
@@ -135,7 +142,7 @@ class Shell:
     @property
     def elements(self) -> tuple[Elements, ...]:
         """All energies but the stretch, those of explicit ties included: an equilibrium is the same."""
-        return (*self.within, *self.between)
+        return (*self.within, *self.between, *self.springs)
 
     @property
     def energies(self) -> Potential:
@@ -146,6 +153,11 @@ class Shell:
     def explicit(self) -> tuple[Elements, ...]:
         """The elements whose forces a motion freezes at the start of each step."""
         return self.between if isinstance(self.coupling, ExplicitPenalty) else ()
+
+    @property
+    def yields(self) -> bool:
+        """Whether its supports let the rods' ends move."""
+        return bool(self.slides or self.springs)
 
     @property
     def first_angle(self) -> int:
@@ -231,10 +243,13 @@ class Shell:
 
         Parameters
         ----------
-        elements : those within rods and linkers, then those between them.
+        elements : those within rods and linkers, those between them, those of supports.
         """
-        count = len(self.within)
-        return replace(self, within=elements[:count], between=elements[count:])
+        parts = iter(elements)
+        within, between, springs = (
+            tuple(islice(parts, len(those))) for those in (self.within, self.between, self.springs)
+        )
+        return replace(self, within=within, between=between, springs=springs)
 
     def turned(self, turn: Floats) -> "Shell":
         """The same shell of a flat grid that is turned in its plane, so that no edge of a shell that lies the other way
@@ -257,8 +272,11 @@ class Shell:
         return self.with_elements(tuple(map(with_frames, self.elements, elements)))
 
     def held_ends(self) -> Freedom:
-        """As `freedom`, with every rod end held in place."""
-        return self.freedom().with_directions(self.ends)
+        """As `freedom`, with every rod end held in place, or along all but its directions."""
+        held = self.freedom().with_directions(self.ends)
+        for end, directions in self.slides.items():
+            held = held.with_directions(self.ends[[end]], *directions)
+        return held
 
     def _turn_directors(self, state: Floats, normals: Floats) -> None:
         """Set the twist angles so that the first directors are as near to the normals as they can be."""

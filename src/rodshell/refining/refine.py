@@ -12,9 +12,10 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
-from rodshell.formfinding.popup import Ends, PopUp
+from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import Footprint
 from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
@@ -344,7 +345,8 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
     InputError : it has no stable equilibrium there after all.
     """
     grid, here = design.grid, design.point.equilibrium
-    shell = Shell.of(grid.mesh, stages.rod, clamped=ends == "clamped", joint=stages.joint)
+    support = stages.popped[ends].support
+    shell = Shell.of(grid.mesh, stages.rod, clamped=support.holds_directions, joint=stages.joint)
     shell = shell.with_frames_of(here.elements)
     problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
     if here.problem.load is None:
@@ -355,7 +357,7 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
         found = replace(unloaded or found, problem=replace((unloaded or found).problem, load=None))
     shell = shell.with_elements(found.elements)
     footprint = Footprint(grid.mesh)
-    popped = PopUp(ends, "draped", footprint, grid.boundary, shell, found)
+    popped = PopUp(support, "draped", footprint, grid.boundary, shell, found)
     result = replace(
         stages, ends=(ends,), footprint=footprint, boundary=grid.boundary,
         popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
