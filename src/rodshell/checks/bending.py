@@ -36,7 +36,7 @@ from rodshell.checks.reactions import joint_loads
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.joints.relative_rotation import RelativeRotation
+from rodshell.joints.relative_rotation import is_elastic
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
@@ -300,7 +300,7 @@ def bending_of(
         mesh, positions = mesh.apart, state[: shell.node_count]
     clamps = unit(state[shell.ghosts] - state[shell.ends]) if len(shell.ghosts) else None
     components, twist, by_joints = None, None, _bent_by_joints(shell, state, rod)
-    if frames := rod_frames(shell):
+    if frames := shell.frames:
         strains = _on_entries(shell, frames.strains(state))
         twist = strains[:, 2]
         if len(set(rod.bend_stiffnesses)) > 1:
@@ -318,8 +318,7 @@ def bending_of(
 def _bent_by_joints(shell: Shell, state: Floats, rod: Rod) -> Floats | None:
     """(k, 3) by how much more each rod bends on the sharper side of its joints than at their nodes, along the joints'
     normals [1/m]; None where no joint resists shear."""
-    joints = (element for element in shell.between if isinstance(element, RelativeRotation))
-    if not any(element.stiffness[:, 0, 0].any() for element in joints):
+    if not any(element.stiffness[:, 0, 0].any() for element in filter(is_elastic, shell.between)):
         return None
     mesh, loads = shell.mesh, joint_loads(shell, state)
     moments = np.zeros((len(mesh.rod_nodes), 3))
@@ -380,11 +379,6 @@ def bending(
         else:
             stress = largest_stress(rod, bends[:, 0], bends[:, 1], axial, sheared_by, weight=shear_weight)
     return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared)
-
-
-def rod_frames(shell: Shell) -> BendTwist | None:
-    """The elements that carry the rods' material frames; None where no twist angles are carried."""
-    return next((element for element in shell.within if isinstance(element, BendTwist)), None)
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:

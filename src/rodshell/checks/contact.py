@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
+from rodshell.checks.bending import edge_directors, shell_normals
 from rodshell.figures.checks import Clearance
 from rodshell.geometry.frames import adapted, cross, dot, unit
 from rodshell.geometry.near_pairs import near_pairs
@@ -51,7 +51,7 @@ def contact_of(shell: Shell, state: Floats, rod: Rod) -> Clearance:
     state : (N, 3) node positions [m] and twist angles [rad].
     rod : the section of every rod.
     """
-    frames = rod_frames(shell)
+    frames = shell.frames
     directors = None if frames is None else edge_directors(shell, frames, state)
     return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
 
@@ -78,7 +78,7 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
         np.concatenate([*(crossings.rods + by for crossings, by in zip(parts, sizes, strict=False)), together // 2]),
         np.concatenate([*(crossings.at for crossings in parts), stations[together]]),
     )
-    frames = [(shell, rod_frames(shell), state) for shell, state in patches]
+    frames = [(shell, shell.frames, state) for shell, state in patches]
     turned = [edge_directors(shell, frame, state) for shell, frame, state in frames if frame is not None]
     directors = np.concatenate(turned) if len(turned) == len(patches) else None
     return contact(mesh, positions, rod, directors=directors, crossings=crossings)

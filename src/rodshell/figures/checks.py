@@ -2,7 +2,6 @@
 
 from math import inf
 from re import fullmatch
-from typing import TypeVar
 
 from pydantic import Field
 
@@ -16,6 +15,7 @@ from rodshell.figures.records import (
     Real,
     Record,
     Rows,
+    T,
     TableOr,
     Text,
     Vector,
@@ -26,10 +26,9 @@ from rodshell.figures.records import (
 )
 
 OTHER_SHAPES = ("pop_up", "deployment")  # with figures in addition to those on supports
-Shape = TypeVar("Shape", bound=Record)
 
 
-def by_shape(record: Record, kind: type[Shape]) -> dict[str, Shape]:
+def _by_shape(record: Record, kind: type[T]) -> dict[str, T]:
     """What a record holds of shapes: by the names of supports, then of the deployment."""
     known = {name: value for name, value in record if isinstance(value, kind) and fullmatch(f"{NAME}|pop_up", name)}
     return {name: known[name] for name in sorted(known, key=OTHER_SHAPES.__contains__)}
@@ -59,7 +58,7 @@ class Bending(Record):
 
     def shapes(self) -> dict[str, WorstBent]:
         """What is known, by the name of the shape."""
-        return by_shape(self, WorstBent)
+        return _by_shape(self, WorstBent)
 
 
 class Clearance(Record):
@@ -83,7 +82,7 @@ class Contact(Record):
 
     def shapes(self) -> dict[str, Clearance]:
         """What is known, by the name of the shape."""
-        return by_shape(self, Clearance)
+        return _by_shape(self, Clearance)
 
     def of(self, shape: str) -> Clearance | None:
         """Of a support by its name, or of the "deployment"."""

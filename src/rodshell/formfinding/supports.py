@@ -16,12 +16,12 @@ from rodshell.solve.equilibrium import MOST_ITERATIONS, Equilibrium, find_stable
 from rodshell.solve.problem import Supports
 from rodshell.validation import described, direction, listed, mapping, some, whole
 
-ENERGY = "an energy, such as rodshell.LocalEnergy, or a list of them"
-Counting = Callable[[str, int], Callable[[int, float], None]]
+_ENERGY = "an energy, such as rodshell.LocalEnergy, or a list of them"
+_Counting = Callable[[str, int], Callable[[int, float], None]]
 
 
 def let_go(
-    shell: Shell, held: Equilibrium, support: Support, points: Floats, counting: Counting
+    shell: Shell, held: Equilibrium, support: Support, points: Floats, counting: _Counting
 ) -> tuple[Shell, Equilibrium]:
     """A shell on its support.
 
@@ -58,10 +58,10 @@ def energies_of(given: object, nodes: int) -> tuple[Elements, ...]:
     ------
     InputError : one is not an energy, or acts on a node that the shell has not.
     """
-    added = (given,) if _is_energy(given) else tuple(listed("energies", given, ENERGY))
+    added = (given,) if _is_energy(given) else tuple(listed("energies", given, _ENERGY))
     for energy in added:
         if not _is_energy(energy):
-            raise InputError(f"energies must be {ENERGY}, not {described(energy)}")
+            raise InputError(f"energies must be {_ENERGY}, not {described(energy)}")
         if (energy.blocks >= nodes).any():
             raise InputError(f"an energy acts on node {energy.blocks.max()}: the shell has {nodes}, from 0")
     return added

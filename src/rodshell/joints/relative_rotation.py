@@ -22,9 +22,9 @@ Why not elements from edge to edge, as the paper's linkers are: those also stiff
 by an amount that depends on the mesh. Frames, spin and sources are those of `rods.bend_twist`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
-from typing import Self
+from typing import Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted, cross, dot
 from rodshell.joints.crossings import by_edge, edge_tangents, frame, of_edge, spread, with_source
 from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.validation import brief
 
 
@@ -107,6 +107,10 @@ class RelativeRotation:
         """The same joints with their source frames at `state` (N, 3)."""
         return with_source(self, state)
 
+    def with_stiffness_of(self, other: "RelativeRotation") -> Self:
+        """The same joints as stiff as others."""
+        return replace(self, stiffness=other.stiffness, deviators=other.deviators)
+
     def sections(self, state: Floats) -> Floats:
         """(m, 2, 2, 3) tangent T and normal N of the sections of A and of B at `state` (N, 3).
 
@@ -159,6 +163,11 @@ class RelativeRotation:
         shear -= 2 * pi * np.round(shear / (2 * pi))
         lean = cross(nb_, na)
         return np.column_stack([shear, dot(lean, ta), dot(nb_, ta), dot(lean, tb), -dot(na, tb)])
+
+
+def is_elastic(element: Elements) -> TypeGuard[RelativeRotation]:
+    """Whether an energy is that of elastic joints."""
+    return isinstance(element, RelativeRotation)
 
 
 @njit(error_model="numpy")

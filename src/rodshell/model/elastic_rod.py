@@ -22,8 +22,8 @@ from rodshell.geometry.frames import cross, unit
 from rodshell.model.assembly import Freedom
 from rodshell.model.potential import Potential
 from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements, Stretch
+from rodshell.rods.bend_twist import BendTwist, frames_among
+from rodshell.rods.elements import BendElements, Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.validation import brief, described, direction, finite, flag, short, vector
 
@@ -72,7 +72,7 @@ class ElasticRod:
 
     rest: Floats
     closed: bool
-    elements: tuple[Elements, ...]
+    elements: tuple[BendElements, ...]
     stretch: Stretch
     mass: Floats
     bend_lengths: Floats
@@ -127,7 +127,7 @@ class ElasticRod:
         rate = finite("natural_twist", natural_twist, int(bends.like.max()) + 1)[bends.like]
         straight = isinstance(natural, str) and natural == "straight"
         free_spin = straight and bool((bends.stiffness[:, 0] == bends.stiffness[:, 1]).all())
-        elements: Elements
+        elements: BendElements
         if twist:
             elements = _bend_twist(line, bends, line.directors(director), natural, rate, isotropic=free_spin)
         elif closed or not free_spin or rate.any():
@@ -172,14 +172,13 @@ class ElasticRod:
     @property
     def bend_energy(self) -> float:
         """EI/L [J] of the softer direction, the mean along the rod: about the energy of a bend by a radian."""
-        bends = self.elements[0]
-        stiffness = bends.stiffness if isinstance(bends, IsotropicBend) else self._bend_twist.bend_stiffness.min(axis=1)
+        stiffness = self.elements[0].bend_stiffness.min(axis=1)
         return float((stiffness * self.bend_lengths).mean() / self.length)
 
     @property
     def twists(self) -> bool:
         """Whether the rod has twist angles."""
-        return isinstance(self.elements[0], BendTwist)
+        return bool(self.elements[0].angle_columns)
 
     @property
     def nodes(self) -> slice:
@@ -296,13 +295,7 @@ class ElasticRod:
         ----------
         state : (N, 3) node positions [m] and twist angles [rad].
         """
-        bends = self.elements[0]
-        if isinstance(bends, IsotropicBend):
-            curvature = bends.curvatures(state)
-            strains = np.column_stack([curvature, 0 * curvature, 0 * curvature])
-        else:
-            strains = self._bend_twist.strains(state)
-        strains = strains / self.bend_lengths[:, None]
+        strains = self.elements[0].strains(state) / self.bend_lengths[:, None]
         return RodStrains(self.stretch.strains(state), strains[:, :2], strains[:, 2])
 
     def energy(self, state: Floats) -> float:
@@ -340,8 +333,7 @@ class ElasticRod:
 
     @property
     def _bend_twist(self) -> BendTwist:
-        bends = self.elements[0]
-        if not isinstance(bends, BendTwist):
+        if (bends := frames_among(self.elements)) is None:
             raise InputError("this rod has no frames: build it with twist=True")
         return bends
 

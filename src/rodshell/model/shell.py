@@ -28,7 +28,6 @@ from rodshell.joints import (
     ExplicitPenalty,
     ImplicitPenalty,
     Joint,
-    Linker,
     SharedDofs,
     Ties,
     require_joint,
@@ -40,10 +39,9 @@ from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
 from rodshell.model.potential import Potential
 from rodshell.model.rod_sections import RodSections
-from rodshell.rods.bend_twist import BendTwist
+from rodshell.rods.bend_twist import BendTwist, frames_among
 from rodshell.rods.elements import Elements, Stretch, turned, with_frames
 from rodshell.rods.isotropic import IsotropicBend
-from rodshell.rods.joints import Elastic
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import CLAMPED, PINNED
 from rodshell.validation import flag, instance
@@ -153,6 +151,11 @@ class Shell:
     def explicit(self) -> tuple[Elements, ...]:
         """The elements whose forces a motion freezes at the start of each step."""
         return self.between if isinstance(self.coupling, ExplicitPenalty) else ()
+
+    @cached_property
+    def frames(self) -> BendTwist | None:
+        """The elements that carry the rods' material frames; None where rods have none."""
+        return frames_among(self.within)
 
     @property
     def yields(self) -> bool:
@@ -419,18 +422,14 @@ class _Builder:
 
     def _elastic(self) -> tuple[Elements, ...]:
         """Joints other than linkers."""
-        elastic = [isinstance(joint, Elastic) and joint.turns_frames for joint in self.joints]
-        if not any(elastic):
-            return ()
-        crossings = np.flatnonzero(np.array(elastic)[self.joint_of])
-        joints = [self.joints[kind] for kind in self.joint_of[crossings].tolist()]
-        return elastic_joints(self.rod_nodes, crossings, joints, self.stiffness, self.size)
+        joints = [self.joints[kind] for kind in self.joint_of.tolist()]
+        return elastic_joints(self.rod_nodes, np.arange(len(joints)), joints, self.stiffness, self.size)
 
     def _linkers(self) -> tuple[list[Elements], list[Elements]]:
         """Linkers, and the ties of those with their own unknowns, whose blocks are added here."""
         linkers, ties = list[Elements](), list[Elements]()
         for kind, joint in enumerate(self.joints):
-            if not isinstance(joint, Linker):
+            if not joint.corners:
                 continue
             crossings = np.flatnonzero(self.joint_of == kind)
             corners = Corners.of(self.rod_nodes, crossings, joint.corners)
@@ -463,7 +462,7 @@ class _Builder:
         if not self.apart:
             return []
         eccentricity = self._of_joints(lambda joint: joint.eccentricity)
-        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not isinstance(joint, Linker), bool)
+        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not joint.corners, bool)
         pairs = self.rod_nodes.blocks[self.rod_nodes.at_crossings[centric]]
         ties = [_ties(pairs, self._penalties()[0])] if centric.any() else []
         return [*ties, *offset_ties(self.rod_nodes, eccentricity, self._offset_stiffness(), self.size)]

@@ -27,7 +27,6 @@ from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
 from rodshell.refining.structure import Point, Structure, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
-from rodshell.rods.joints import Elastic
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.units import percent_text
@@ -237,8 +236,7 @@ def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
     joint = structure.joint
-    given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
-    springs = any(0.0 < stiffness < inf for stiffness in given)
+    springs = any(0.0 < stiffness < inf for stiffness in (joint.shear, joint.out_of_plane, joint.twist))
     if point.equilibrium.problem.load is None and not springs and not as_found:
         profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
         thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)

@@ -28,8 +28,9 @@ source. An edge that turns by half a revolution from its source has no frame: th
 The branch of m_ref holds while m_ref changes by less than pi, which a node that is nearly folded may exceed.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,7 +38,7 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
 from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.validation import brief
 
 
@@ -67,7 +68,8 @@ class BendTwist:
     source_directors: Floats
     source_twist: Floats
 
-    angle_columns = 1, 3
+    angle_columns: ClassVar[tuple[int, ...]] = (1, 3)
+    moduli: ClassVar[tuple[int, ...]] = (0, 1, 2)
     __repr__ = brief
 
     @classmethod
@@ -116,6 +118,22 @@ class BendTwist:
         """
         strains = self.strains(state)
         return replace(self, natural_curvature=strains[:, :2].copy(), natural_twist=strains[:, 2].copy())
+
+    def between(self, held: Self, t: float) -> Self:
+        """The same elements, their natural strains only the share t of the way from those of `held`."""
+        if t >= 1 or held is self:
+            return self
+        return replace(
+            self,
+            natural_curvature=(1 - t) * held.natural_curvature + t * self.natural_curvature,
+            natural_twist=(1 - t) * held.natural_twist + t * self.natural_twist,
+        )
+
+    def with_stiffness(self, stiffness: Floats) -> Self:
+        """The same elements with EI1, EI2 and GJ over the Voronoi length, (b, 3) [N m]; without bending if they have
+        none."""
+        bend = stiffness[:, :2].copy() if self.bend_stiffness.any() else 0.0 * self.bend_stiffness
+        return replace(self, bend_stiffness=bend, twist_stiffness=stiffness[:, 2].copy())
 
     @property
     def parts(self) -> tuple[Self, ...]:
@@ -197,6 +215,11 @@ class BendTwist:
 
 
 PROBE = 1e-5  # of the shortest edge, or rad: motion over which the change of strains is taken; good to 1e-9
+
+
+def frames_among(sets: Sequence[Elements]) -> BendTwist | None:
+    """The first of these energies that carries frames of rods."""
+    return next((elements for elements in sets if isinstance(elements, BendTwist)), None)
 
 
 def strain_rates(elements: BendTwist, state: Floats, motion: Floats) -> Floats:

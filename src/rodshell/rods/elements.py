@@ -13,7 +13,7 @@ edge: at the solution the strain vanishes and N0 is the axial force.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,42 @@ class Elements(Protocol):
         ...
 
 
-@runtime_checkable
+class BendElements(Elements, Protocol):
+    """Bending between consecutive edges of rods, and twist where they have it.
+
+    Attributes
+    ----------
+    bend_stiffness : (b, 1) or (b, 2) EI over the Voronoi length, of both directions [N m].
+    parts : the energies of each stiffness alone, bending first.
+    moduli : for each part 0, 1 or 2: it resists with EI1, EI2 or GJ.
+    """
+
+    angle_columns: ClassVar[tuple[int, ...]]
+    moduli: ClassVar[tuple[int, ...]]
+
+    @property
+    def bend_stiffness(self) -> Floats: ...
+
+    @property
+    def parts(self) -> "tuple[BendElements, ...]": ...
+
+    def strains(self, state: Floats) -> Floats:
+        """(b, 3) curvatures (integrated, [-]) and twist [rad] at `state` (N, 3)."""
+        ...
+
+    def relaxed(self, state: Floats) -> Self:
+        """The same elements with `state` (N, 3) as their stress-free state, as far as they have natural strains."""
+        ...
+
+    def between(self, held: Self, t: float) -> Self:
+        """The same elements, their natural strains only the share t of the way from those of `held`."""
+        ...
+
+    def with_stiffness(self, stiffness: Floats) -> Self:
+        """The same elements with EI1, EI2 and GJ over the Voronoi length, (b, 3) [N m]."""
+        ...
+
+
 class Stressed(Elements, Protocol):
     """Energies of strains whose internal forces stiffen or soften a structure: those that buckling looks at."""
 
@@ -71,6 +106,16 @@ class Stressed(Elements, Protocol):
         hessians : (m, 3k, 3k), which are filled.
         """
         ...
+
+
+def is_bends(element: Elements) -> TypeGuard[BendElements]:
+    """Whether an energy is that of bends of rods."""
+    return hasattr(element, "moduli")
+
+
+def is_stressed(element: Elements) -> TypeGuard[Stressed]:
+    """Whether buckling looks at an energy."""
+    return hasattr(element, "stress_stiffness")
 
 
 def twist_angles(sets: Sequence[Elements], count: int) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ triangles, each by
 """
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -42,15 +42,34 @@ class IsotropicBend:
     blocks: Ints
     stiffness: Floats
 
+    angle_columns: ClassVar[tuple[int, ...]] = ()
+    moduli: ClassVar[tuple[int, ...]] = (0,)
     __repr__ = brief
+
+    @property
+    def bend_stiffness(self) -> Floats:
+        """(b, 1) EI over the Voronoi length [N m]."""
+        return self.stiffness[:, None]
 
     @property
     def parts(self) -> tuple[Self, ...]:
         """The energies of each stiffness alone: it has one."""
         return (self,)
 
-    def curvatures(self, state: Floats) -> Floats:
-        """(b,) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-].
+    def with_stiffness(self, stiffness: Floats) -> Self:
+        """The same bends with EI1 of (b, 3) EI1, EI2 and GJ over the Voronoi length [N m]."""
+        return replace(self, stiffness=stiffness[:, 0].copy())
+
+    def relaxed(self, state: Floats) -> Self:
+        """The same: these rods are naturally straight."""
+        return self
+
+    def between(self, held: Self, t: float) -> Self:
+        """The same: there are no natural strains."""
+        return self
+
+    def strains(self, state: Floats) -> Floats:
+        """(b, 3) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-]; without frames the other two are zero.
 
         Parameters
         ----------
@@ -59,7 +78,8 @@ class IsotropicBend:
         x = state[self.blocks]
         before, after = unit(x[:, 1] - x[:, 0]), unit(x[:, 2] - x[:, 1])
         # unit vectors at an angle phi differ by 2 sin(phi/2) and add up to 2 cos(phi/2)
-        return np.asarray(2 * np.linalg.norm(after - before, axis=1) / np.linalg.norm(after + before, axis=1))
+        curvature = 2 * np.linalg.norm(after - before, axis=1) / np.linalg.norm(after + before, axis=1)
+        return np.column_stack([curvature, 0 * curvature, 0 * curvature])
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
@@ -74,6 +94,7 @@ class IsotropicBend:
 class IsotropicBendTwist(BendTwist):
     """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature."""
 
+    moduli = (0, 2)
     __repr__ = brief
 
     def relaxed(self, state: Floats) -> Self:

@@ -17,7 +17,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.model.potential import product, room_for
-from rodshell.rods.elements import NO_HESSIANS, Elements, Stressed, Stretch, evaluate_all
+from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch, evaluate_all, is_stressed
 from rodshell.solve.problem import NO_CURVATURE, Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
@@ -292,7 +292,7 @@ class TangentAssembly:
         """
         hessians = room_for(self.blocks)
         for element, values in zip(elements, hessians, strict=False):
-            if isinstance(element, Stressed):
+            if is_stressed(element):
                 element.stress_stiffness(state, motion, values)
         self._problem.stretch.axial_stiffness(state, change, hessians[-2])
         return self.pattern.assembly.assemble(hessians, self.blocks, self._problem.constraint.freedom(state))
