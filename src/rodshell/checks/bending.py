@@ -31,7 +31,7 @@ from math import sqrt
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, State
 from rodshell.checks.reactions import joint_loads
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals
@@ -283,13 +283,12 @@ def worst(shapes: Sequence[Bending], where: slice = slice(None)) -> dict[str, fl
 
 
 def bending_of(
-    shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = VON_MISES, edge_strains: Floats | None = None
+    shell: Shell, state: State, rod: Rod, *, shear_weight: float = VON_MISES, edge_strains: Floats | None = None
 ) -> Bending:
     """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis.
 
     Parameters
     ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
     rod : the section and material of every rod.
     shear_weight : of the shear stress against the normal stress, see `checks.bending`.
     edge_strains : (e,) axial strains that stress the edges; default: against their rest lengths.
@@ -381,13 +380,12 @@ def bending(
     return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared)
 
 
-def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
+def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
     """(e, 3) first material director m1 of each edge in a `state` (N, 3).
 
     Parameters
     ----------
     frames : the shell's bending and twist, whose frames are transported to the state.
-    state : (N, 3) node positions [m] and twist angles [rad].
     """
     m1 = frames.refreshed(state).material_directors(state)
     result = np.zeros((len(shell.mesh.edges) + len(shell.ghosts), 3))  # of ghost edges, too

@@ -21,7 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.checks.bending import edge_directors, shell_normals
 from rodshell.figures.checks import Clearance
 from rodshell.geometry.frames import adapted, cross, dot, unit
@@ -43,12 +43,11 @@ APART = Clearance(clearance=None, pairs=0, rods=None, where=None)
 """No two rods come nearer than a rod's breadth, or the section's outline is not known."""
 
 
-def contact_of(shell: Shell, state: Floats, rod: Rod) -> Clearance:
+def contact_of(shell: Shell, state: State, rod: Rod) -> Clearance:
     """Contact of a shell of equal rods in a `state` (N, 3).
 
     Parameters
     ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
     rod : the section of every rod.
     """
     frames = shell.frames

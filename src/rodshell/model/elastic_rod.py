@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csc_matrix
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
 from rodshell.model.assembly import Freedom
@@ -262,39 +262,24 @@ class ElasticRod:
         """The same rod with its source frames moved to `state`: no strain and no angle changes."""
         return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
 
-    def reference_directors(self, state: Floats) -> Floats:
-        """(edges + clamps, 3) first reference director of each edge, then of each ghost edge, at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def reference_directors(self, state: State) -> Floats:
+        """(edges + clamps, 3) first reference director of each edge, then of each ghost edge, at `state` (N, 3)."""
         bends = self._bend_twist.refreshed(state)
         directors = np.empty((self.block_count, 3))
         for side in range(2):
             directors[bends.blocks[:, 1 + 2 * side]] = bends.source_directors[:, side]
         return np.vstack([directors[self.angles], directors[self.ghost_angles]])
 
-    def material_frames(self, state: Floats) -> Floats:
-        """(edges, 3, 3) rows m1, m2, t of each edge at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def material_frames(self, state: State) -> Floats:
+        """(edges, 3, 3) rows m1, m2, t of each edge at `state` (N, 3)."""
         edge = state[self.stretch.blocks[:, 1]] - state[self.stretch.blocks[:, 0]]
         d1, t = self.reference_directors(state)[: self.edge_count], unit(edge)
         theta = state[self.angles, :1]
         m1 = np.cos(theta) * d1 + np.sin(theta) * cross(t, d1)
         return np.stack([m1, cross(t, m1), t], axis=1)
 
-    def strains(self, state: Floats) -> RodStrains:
-        """Strains at `state` (N, 3); without twist angles there are no directors: curvatures are (size, 0).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def strains(self, state: State) -> RodStrains:
+        """Strains at `state` (N, 3); without twist angles there are no directors: curvatures are (size, 0)."""
         strains = self.elements[0].strains(state) / self.bend_lengths[:, None]
         return RodStrains(self.stretch.strains(state), strains[:, :2], strains[:, 2])
 
@@ -306,12 +291,11 @@ class ElasticRod:
         """(N, 3) gradient of the energy at `state` (N, 3) [N, for angles N m]."""
         return self._potential.gradient(state)
 
-    def hessian(self, state: Floats, freedom: Freedom | None = None) -> csc_matrix:
+    def hessian(self, state: State, freedom: Freedom | None = None) -> csc_matrix:
         """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's.
 
         Parameters
         ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
         freedom : free directions of the blocks.
         """
         return self._potential.matrix(state, self.freedom() if freedom is None else freedom)

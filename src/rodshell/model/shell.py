@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle, unit
 from rodshell.joints import (
@@ -219,13 +219,8 @@ class Shell:
             self._turn_directors(state, normals)
         return state
 
-    def positions(self, state: Floats) -> Floats:
-        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def positions(self, state: State) -> Floats:
+        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean."""
         if self.node_count == self.mesh.node_count:  # nodes that rods share
             return state[: self.node_count].copy()
         result, visits = np.zeros((self.mesh.node_count, 3)), np.zeros(self.mesh.node_count)
