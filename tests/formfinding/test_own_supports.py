@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.loads.locked_joints import locked
+from rodshell.loads.structure import Structure
 from rodshell.rods.supports import SUPPORTS, supports_of
 
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(25e9, 1900))
@@ -131,3 +133,29 @@ def test_supports_are_read_in_their_order():
     assert supports_of("both") == supports_of(("clamped", "both")) == (pinned, clamped)
     assert supports_of(["clamped", "pinned", clamped]) == (clamped, pinned)
     assert supports_of(()) == ()
+
+
+@pytest.mark.parametrize("tightened", [None, rs.LockedJoints(shear=1.0)])
+def test_under_loads_stiff_posts_are_pins_and_reactions_are_the_loads(tightened):
+    ends = ("pinned", Posts("stiff", stiffness=1e8), Posts("posts"))
+    form = rs.find_form(rs.Hemisphere(radius=0.2), LAYOUT, ROD, ends=ends, joint=rs.Pin())
+    force = (0.3, 0.0, -1.0)
+    loads = rs.Loads(
+        loads={"push": rs.PointLoad(force=force, at=(0.0, 0.05))}, combinations={"all": {"push": 1.0}},
+        locked_joints=tightened,
+    )  # fmt: skip
+    found = rs.check_loads(form, loads).shells["all"]
+    for shell in found.values():
+        np.testing.assert_allclose(shell.reactions.sum(axis=0), -np.array(force), atol=1e-8)
+    pinned, stiff, posts = (shell.max_deflection for shell in found.values())
+    assert stiff == pytest.approx(pinned, rel=1e-4)  # 1e8 N/m against some 1e3 N/m of the shell
+    assert posts > 1.001 * pinned
+
+
+def test_locked_joints_come_before_the_springs_of_supports():
+    form = rs.find_form(rs.Hemisphere(radius=0.2), LAYOUT, ROD, ends=Posts("posts"), joint=rs.Pin())
+    structure = locked(rs.LockedJoints(shear=1.0), Structure.erected(form.popped["posts"], ROD))
+    shell, elements = structure.shell, structure.equilibrium.problem.elements
+    assert [element.blocks.shape for element in shell.elements] == [element.blocks.shape for element in elements]
+    assert len(shell.springs) == 1
+    assert structure.locked_moments(structure.equilibrium) == pytest.approx(0.0, abs=1e-9)  # at rest as it stands

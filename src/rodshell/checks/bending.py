@@ -42,7 +42,7 @@ from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.model.shell import last_edges
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
 from rodshell.validation import brief
 
 VON_MISES = sqrt(3.0)
@@ -56,16 +56,9 @@ def fibre_distance(rod: Rod) -> float | None:
     Where the section is not round it is that of its farthest point: the stress is then an upper bound. None for a
     given section without fibre distances.
     """
-    section = rod.section
-    if isinstance(section, GivenSection):
-        return None if section.fibre_distances is None else float(np.hypot(*section.fibre_distances))
-    if isinstance(section, Circle | Tube):
-        return section.outer_radius
-    if isinstance(section, Ellipse):
-        return max(section.a, section.b)
-    if isinstance(section, RectangularSection):
-        return 0.5 * float(np.hypot(section.width, section.height))
-    raise InputError(f"the outermost fibre of a section of kind {type(section).__name__} is not known")
+    if (extents := rod.section.half_extents) is None:
+        return None
+    return float(np.hypot(*extents)) if rod.section.boxed else max(extents)
 
 
 def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
@@ -81,18 +74,12 @@ def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
     ------
     InputError : a given section has no fibre distances.
     """
-    section = rod.section
-    if isinstance(section, Ellipse):
-        return np.hypot(section.a * kappa1, section.b * kappa2)
-    if isinstance(section, Circle | Tube):
-        return np.asarray(section.outer_radius * np.hypot(kappa1, kappa2))
-    if isinstance(section, RectangularSection):
-        x, y = 0.5 * section.width, 0.5 * section.height
-    elif section.fibre_distances is None:
+    if (extents := rod.section.half_extents) is None:
         raise InputError("the strain of a given section without fibre_distances is not known: give them")
-    else:
-        x, y = section.fibre_distances
-    return np.asarray(x * np.abs(kappa1) + y * np.abs(kappa2))
+    x, y = extents
+    if rod.section.boxed:
+        return np.asarray(x * np.abs(kappa1) + y * np.abs(kappa2))
+    return np.asarray(x * np.hypot(kappa1, kappa2)) if rod.section.round else np.hypot(x * kappa1, y * kappa2)
 
 
 def torsion_stress(rod: Rod, twist_rate: Floats) -> Floats:
@@ -130,7 +117,7 @@ def largest_stress(
     result = np.asarray(modulus * (bent + drawn))
     if not twist.any():
         return result
-    if isinstance(rod.section, Circle | Tube):
+    if rod.section.round:
         kappa1, kappa2 = np.hypot(kappa1, kappa2), np.zeros_like(kappa2)
     across, within = np.abs(kappa1), np.abs(kappa2)
     for x, y, shear in zip(*_outline(rod), strict=True):  # in the quarter of equal signs, the worst of four
@@ -304,7 +291,7 @@ def bending_of(
         twist = strains[:, 2]
         if len(set(rod.bend_stiffnesses)) > 1:
             components = strains[:, :2]
-        elif not isinstance(rod.section, Circle | Tube):
+        elif not rod.section.round:
             directors = _mean_of_edges(mesh, edge_directors(shell, frames, state))
             components = np.column_stack(_parts(*_turns(mesh, positions, clamps), directors))
     return bending(

@@ -31,7 +31,7 @@ from rodshell.layout.flatgrid import Crossings, FlatRod
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.model.shell import UP
-from rodshell.rods.section import Circle, Ellipse, RectangularSection, Rod, Tube
+from rodshell.rods.section import Rod
 
 FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
 SHORT = 0.5  # of a section's reach: edges are taken together up to this length, which leaves 0.2 % of it as sag
@@ -135,17 +135,9 @@ class _Outline:
 
     @staticmethod
     def of(rod: Rod, mesh: GridMesh) -> "_Outline | None":
-        section = rod.section
-        if isinstance(section, Circle | Tube):
-            unchanged = _Outline(section.outer_radius, section.outer_radius, False)
-        elif isinstance(section, Ellipse):
-            unchanged = _Outline(section.a, section.b, False)
-        elif isinstance(section, RectangularSection):
-            unchanged = _Outline(0.5 * section.width, 0.5 * section.height, True)
-        elif section.fibre_distances is not None:
-            unchanged = _Outline(*section.fibre_distances, True)
-        else:
+        if (extents := rod.section.half_extents) is None:
             return None
+        unchanged = _Outline(*extents, rod.section.boxed)
         if (local := varied_at_nodes(mesh, rod)) is None:
             return unchanged
         depths = np.column_stack([local.depth1, local.depth2])

@@ -19,7 +19,7 @@ from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
-from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
+from rodshell.rods.section import GivenSection, Rod
 from rodshell.targets import Target
 from rodshell.units import length_text
 
@@ -102,12 +102,7 @@ def middle_surface(mesh: GridMesh, layered: GridMesh, positions: Floats) -> Floa
 
 def rod_thickness(rod: Rod) -> float:
     """Size of a rod's section along the shell's normal [m]; 0 where the shape of its section is not known."""
-    section = rod.section
-    if isinstance(section, GivenSection):
-        return 0.0
-    if isinstance(section, Circle | Tube):
-        return 2 * section.outer_radius
-    return 2 * section.a if isinstance(section, Ellipse) else section.width
+    return 0.0 if isinstance(rod.section, GivenSection) else 2 * rod.section.half_extents[0]
 
 
 def thickness_warnings(

@@ -279,9 +279,7 @@ class _Stages:
         relaxed = relax(
             self.problem(shell),
             state,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"{support}, descending, step {k} of at most {MOST_STEPS}", step
-            ),
+            progress=self.counting(f"{support}, descending, step", MOST_STEPS),
         )
         return shell, replace(relaxed, report=relaxed.report.after(at_once.report))
 
@@ -303,9 +301,7 @@ class _Stages:
             state,
             stiffer * transferred_edges(warm_start.forces, before, mesh),
             most_iterations=MOST_AGAIN,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"{warm_start.ends}, again, iteration {k} of at most {MOST_AGAIN}", step
-            ),
+            progress=self.counting(f"{support}, again, iteration", MOST_AGAIN),
         )
         strayed = np.abs(shell.positions(found.state) - here - moved).max() > NEARBY * self.length
         return None if strayed or not found.report.stable else (shell, found)
@@ -349,9 +345,7 @@ class _Stages:
         here = relax(
             problem_at(FIRST_RISE),
             arch,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"from flat, descending, step {k} of at most {MOST_STEPS}", step
-            ),
+            progress=self.counting("from flat, descending, step", MOST_STEPS),
         )
         if not here.report.stable:
             kept, other = (here, failed) if here.report.status is Status.OUT_OF_TIME else (failed, here)

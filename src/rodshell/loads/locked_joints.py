@@ -43,7 +43,7 @@ def locked(joints: LockedJoints, structure: Structure) -> Structure:
         )
         for pin, spring in zip(pins, springs, strict=True)
     )
-    count = len(shell.elements)
+    count = len(shell.within) + len(shell.between)
     elements = (*before.elements[:count], *locks, *before.elements[count:])
     problem = replace(before.problem, elements=elements)
     return replace(

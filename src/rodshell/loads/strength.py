@@ -39,7 +39,7 @@ from rodshell.loads.settings import Strength
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.rods.design_strength import DESIGN, DURATIONS, Duration
-from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Section, Tube
+from rodshell.rods.section import GivenSection, Rod, Section, Tube
 from rodshell.validation import brief
 
 By = Literal["bending", "shear", "slip", "permanent", "slip_unloaded"]
@@ -222,7 +222,7 @@ def utilisation(
         drawn = np.abs(bent.axial_strain) * rod.stretch_stiffness / area_of(rod)
         stress = bent.stress + drawn * (1.0 / (limits.axial or 1.0) - 1.0)
         uses["bending"] = net * stress / strength
-        if bent.torsion_stress is not None and (peak := _shear_peak(section)) is not None:
+        if bent.torsion_stress is not None and (peak := section.shear_peak) is not None:
             sheared = spans.on_entries(across) * peak / (limits.cracked * area_of(rod) * areas)
             uses["shear"] = net * limits.shear_weight * (bent.torsion_stress + sheared) / strength
     slips = [] if asked.slip is None else [spans.jumps(forces) / asked.slip]
@@ -251,15 +251,6 @@ def area_of(rod: Rod) -> float:
     return rod.section.area
 
 
-def _shear_peak(section: Section | GivenSection) -> float | None:
-    """Largest shear stress of a shear force over its mean; None: not known."""
-    if isinstance(section, Tube):
-        return 2.0
-    if isinstance(section, RectangularSection):
-        return 1.5
-    return 4.0 / 3.0 if isinstance(section, Circle | Ellipse) else None
-
-
 def net_section(section: Section | GivenSection, hole: float) -> float:
     """Largest stress at a hole through the section along its first axis, over that of the full section.
 
@@ -274,15 +265,11 @@ def net_section(section: Section | GivenSection, hole: float) -> float:
     if isinstance(section, GivenSection):
         raise InputError("strength.hole: the net section of a given section is not known: leave it out")
     first, _ = section.second_moments
+    deep, wide = (2 * extent for extent in section.half_extents)
+    area, cut = hole * deep, hole * deep**3 / 12
     if isinstance(section, Tube):
         outer, inner = section.outer_radius, section.inner_radius
-        wide, area, cut = 2 * outer, 2 * hole * section.thickness, 2 * hole * (outer**3 - inner**3) / 3
-    elif isinstance(section, Ellipse):
-        wide, area, cut = 2 * section.b, 2 * hole * section.a, hole * (2 * section.a) ** 3 / 12
-    elif isinstance(section, Circle):
-        wide, area, cut = 2 * section.radius, 2 * hole * section.radius, hole * (2 * section.radius) ** 3 / 12
-    else:
-        wide, area, cut = section.height, hole * section.width, hole * section.width**3 / 12
+        area, cut = 2 * hole * section.thickness, 2 * hole * (outer**3 - inner**3) / 3
     left = min(1.0 - area / section.area, 1.0 - cut / first)
     if hole >= wide or left <= 0:
         raise InputError(

@@ -13,7 +13,6 @@ Eccentric joints lay the rods in two layers, whose mesh gives each rod its own n
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import islice
 from typing import Any, TypeVar
 
 import numpy as np
@@ -243,11 +242,8 @@ class Shell:
         ----------
         elements : those within rods and linkers, those between them, those of supports.
         """
-        parts = iter(elements)
-        within, between, springs = (
-            tuple(islice(parts, len(those))) for those in (self.within, self.between, self.springs)
-        )
-        return replace(self, within=within, between=between, springs=springs)
+        first, last = len(self.within), len(self.within) + len(self.between)
+        return replace(self, within=elements[:first], between=elements[first:last], springs=elements[last:])
 
     def turned(self, turn: Floats) -> "Shell":
         """The same shell of a flat grid that is turned in its plane, so that no edge of a shell that lies the other way

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from html import escape
 from math import degrees
-from typing import Any, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.output.drawing import Pen, Pencil
@@ -135,7 +134,7 @@ def length_unit(largest: float) -> tuple[float, str]:
     return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
 
 
-def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, NDArray[Any]]]:
+def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, Floats]]:
     """The arrays of stress, curvature or force in the shapes on all supports, and in the stages of the deployment."""
     for name, values in archive.states.items():
         if name.startswith(f"{what}_") or name == f"history_{what}":

@@ -14,7 +14,7 @@ from rodshell.layout.mesh import mesh_grid
 from rodshell.results.archive import Archive, made_once
 from rodshell.results.laths import laths_on
 from rodshell.results.states import BENT, DRAPED, GAP, POPPED, shells_among
-from rodshell.rods.supports import PINNED, SUPPORTS
+from rodshell.rods.supports import SUPPORTS
 
 CAPTIONS = {"flat": "Flat, as cut and laid out", DRAPED: "Draped on the target"}
 STAGE = "stage_"
@@ -220,12 +220,6 @@ def caption_of(archive: Archive, state: str) -> str:
     if archive.is_lost(state):
         return f"Not popped up, {state.removeprefix(POPPED)} ends: where the computation stopped"
     return CAPTIONS.get(state) or f"Popped up, {supported(state)}"
-
-
-def deployed_to(archive: Archive) -> str:
-    """The state that the stages of the deployment lead to."""
-    way = archive.results.deployment
-    return POPPED + ((way.ends if way else None) or PINNED.name)
 
 
 def supported(state: str, *more: str) -> str:

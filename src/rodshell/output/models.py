@@ -25,17 +25,7 @@ from rodshell.figures.form import Section, Stiffness
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.drawings.flat import FlatPlan
-from rodshell.output.grid import (
-    STAGE,
-    Shape,
-    deployed_shape,
-    deployed_to,
-    joint_places,
-    joints_of,
-    rods_of,
-    shape_names,
-    shape_of,
-)
+from rodshell.output.grid import STAGE, Shape, deployed_shape, joint_places, joints_of, rods_of, shape_names, shape_of
 from rodshell.output.svg import tag
 from rodshell.results import Archive
 
@@ -88,7 +78,7 @@ def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
     if not stages:
         return
     shares = archive.states["history_share"]
-    last = deployed_to(archive)
+    last = archive.deployed
     entries = []
     for share, name in zip(shares.tolist(), ["flat", *stages, last], strict=True):
         yield f"pop_up/{name}.vtp", vtp_text(archive, name)

@@ -16,7 +16,6 @@ from rodshell.output.grid import (
     GridRod,
     Shape,
     deployed_shape,
-    deployed_to,
     opens,
     outlines_of,
     rods_of,
@@ -240,7 +239,7 @@ def deployment_picture(archive: Archive) -> Drawing:
     archive : one that holds stages of a deployment.
     """
     known = shape_names(archive)
-    names = [name for name in known if name.startswith(STAGE) or name in ("flat", deployed_to(archive))]
+    names = [name for name in known if name.startswith(STAGE) or name in ("flat", archive.deployed)]
     chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
     view, rods, whole, last = _view_of_all(archive), rods_of(archive), Pencil(), None
     width = WIDTH + 2 * SIDE

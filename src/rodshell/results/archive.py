@@ -25,7 +25,7 @@ from rodshell.results.results import Results, Verdict, read_results
 from rodshell.results.states import DRAPED, POPPED, packed, read_states, shells_among
 from rodshell.results.summary import summary_text
 from rodshell.results.verdict import CONVERGED, verdict_of
-from rodshell.rods.supports import finals_first
+from rodshell.rods.supports import PINNED, finals_first
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import file_path, instance, mapping
 
@@ -225,6 +225,11 @@ class Archive:
         popped = [name.removeprefix(POPPED) for name in shells_among(self.states) if name != DRAPED]
         shells = [*(POPPED + support for support in finals_first(popped)), *({DRAPED} & self.states.keys())]
         return min(shells, key=self.is_lost, default=None)
+
+    @property
+    def deployed(self) -> str:
+        """The state that the stages of the deployment lead to."""
+        return POPPED + ((self.results.deployment.ends if self.results.deployment else None) or PINNED.name)
 
     def is_lost(self, state: str) -> bool:
         """Whether a state is where the solve of a shell stopped before it converged.

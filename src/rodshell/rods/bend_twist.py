@@ -114,7 +114,7 @@ class BendTwist:
         return replace(self, natural_curvature=strains[:, :2].copy(), natural_twist=strains[:, 2].copy())
 
     def between(self, held: Self, t: float) -> Self:
-        """The same elements, their natural strains only the share t of the way from those of `held`."""
+        """See `BendElements.between`."""
         if t >= 1 or held is self:
             return self
         return replace(
@@ -124,8 +124,7 @@ class BendTwist:
         )
 
     def with_stiffness(self, stiffness: Floats) -> Self:
-        """The same elements with EI1, EI2 and GJ over the Voronoi length, (b, 3) [N m]; without bending if they have
-        none."""
+        """See `BendElements.with_stiffness`; without bending they stay so."""
         bend = stiffness[:, :2].copy() if self.bend_stiffness.any() else 0.0 * self.bend_stiffness
         return replace(self, bend_stiffness=bend, twist_stiffness=stiffness[:, 2].copy())
 

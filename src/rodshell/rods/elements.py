@@ -71,22 +71,22 @@ class BendElements(Elements, Protocol):
     def bend_stiffness(self) -> Floats: ...
 
     @property
-    def parts(self) -> "tuple[BendElements, ...]": ...
+    def parts(self) -> tuple[Self, ...]: ...
 
     def strains(self, state: State) -> Floats:
         """(b, 3) curvatures (integrated, [-]) and twist [rad] at `state` (N, 3)."""
         ...
 
+    def with_stiffness(self, stiffness: Floats) -> Self:
+        """The same elements with EI1, EI2 and GJ over the Voronoi length, (b, 3) [N m]; what they lack is left out."""
+        ...
+
     def relaxed(self, state: State) -> Self:
-        """The same elements with `state` (N, 3) as their stress-free state, as far as they have natural strains."""
+        """The same elements with `state` (N, 3) as their stress-free state; naturally straight ones stay so."""
         ...
 
     def between(self, held: Self, t: float) -> Self:
-        """The same elements, their natural strains only the share t of the way from those of `held`."""
-        ...
-
-    def with_stiffness(self, stiffness: Floats) -> Self:
-        """The same elements with EI1, EI2 and GJ over the Voronoi length, (b, 3) [N m]."""
+        """The same elements, their natural strains, if any, only the share t of the way from those of `held`."""
         ...
 
 

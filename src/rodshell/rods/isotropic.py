@@ -57,15 +57,15 @@ class IsotropicBend:
         return (self,)
 
     def with_stiffness(self, stiffness: Floats) -> Self:
-        """The same bends with EI1 of (b, 3) EI1, EI2 and GJ over the Voronoi length [N m]."""
+        """See `BendElements.with_stiffness`."""
         return replace(self, stiffness=stiffness[:, 0].copy())
 
     def relaxed(self, state: State) -> Self:
-        """The same: these rods are naturally straight."""
+        """The same: they are naturally straight."""
         return self
 
     def between(self, held: Self, t: float) -> Self:
-        """The same: there are no natural strains."""
+        """The same, as of `relaxed`."""
         return self
 
     def strains(self, state: State) -> Floats:
@@ -89,7 +89,7 @@ class IsotropicBend:
 class IsotropicBendTwist(BendTwist):
     """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature."""
 
-    moduli = (0, 2)
+    moduli: ClassVar[tuple[int, ...]] = (0, 2)
     __repr__ = brief
 
     def relaxed(self, state: State) -> Self:

@@ -29,8 +29,24 @@ from rodshell.validation import brief, instance
 MM = 1e-3
 
 
-class _Round:
+class _Shape:
+    """What is known of a section's shape.
+
+    Attributes
+    ----------
+    round : whether it is the same about every diameter.
+    boxed : whether its fibres fill the box of its half extents, or the ellipse in it.
+    shear_peak : largest shear stress of a shear force over its mean; None: not known.
+    """
+
+    round = boxed = False
+    shear_peak: float | None = 4.0 / 3.0
+
+
+class _Round(_Shape):
     """A section whose second moment of area is the same about every diameter."""
+
+    round = True
 
     @property
     def outer_radius(self) -> float:
@@ -51,6 +67,11 @@ class _Round:
     def torsion_constant(self) -> float:
         """J [m4]: of circles and tubes the polar second moment of area."""
         return 2 * self.second_moment
+
+    @property
+    def half_extents(self) -> tuple[float, float]:
+        """Along m1 and m2 [m]."""
+        return self.outer_radius, self.outer_radius
 
     @property
     def depth(self) -> float:
@@ -89,6 +110,7 @@ class Tube(_Round):
     """Circular tube, whose wall is not thicker than its radius."""
 
     kind: ClassVar = "tube"
+    shear_peak = 2.0
     radius: Annotated[Length, "outer radius"]
     thickness: Annotated[Length, "thickness of the tube's wall"]
 
@@ -119,7 +141,7 @@ class Tube(_Round):
 
 
 @dataclass(frozen=True)
-class Ellipse:
+class Ellipse(_Shape):
     """Solid ellipse with half-axes along m1 and m2."""
 
     kind: ClassVar = "ellipse"
@@ -145,16 +167,22 @@ class Ellipse:
         return pi * (self.a * self.b) ** 3 / (self.a**2 + self.b**2)
 
     @property
+    def half_extents(self) -> tuple[float, float]:
+        """Along m1 and m2 [m]."""
+        return self.a, self.b
+
+    @property
     def depth(self) -> float:
         """The longer axis [m]."""
         return 2 * max(self.a, self.b)
 
 
 @dataclass(frozen=True)
-class RectangularSection:
+class RectangularSection(_Shape):
     """Solid rectangle with sides along m1 and m2. (`rodshell.Rectangle` is a target's domain.)"""
 
     kind: ClassVar = "rectangle"
+    boxed, shear_peak = True, 1.5
     width: Annotated[Length, "side along the grid's normal: of a flat lath its thickness"]
     height: Annotated[Length, "side within the grid: of a flat lath its breadth"]
 
@@ -180,13 +208,18 @@ class RectangularSection:
         return wide * thin**3 * (1 / 3 - 64 / pi**5 * thin / wide * series)
 
     @property
+    def half_extents(self) -> tuple[float, float]:
+        """Along m1 and m2 [m]."""
+        return 0.5 * self.width, 0.5 * self.height
+
+    @property
     def depth(self) -> float:
         """The longer side [m]."""
         return max(self.width, self.height)
 
 
 @dataclass(frozen=True)
-class GivenSection:
+class GivenSection(_Shape):
     """Stiffnesses and masses as they are, of a composite or a measured rod; such a rod takes no material.
 
     EI1 and EI2 are against bends towards m1 and m2. The rotary inertia is needed only for dynamics with twist. With the
@@ -195,6 +228,7 @@ class GivenSection:
     """
 
     kind: ClassVar = "given"
+    boxed, shear_peak = True, None
     EA: Annotated[Force, "axial stiffness"]
     EI1: Annotated[BendingStiffness, "bending stiffness out of the grid"]
     EI2: Annotated[BendingStiffness, "bending stiffness within the grid"]
@@ -213,6 +247,11 @@ class GivenSection:
 
     def __post_init__(self) -> None:
         checked(self)
+
+    @property
+    def half_extents(self) -> tuple[float, float] | None:
+        """The fibres' distances along m1 and m2 [m], if they are known."""
+        return None if self.fibre_distances is None else (self.fibre_distances[0], self.fibre_distances[1])
 
 
 Sized = Ellipse | RectangularSection
