@@ -99,7 +99,7 @@ class Run:
         rod, fit, stages, tried = found.rod, None, None, found._replace(method=Bound())
         if case.rod.left_open:
             fit = case.fit_on(found.target, found.layout, anchor=None if case.seams.lines else found.anchor)
-        if fit and found.joint.resists_shear and found.supports and self.pops_up and self._sizes(rod):
+        if fit and found.joint.resists_shear and found.ends and self.pops_up and self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, partial(self._stages, case, tried))
             case.require_strength(rod, found.joint)
         self._announce_rod(rod, fit)
@@ -203,7 +203,7 @@ class Run:
         return find_stages(
             found.target, found.layout, found.rod,
             method=method, anchor=found.anchor, joint=found.joint,
-            ends=found.supports if self.pops_up else (),
+            ends=found.ends if self.pops_up else (),
             warm_start=earlier if isinstance(earlier, PatchForm) else None,
             same_drape="trim" in same and not streams, progress=self.progress,
         )  # fmt: skip
@@ -213,7 +213,7 @@ class Run:
         return find_patched_stages(
             found.target, [Seam.of(line) for line in case.seams.lines], found.layout, found.rod,
             patch_layouts=case.seams.patch_layouts(), joint=found.joint,
-            ends=found.supports if self.pops_up else (),
+            ends=found.ends if self.pops_up else (),
             warm_start=earlier if isinstance(earlier, PatchedForm) else None,
             same_drape="trim" in same, progress=self.progress,
         )  # fmt: skip

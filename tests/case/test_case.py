@@ -403,7 +403,7 @@ def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
     tube |= {"joint.kind": "pin", "joint.eccentricity": "2 mm"}
     built = load_case("hemisphere", tube).build()
     assert built.rod.section == Tube(0.001, 0.0001)
-    assert built.supports == (SUPPORTS["pinned"],)
+    assert built.ends == (SUPPORTS["pinned"],)
     assert built.joint == Pin(eccentricity=0.002)
     assert built.anchor is None
 

@@ -49,7 +49,7 @@ class Built(NamedTuple):
     Parameters
     ----------
     anchor : x, y where the axes cross [m]; None: the default, or one that is searched for.
-    supports : on which the grid is popped up.
+    ends : supports on which the grid is popped up.
     """
 
     target: "Target"
@@ -58,7 +58,7 @@ class Built(NamedTuple):
     joint: "Joint"
     method: "Method"
     anchor: tuple[float, float] | None
-    supports: tuple[Support, ...]
+    ends: tuple[Support, ...]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -116,8 +116,10 @@ def _inside(node: Mapping[str, Any]) -> dict[str, Any]:
     for choice in _choices(node):
         found |= choice.get("properties", {})
         each, names = choice.get("additionalProperties"), choice.get("propertyNames", {})
-        if each and isinstance(each, Mapping):
+        if each and isinstance(each, Mapping) and "oneOf" not in each:  # that is a `TableOr`
             found |= dict.fromkeys(names.get("enum", (ANY,)), each)
+        for each in choice.get("patternProperties", {}).values():  # cases have no other supports
+            found |= dict.fromkeys(SUPPORTS, each)
     return found
 
 
