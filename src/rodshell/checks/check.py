@@ -259,7 +259,11 @@ def _long_checks(
             weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
             missing.pop(0)
         if upright is not None:
-            deployment = _deployed(popped[upright], stages, progress)
+            last = popped[upright]
+            deployment = deploy(
+                last.shell, last.equilibrium, stages=stages, ends=upright,
+                progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
+            )  # fmt: skip
             missing[0] = "whether the clamped shell is reached from flat"
             if deployment.reached_from_flat and clamped and done[clamped].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
@@ -322,16 +326,6 @@ def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
         progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
 
     return report
-
-
-def _deployed(last: PopUp, stages: int, progress: Progress) -> Deployment:
-    return deploy(
-        last.shell,
-        last.equilibrium,
-        ends=last.ends,
-        stages=stages,
-        progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
-    )
 
 
 @dataclass(frozen=True)

@@ -129,7 +129,6 @@ def deploy(
     shell : its ends being free to turn, its source frames being at the equilibrium.
     stages : number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root of
         the way.
-    ends : name of the support.
     progress : called with each share of the deployment that is looked for.
 
     Returns

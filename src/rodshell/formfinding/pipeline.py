@@ -312,7 +312,6 @@ def meshed_again(form: PatchForm, ends: Ends) -> PatchForm:
     Parameters
     ----------
     form : of a target, with a pop-up.
-    ends : how the rods' ends are held.
     """
     old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
     mesh, normals = mesh_grid(old.grid, form.layout.edge), None

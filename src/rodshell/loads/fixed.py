@@ -20,7 +20,6 @@ def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, comb
     Parameters
     ----------
     stages : of a form in one piece, popped up with these ends.
-    ends : how the rods' ends are held.
 
     Returns
     -------

@@ -217,7 +217,6 @@ def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
 
     Parameters
     ----------
-    ends : end condition of the shell.
     state : name of the mode's array (n, 3).
     """
     shape, pencil = shape_of(archive, POPPED + ends), Pencil()

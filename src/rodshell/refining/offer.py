@@ -36,7 +36,6 @@ class Offer:
 
     Parameters
     ----------
-    ends : how the rods' ends are held.
     before, after : root mean square of the gap over the target's size, as the form is and with double laths.
     shares : smallest and largest share of a rod's length that is then double, patch by patch.
     others : the gap with the form's other ends, as it is.

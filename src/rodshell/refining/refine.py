@@ -64,7 +64,6 @@ class Refinement:
 
     Parameters
     ----------
-    ends : how the rods' ends are held.
     before, after : the stages, with the popped-up shell of these ends alone.
     designs : those that were accepted on the way, the last best; the first is the shell before.
     converged : whether no further step would gain much.
@@ -268,10 +267,6 @@ def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family
 def structure_of(stages: PatchForm, ends: Ends) -> Structure:
     """The shell that is refined.
 
-    Parameters
-    ----------
-    ends : how the rods' ends are held.
-
     Raises
     ------
     InputError : it has no target, no pop-up with these ends, or is not stable.
@@ -336,7 +331,6 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
     Parameters
     ----------
     design : what is built, and the equilibrium that was found for it.
-    ends : how the rods' ends are held.
 
     Raises
     ------
@@ -369,7 +363,6 @@ def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
     Parameters
     ----------
     design : of which it is built, with its loaded equilibrium.
-    ends : how the rods' ends are held.
     """
     popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
     load = np.zeros_like(popped.state)
