@@ -14,7 +14,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.figures.records import NAME
 from rodshell.units import shown
-from rodshell.validation import choice, described
+from rodshell.validation import choice, described, flag
 
 if TYPE_CHECKING:
     from rodshell.rods.elements import Elements
@@ -40,6 +40,7 @@ class Support:
     holds_directions: bool = False
 
     def __post_init__(self) -> None:
+        flag("holds_directions", self.holds_directions)
         if not isinstance(self.name, str) or not fullmatch(NAME, self.name) or self.name in _RESERVED:
             raise InputError(
                 f"the name of a support must be a word of small letters and digits, and none of "
