@@ -264,7 +264,7 @@ def _long_checks(
                 last.shell, last.equilibrium, stages=stages, ends=upright,
                 progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
             )  # fmt: skip
-            missing[0] = "whether the clamped shell is reached from flat"
+            missing[0] = f"whether the {clamped} shell is reached from flat"
             if deployment.reached_from_flat and clamped and done[clamped].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
                 turned = reached_by_turning(popped[upright], popped[clamped])

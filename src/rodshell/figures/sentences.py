@@ -66,7 +66,9 @@ SENTENCES = {
         "the design strength of the rods is not known, so that whether they break under the loads was not judged: "
         "give strength.permanent and strength.short"
     ),
-    "not_checked: clamped": "whether the clamped shape is reached from the pinned one by turning the ends is not known",
+    "not_checked: clamped": (
+        "whether the {ends} shape is reached from the {pinned} one by turning the ends is not known"
+    ),
     "not_checked: contact": (
         "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
         "rod.section.fibre_distances for that"
@@ -136,7 +138,7 @@ SENTENCES = {
         "{shape} bending strains the rods by {strain}: they are too thick for this curvature, and the theory of thin "
         "rods is valid up to about {valid}; use thinner rods or a larger target"
     ),
-    "turned": "turned into their clamps after deployment, the ends lead to another than the clamped shape",
+    "turned": "turned into their clamps after deployment, the ends lead to another than the {ends} shape",
     "unstable": "with {ends} ends the shell is unstable{count} and would snap to another shape",
     "unstable: unloaded": "with {ends} ends the shell is unstable before the loads of {place} act",
 }

@@ -26,7 +26,7 @@ from rodshell.results.wording import (
     stress,
     whole_percent,
 )
-from rodshell.rods.supports import PINNED
+from rodshell.rods.supports import CLAMPED, PINNED, clamped_among
 from rodshell.units import places_text
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
@@ -308,7 +308,8 @@ def _deployment(results: Results) -> Iterator[str]:
                 True: "reached: the ends are turned into their clamps after the deployment",
                 False: "turning the ends into their clamps ends in another shape",
             }
-            yield f"  from flat clamped {turned[deployment.clamped.reached_from_flat]}"
+            held = clamped_among(results.pop_up) or CLAMPED.name
+            yield f"  from flat {held:<8}{turned[deployment.clamped.reached_from_flat]}"
     for ends, searched in results.other_shapes.items():
         others = [shape for shape in searched.found if not shape.mirror]
         found = ["its mirror image"] if len(others) < len(searched.found) else []

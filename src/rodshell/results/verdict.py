@@ -30,7 +30,7 @@ from rodshell.results.wording import (
     whole_percent,
 )
 from rodshell.rods.design_strength import RESERVED
-from rodshell.rods.supports import clamped_among, finals_first
+from rodshell.rods.supports import PINNED, clamped_among, finals_first
 
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
@@ -391,7 +391,7 @@ def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[
     """Whether the deployment was checked; what was found there is among a result's warnings."""
     deployment = results.deployment
     if not deployment:
-        remedy = "" if late else ": this needs pinned ends (pop_up.ends) and checks.stages above 0"
+        remedy = "" if late else f": this needs {PINNED} ends (pop_up.ends) and checks.stages above 0"
         upright = clamped_among(results.pop_up, False)
         failed = upright and _status(results.pop_up[upright]) != CONVERGED
         why = f", since the {upright} shell was not found" if failed else remedy
@@ -401,7 +401,7 @@ def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[
         and deployment.reached_from_flat
         and (deployment.clamped is None or deployment.clamped.reached_from_flat is None)
     ):
-        yield said("not_checked: clamped", clamped)
+        yield said("not_checked: clamped", clamped, pinned=deployment.ends or PINNED)
 
 
 def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
