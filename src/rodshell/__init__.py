@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from rodshell.rods.local_energy import LocalEnergy
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+    from rodshell.rods.supports import Support
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.problem import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.rod_statics import RodLoads, RodShape, RodSupports, solve_rod
@@ -139,6 +140,7 @@ _HOMES = {
     "rodshell.output.settings": ("DrawingStyle",),
     "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.rods.local_energy": ("LocalEnergy",),
+    "rodshell.rods.supports": ("Support",),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.solve.problem": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
@@ -165,8 +167,8 @@ __all__ = [
     "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoad",
     "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads",
     "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow",
-    "Spring", "Stability", "StabilityError", "Strength", "Target", "Temperature", "TimeSeries", "Trimmed", "Tube",
-    "Verdict", "Wind", "__version__", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape",
+    "Spring", "Stability", "StabilityError", "Strength", "Support", "Target", "Temperature", "TimeSeries", "Trimmed",
+    "Tube", "Verdict", "Wind", "__version__", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape",
     "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise", "pop_up",
     "pop_up_table", "read", "read_sweep", "refine", "save", "search", "settle", "simulate", "solve_rod",
     "straight_rods", "surface_from", "sweep", "trim",

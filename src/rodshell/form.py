@@ -18,9 +18,9 @@ from rodshell.checks.contact import contact_of_patches
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
 from rodshell.figures.form import FlatState
+from rodshell.figures.records import Ends
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
 from rodshell.formfinding.patches import MergedPopUp, PatchedForm
-from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint

@@ -18,10 +18,10 @@ from rodshell.case.from_objects import case_of, case_of_rod_ends
 from rodshell.case.load import changed_case, flattened, is_described, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
 from rodshell.errors import InputError, OutOfMemoryError
+from rodshell.figures.records import Ends
 from rodshell.form import Form
 from rodshell.formfinding import Bound, Method
 from rodshell.formfinding.methods import require_method
-from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, Layout
@@ -29,6 +29,7 @@ from rodshell.output.options import OutputOptions
 from rodshell.progress import Progress, limited, silent
 from rodshell.results.folder import reading
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import BOTH, SUPPORTS, Asked, support_of, supports_of
 from rodshell.run import Announce, Run, inputs_of
 from rodshell.targets import Target
 from rodshell.targets.patch_layout import PatchLayout
@@ -36,7 +37,6 @@ from rodshell.units import length_text, shown
 from rodshell.validation import (
     array,
     choice,
-    choices_of,
     file_path,
     function_of,
     instance,
@@ -49,7 +49,6 @@ from rodshell.validation import (
 )
 
 Auto = Literal["auto"]
-AskedEnds = Literal["pinned", "clamped", "both"]
 
 FOUND = "a form that Job.run or find_form returned (one read from a folder: run its case.toml again)"
 OBJECTS = 'a job needs target, layout and rod; for a case by its name or its file use rodshell.Job.load("...")'
@@ -70,7 +69,8 @@ class Job:
     rotate : heading in place of the layout's [rad]; "auto": the best found.
     objective : what an "auto" anchor or heading makes smallest, see `search`.
     joint : the joints where rods cross, see `pop_up`; default: ball joints.
-    ends : end conditions of the pop-up: "pinned", "clamped", or "both"; also in a tuple, which may be empty.
+    ends : supports of the pop-up: "pinned", "clamped", "both", or a `Support` of your own; also in a tuple, which
+        may be empty.
     seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down into patches; each
         continues straight past its ends, unless it is closed. Rods and length of the layout are then "auto"; its
         heading is that at the target's summit, and "auto" is the heading that leaves out the fewest rods.
@@ -98,7 +98,7 @@ class Job:
         rotate: float | Auto | None = None,
         objective: Objective = "shear",
         joint: Joint | None = None,
-        ends: AskedEnds | Sequence[AskedEnds] = "both",
+        ends: Asked = BOTH,
         seams: Iterable[ArrayLike] = (),
         patches: Mapping[str, PatchLayout] | None = None,
         options: OutputOptions | None = None,
@@ -122,7 +122,7 @@ class Job:
         case = case_of(
             target, layout, rod,
             joint=joint or Ball(), method=method, anchor=anchor, rotate=rotate,
-            objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
+            objective=choice("objective", objective, get_args(Objective)), ends=supports_of(ends),
             seams=listed("seams", seams, "a list of lines, each of points x, y in m"),
             patches=patches, options=options or OutputOptions(),
         )  # fmt: skip
@@ -332,12 +332,6 @@ def _changes(overrides: Mapping[str, object] | None, more: Mapping[str, object])
     return flattened({**given, **more})
 
 
-def _ends(given: AskedEnds | Sequence[AskedEnds]) -> tuple[Ends, ...]:
-    """The end conditions asked for, in their order."""
-    words = choices_of("ends", given, ("pinned", "clamped", "both"))
-    return ENDS if "both" in words else tuple(end for word in words for end in ENDS if end == word)
-
-
 def _ends_and_case(
     source: "str | PathLike[str] | RodEnds", unit: str | None, overrides: dict[str, object]
 ) -> tuple[RodEnds, Case]:
@@ -367,7 +361,7 @@ def find_form(
     method: Method = Bound(),
     anchor: tuple[float, float] | Auto | None = None,
     joint: Joint | None = None,
-    ends: AskedEnds | Sequence[AskedEnds] = "both",
+    ends: Asked = BOTH,
     seams: Iterable[ArrayLike] = (),
     patches: Mapping[str, PatchLayout] | None = None,
     warm_start: Form | None = None,
@@ -434,7 +428,7 @@ def refine(
     if form.from_table:
         raise InputError("a table of rods has no target to come nearer to: refine the form of a target")
     asked = form.case.ends
-    end = choice("ends", ends, ENDS) if ends is not None else (asked or ENDS)[0]
+    end = support_of(ends).name if ends is not None else (asked or tuple(SUPPORTS))[0]
     changes: dict[str, object] = {"vary": vary, "ends": end, "ratio": ratio, "per": per, "varies": varies}
     changes |= {"under": under, "tolerance": tolerance}
     job = Job.of_case(form.case).changed({f"refine.{key}": value for key, value in changes.items()})

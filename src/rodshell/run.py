@@ -23,6 +23,7 @@ from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
 from rodshell.results.summary import chosen, rod_text
 from rodshell.rods.section import GivenSection, Rod, size_text
+from rodshell.rods.supports import PINNED
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
 from rodshell.units import length_text
@@ -179,7 +180,7 @@ class Run:
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
         stages = earlier.stages if earlier is not None else None
-        if isinstance(stages, PatchForm) and "pop-up" in self._unchanged(case) and stages.finished_pop_ups(stages.ends):
+        if isinstance(stages, PatchForm) and "pop-up" in self._unchanged(case) and stages.finished_pop_ups((PINNED,)):
             return stages
         joint = case.joint
         return pop_up_stages(ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress)

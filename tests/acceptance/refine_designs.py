@@ -74,7 +74,7 @@ def largest_curvature(popped: rs.PopUp) -> float:
     """[1/m], of round rods."""
     (bends,) = [element for element in popped.equilibrium.elements if isinstance(element, IsotropicBend)]
     mesh = popped.shell.mesh
-    return float(np.max(bends.curvatures(popped.state)[: len(mesh.bends)] / mesh.voronoi_lengths))
+    return float(np.max(bends.strains(popped.state)[: len(mesh.bends), 0] / mesh.voronoi_lengths))
 
 
 def lowest_eigenvalue(popped: rs.PopUp) -> float:

@@ -181,6 +181,7 @@ def values() -> dict[str, Call]:
         "SharedDofs": Call(rs.SharedDofs),
         "Snow": Call(rs.Snow, value=500.0),
         "Spring": Call(rs.Spring, shear=1.0),
+        "Support": Call(rs.Support, name="posts"),
         "Stability": Call(rs.Stability),
         "Strength": Call(rs.Strength),
         "Temperature": Call(rs.Temperature, change=30.0, expansion=1e-5),

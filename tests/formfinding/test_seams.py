@@ -305,7 +305,7 @@ BAD = {
     "--seams.lines=-1,0;1,0 --layout.rods=7x7": 'use "auto"',
     "--seams.lines=-1,0;1,0 --method=gravity": 'use "bound"',
     "--seams.lines=-1,0;1,0 --anchor=0,0": "leave it out",
-    "--seams.lines=-1,0;1,0 --spacing=500mm": "larger than the target",
+    "--seams.lines=-1,0;1,0 --spacing=500mm": "wider than the shell of 400 mm",
 }
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.formfinding.popup import Ends
+from rodshell.figures.records import Ends
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.length_families import Holes, Offsets, Tails
 from rodshell.refining.limits import Curvature, Energy, MinimumAngle, SmoothStiffness

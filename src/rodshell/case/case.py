@@ -25,13 +25,13 @@ from rodshell.loads.settings import LockedJoints, Stability, Strength
 from rodshell.output.settings import CheckOptions, DrawingStyle
 from rodshell.progress import Progress, silent
 from rodshell.rods.joints import Ball, JointKind
+from rodshell.rods.supports import Support, supports_of
 from rodshell.schema import read, undescribed, written
 from rodshell.units import length_text, shown
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
     from rodshell.formfinding.methods import Method
-    from rodshell.formfinding.popup import Ends
     from rodshell.joints import Joint
     from rodshell.layout import Layout
     from rodshell.loads.combinations import Loads
@@ -51,7 +51,7 @@ class Built(NamedTuple):
     Parameters
     ----------
     anchor : x, y where the axes cross [m]; None: the default, or one that is searched for.
-    ends : end conditions of the pop-up.
+    ends : supports on which the grid is popped up.
     """
 
     target: "Target"
@@ -60,7 +60,7 @@ class Built(NamedTuple):
     joint: "Joint"
     method: "Method"
     anchor: tuple[float, float] | None
-    ends: "tuple[Ends, ...]"
+    ends: tuple[Support, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,11 +200,14 @@ class Case:
         return replace(self, layout=replace(self.layout, rotate=rotate, held=turned))
 
     @property
-    def ends(self) -> "tuple[Ends, ...]":
-        """End conditions of the pop-up."""
-        if self.pop_up.held is not None:
-            return ()
-        return ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
+    def supports(self) -> tuple[Support, ...]:
+        """On which the grid is popped up."""
+        return supports_of(self.pop_up.ends) if self.pop_up.held is None else self.pop_up.held.value
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """The names of the supports."""
+        return tuple(support.name for support in self.supports)
 
     def build(self, target: "Target | None" = None, progress: Progress = silent) -> Built:
         """The objects.
@@ -256,7 +259,7 @@ class Case:
             progress("preparing", "net for the size of the rods", 0.0)
         rod = self.rod_on(target, layout, anchor=anchor, progress=progress)
         self.require_strength(rod, joint)
-        return Built(target, layout, rod, joint, method, anchor, self.ends)
+        return Built(target, layout, rod, joint, method, anchor, self.supports)
 
     def require_strength(self, rod: "Rod", joint: "Joint") -> None:
         """InputError where what is said of the strength does not suit the rod, such as bolts as wide as it."""

@@ -196,7 +196,7 @@ def read_result(folder: Path) -> ResultRods:
     """
     from rodshell.output.grid import rods_of
     from rodshell.results.archive import read
-    from rodshell.results.states import SHELLS
+    from rodshell.results.states import shells_among
 
     archive = read(folder)
     results = archive.results
@@ -220,7 +220,7 @@ def read_result(folder: Path) -> ResultRods:
         )
     try:
         rods = rods_of(archive)
-        shell = archive.states[next(name for name in SHELLS if name in archive.states)]
+        shell = archive.states[shells_among(archive.states)[0]]
         flat = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
         final = np.array([shell[rod.nodes[[0, -1]]] for rod in rods]).reshape(-1, 2, 3)
     except (StopIteration, KeyError, IndexError, TypeError, ValueError):

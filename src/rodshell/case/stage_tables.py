@@ -31,6 +31,7 @@ from rodshell.quantities import (
     Unit,
     words,
 )
+from rodshell.rods.supports import BOTH, AskedName, SupportName
 from rodshell.schema import Inline, Rows, written
 from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import rounded_down, shown
@@ -140,9 +141,7 @@ class DrapeTable(Holding):
 
 @dataclass(frozen=True, kw_only=True)
 class PopUpTable(Holding):
-    ends: Annotated[
-        Literal["pinned", "clamped", "both"], "supports: free to turn, with fixed direction, or one form with each"
-    ] = "both"
+    ends: Annotated[AskedName, "supports: free to turn, with fixed direction, or one form with each"] = BOTH
 
 
 FAMILIES = ("taper", "double", "sections", "tails", "clamps", "supports", "holes", "offsets")
@@ -151,9 +150,7 @@ FAMILIES = ("taper", "double", "sections", "tails", "clamps", "supports", "holes
 @dataclass(frozen=True, kw_only=True)
 class RefineTable:
     vary: Annotated[Annotated[tuple[str, ...], words(FAMILIES)], ", ".join(FAMILIES)] = ()
-    ends: Annotated[
-        Literal["pinned", "clamped"] | None, "supports of the refined shell; default: the first of pop_up.ends"
-    ] = None
+    ends: Annotated[SupportName | None, "supports of the refined shell; default: the first of pop_up.ends"] = None
     ratio: Annotated[Ratio, "of the largest EI to the smallest along a taper"] = 8.0
     per: Annotated[
         Literal["shell", "family", "rod"], "one taper for the shell, one for each family, or for each rod"

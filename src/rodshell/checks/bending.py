@@ -31,12 +31,12 @@ from math import sqrt
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, State
 from rodshell.checks.reactions import joint_loads
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.joints.relative_rotation import RelativeRotation
+from rodshell.joints.relative_rotation import is_elastic
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
@@ -267,13 +267,12 @@ def worst(shapes: Sequence[Bending], where: slice = slice(None)) -> dict[str, fl
 
 
 def bending_of(
-    shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = VON_MISES, edge_strains: Floats | None = None
+    shell: Shell, state: State, rod: Rod, *, shear_weight: float = VON_MISES, edge_strains: Floats | None = None
 ) -> Bending:
     """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis.
 
     Parameters
     ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
     rod : the section and material of every rod.
     shear_weight : of the shear stress against the normal stress, see `checks.bending`.
     edge_strains : (e,) axial strains that stress the edges; default: against their rest lengths.
@@ -284,7 +283,7 @@ def bending_of(
         mesh, positions = mesh.apart, state[: shell.node_count]
     clamps = unit(state[shell.ghosts] - state[shell.ends]) if len(shell.ghosts) else None
     components, twist, by_joints = None, None, _bent_by_joints(shell, state, rod)
-    if frames := rod_frames(shell):
+    if frames := shell.frames:
         strains = _on_entries(shell, frames.strains(state))
         twist = strains[:, 2]
         if len(set(rod.bend_stiffnesses)) > 1:
@@ -302,8 +301,7 @@ def bending_of(
 def _bent_by_joints(shell: Shell, state: Floats, rod: Rod) -> Floats | None:
     """(k, 3) by how much more each rod bends on the sharper side of its joints than at their nodes, along the joints'
     normals [1/m]; None where no joint resists shear."""
-    joints = (element for element in shell.between if isinstance(element, RelativeRotation))
-    if not any(element.stiffness[:, 0, 0].any() for element in joints):
+    if not any(element.stiffness[:, 0, 0].any() for element in filter(is_elastic, shell.between)):
         return None
     mesh, loads = shell.mesh, joint_loads(shell, state)
     moments = np.zeros((len(mesh.rod_nodes), 3))
@@ -366,18 +364,12 @@ def bending(
     return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared)
 
 
-def rod_frames(shell: Shell) -> BendTwist | None:
-    """The elements that carry the rods' material frames; None where no twist angles are carried."""
-    return next((element for element in shell.within if isinstance(element, BendTwist)), None)
-
-
-def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
+def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
     """(e, 3) first material director m1 of each edge in a `state` (N, 3).
 
     Parameters
     ----------
     frames : the shell's bending and twist, whose frames are transported to the state.
-    state : (N, 3) node positions [m] and twist angles [rad].
     """
     m1 = frames.refreshed(state).material_directors(state)
     result = np.zeros((len(shell.mesh.edges) + len(shell.ghosts), 3))  # of ghost edges, too

@@ -17,15 +17,16 @@ from rodshell.checks.self_weight import self_weight, weakest
 from rodshell.errors import OutOfTimeError
 from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, Stage
 from rodshell.figures.findings import Said, said
+from rodshell.figures.records import Ends
 from rodshell.formfinding import PopUp
-from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.quantities import MOST_STAGES
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import PINNED, SUPPORTS, finals_first
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.load_path import MOST_FACTORIZATIONS
-from rodshell.units import length_text, stress_text
+from rodshell.units import length_text, shown, stress_text
 from rodshell.validation import brief, choice, instance, mapping, positive, whole
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
@@ -119,7 +120,7 @@ class Checks:
         way = () if self.deployment is None else self.deployment.warnings
         turned: tuple[Said, ...] = ()
         if self.clamped_from_flat is False:
-            turned = (said("turned", "clamped"),)
+            turned = (said("turned", finals_first(self.bending)[0]),)
         return (*self._late, *way, *turned, *self.tight)
 
     @property
@@ -190,10 +191,10 @@ def check(
     ------
     InputError : a value is of the wrong kind.
     """
-    by_ends = 'shells by their ends, such as {"pinned": rodshell.pop_up(...)}'
+    by_ends = f"shells by their ends, such as {{{shown(PINNED.name)}: rodshell.pop_up(...)}}"
     for ends, shape in mapping("popped", popped, by_ends).items():
-        choice("the ends of popped", ends, ENDS)
         instance(f"the shell with {ends} ends", shape, PopUp, "what rodshell.pop_up returned")
+        choice("the ends of popped", ends, tuple(dict.fromkeys((*SUPPORTS, shape.ends))))
     instance("rod", rod, Rod)
     whole("stages", stages, 0, MOST_STAGES)
     shear_weight = positive("shear_weight", shear_weight)
@@ -210,7 +211,8 @@ def check(
     )
     if checks.deployment is None:
         return checks
-    mesh, flat, shells = done["pinned"].footprint.mesh, checks.deployment.positions[0], checks.deployment.shells
+    (mesh, *_), way = [shape.footprint.mesh for shape in done.values()], checks.deployment
+    flat, shells = way.positions[0], way.shells
     directors = np.tile(UP, (len(mesh.edges), 1))
     bent = (
         bending(mesh, flat, rod, normals=shell_normals(mesh, flat)),
@@ -246,21 +248,26 @@ def _long_checks(
     popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], stages: int, progress: Progress
 ) -> dict[str, Any]:
     """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
-    follow = "pinned" in done and stages > 0
+    upright = _deployable(done) if stages > 0 else None
+    clamped = next((ends for ends, shape in done.items() if shape.support.holds_directions), None)
     deployment, turned, stopped = None, None, ""
     weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
     missing = [f"self-weight with {ends} ends" for ends in done]
-    missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
+    missing += [*(["the deployment from flat"] if upright else []), "other stable shapes"]
     try:
         for ends, shape in done.items():
             weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
             missing.pop(0)
-        if follow:
-            deployment = _deployed(popped["pinned"], stages, progress)
-            missing[0] = "whether the clamped shell is reached from flat"
-            if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
+        if upright is not None:
+            last = popped[upright]
+            deployment = deploy(
+                last.shell, last.equilibrium, stages=stages, ends=upright,
+                progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
+            )  # fmt: skip
+            missing[0] = f"whether the {clamped} shell is reached from flat"
+            if deployment.reached_from_flat and clamped and done[clamped].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
-                turned = reached_by_turning(popped["pinned"], popped["clamped"])
+                turned = reached_by_turning(popped[upright], popped[clamped])
             missing.pop(0)
         weighing = sum(weight.factorizations or 0 for weight in weighed.values())
         for ends, search in _other_shapes(popped, done, deployment, weighing, progress):
@@ -275,6 +282,12 @@ def _long_checks(
         "stopped": stopped,
         "missing": tuple(missing),
     }
+
+
+def _deployable(shapes: Mapping[Ends, PopUp]) -> Ends | None:
+    """The first shell whose ends are held in place and free to turn, which can be followed from flat."""
+    held = (ends for ends, shape in shapes.items() if not (shape.support.holds_directions or shape.shell.yields))
+    return next(held, None)
 
 
 def _other_shapes(
@@ -297,7 +310,7 @@ def _other_shapes(
                 shape.shell,
                 shape.equilibrium,
                 most_factorizations=most,
-                deployment=deployment if ends == "pinned" else None,
+                deployment=deployment if deployment and ends == deployment.ends else None,
                 progress=partial(_starting, ends, progress),
             ),
         )
@@ -313,15 +326,6 @@ def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
         progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
 
     return report
-
-
-def _deployed(last: PopUp, stages: int, progress: Progress) -> Deployment:
-    return deploy(
-        last.shell,
-        last.equilibrium,
-        stages=stages,
-        progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
-    )
 
 
 @dataclass(frozen=True)
@@ -407,7 +411,7 @@ def _merged_stages(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Dep
     snaps = sorted({snap for way in ways for snap in zip(way.snaps, way.snapped_by, strict=True)})
     turned = [way.clamped.reached_from_flat if way.clamped else None for way in ways]
     return Deployment(
-        ends="pinned",
+        ends=ways[0].ends,
         share=ways[0].share[rows[0]],
         positions=np.concatenate([way.positions[row] for way, row in zip(ways, rows, strict=True)], axis=1),
         snaps=tuple(snap for snap, _ in snaps),

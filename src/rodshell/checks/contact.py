@@ -20,8 +20,8 @@ from functools import cached_property
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints
-from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
+from rodshell.arrays import Bools, Floats, Ints, State
+from rodshell.checks.bending import edge_directors, shell_normals
 from rodshell.figures.checks import Clearance
 from rodshell.geometry.frames import adapted, cross, dot, unit
 from rodshell.geometry.near_pairs import near_pairs
@@ -42,15 +42,14 @@ APART = Clearance(clearance=None, pairs=0, rods=None, where=None)
 """No two rods come nearer than a rod's breadth, or the section's outline is not known."""
 
 
-def contact_of(shell: Shell, state: Floats, rod: Rod) -> Clearance:
+def contact_of(shell: Shell, state: State, rod: Rod) -> Clearance:
     """Contact of a shell of equal rods in a `state` (N, 3).
 
     Parameters
     ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
     rod : the section of every rod.
     """
-    frames = rod_frames(shell)
+    frames = shell.frames
     directors = None if frames is None else edge_directors(shell, frames, state)
     return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
 
@@ -78,7 +77,7 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
         np.concatenate([*(crossings.rods + by for crossings, by in zip(parts, sizes, strict=False)), together // 2]),
         np.concatenate([*(crossings.at for crossings in parts), stations[together]]),
     )
-    frames = [(shell, rod_frames(shell), state) for shell, state in patches]
+    frames = [(shell, shell.frames, state) for shell, state in patches]
     turned = [edge_directors(shell, frame, state) for shell, frame, state in frames if frame is not None]
     directors = np.concatenate(turned) if len(turned) == len(patches) else None
     return contact(mesh, positions, rod, directors=directors, crossings=crossings)

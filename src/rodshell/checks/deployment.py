@@ -27,6 +27,7 @@ from rodshell.formfinding.popup import end_directions, laid_below, turned
 from rodshell.model import Shell
 from rodshell.model.shell import last_edges
 from rodshell.rods.elements import Elements
+from rodshell.rods.supports import PINNED
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
@@ -106,24 +107,26 @@ class Deployment(figures.Deployment):
             other = "; a small difference can make it snap elsewhere" if len(self.snaps) > FEW else ""
             found.append(
                 said(
-                    "snaps", "pinned", most, unit="m",
+                    "snaps", self.ends, most, unit="m",
                     where=where, by=length_text(most), continues=continues, other=other,
                 )
             )  # fmt: skip
         if self.reached_from_flat is False:
             where = "" if self.elsewhere is None else f", {self.elsewhere.words}"
-            found.append(said("guided", "pinned", where=where))
+            found.append(said("guided", self.ends, where=where))
         if self.gap is not None:
-            found.append(said("lost", "pinned", self.lost_at, 0, how=self.gap.words))
+            found.append(said("lost", self.ends, self.lost_at, 0, how=self.gap.words))
         return tuple(found)
 
 
-def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress = lambda share: None) -> Deployment:
+def deploy(
+    shell: Shell, found: Equilibrium, *, stages: int, ends: str = PINNED.name, progress: Progress = lambda share: None
+) -> Deployment:
     """Follow a popped-up shell back to the flat grid, and forwards from there where that path has a gap.
 
     Parameters
     ----------
-    shell : with pinned ends, its source frames being at the equilibrium.
+    shell : its ends being free to turn, its source frames being at the equilibrium.
     stages : number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root of
         the way.
     progress : called with each share of the deployment that is looked for.
@@ -158,7 +161,7 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
     wanted = [(share, there) for share, there in whole if share in shares]
     snaps = [snap for snap in lower.snaps if guided is None or snap.stop <= guided[0]]
     return Deployment(
-        ends="pinned",
+        ends=ends,
         share=np.array([0.0, *(share for share, _ in wanted)]),
         positions=np.array([path.flat, *(shell.positions(there.state) for _, there in wanted)]),
         shells=tuple((shell.with_elements(there.elements), there.state) for _, there in wanted),

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.checks.bending import edge_directors, rod_frames
+from rodshell.checks.bending import edge_directors
 from rodshell.checks.deployment import Deployment, OtherShape
 from rodshell.figures import checks as figures
 from rodshell.figures.records import Rows, rows
@@ -166,7 +166,7 @@ class _Search:
         state[nodes] += (self._mirrored(above) - self.positions)[self.shell.like[nodes]]
         held = np.append(self.shell.ends, self.shell.ghosts)
         state[held] = self.found.state[held]
-        if frames := rod_frames(self.shell):
+        if frames := self.shell.frames:
             self._turn_sections(frames, state)
         return state
 

@@ -21,10 +21,9 @@ from rodshell.figures import checks as figures
 from rodshell.figures.records import Found
 from rodshell.formfinding.finite_sections import joint_normals, joint_tangents
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.joints.crossings import LinkerBend
 from rodshell.layout import FlatGrid
 from rodshell.model import Shell
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import Elements, is_bends
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.validation import brief
 
@@ -70,14 +69,19 @@ def _imbalance(parts: Floats) -> float:
 
 
 def reactions(shell: Shell, found: Equilibrium) -> Reactions:
-    """Reactions of a shell without loads whose ends are held.
+    """Reactions of a shell without loads, whose ends are held or pushed by the springs of supports.
 
     Parameters
     ----------
     shell : with its source frames at the equilibrium.
-    found : the equilibrium; its gradient at the held ends is what the supports exert.
+    found : the equilibrium; its gradient at the ends, without that of the springs, is what the supports exert.
     """
     state, gradient = found.state, found.gradient
+    if shell.springs:  # their forces are the supports'
+        pushes = np.zeros_like(gradient)
+        for spring in shell.springs:
+            spring.evaluate(state, pushes)
+        gradient = gradient - pushes
     points = state[shell.ends]
     forces, moments = gradient[shell.ends], np.zeros_like(points)
     if len(shell.ghosts):
@@ -188,9 +192,7 @@ def _on_places(shell: Shell, state: Floats) -> Floats:
     order = np.argsort(key)
     result = np.zeros((len(key), 3))
     clamps = np.repeat(np.arange(len(mesh.rod_start)), 2)
-    for element in (shell.stretch, *shell.within):
-        if isinstance(element, LinkerBend):
-            continue
+    for element in (shell.stretch, *filter(is_bends, shell.within)):
         of_rods = mesh.edge_rods if element is shell.stretch else mesh.bend_rods
         of_rods = np.append(of_rods, clamps[: len(element.blocks) - len(of_rods)])
         rows = _rows(element, state)
@@ -241,8 +243,8 @@ def _between(shell: Shell, state: Floats, met: Ints) -> tuple[Floats, Floats]:
     pair = np.sort(mesh.grid.crossings.rods, axis=1) @ [count, 1]
     order = np.argsort(pair)
     forces, moments = np.zeros((len(pair), 2, 3)), np.zeros((len(pair), 3))
-    elements = [element for element in shell.elements if isinstance(element, LinkerBend) or element in shell.between]
-    for element in elements:
+    linkers = (element for element in shell.within if not is_bends(element))
+    for element in (*linkers, *shell.between):
         angles = [c for c in range(element.blocks.shape[1]) if (element.blocks[:, c] >= first).all()]
         if len(element.blocks) == 0:
             continue

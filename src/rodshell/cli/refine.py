@@ -10,6 +10,7 @@ from rodshell.case import load_case
 from rodshell.cli.form import run_case
 from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
 from rodshell.errors import InputError
+from rodshell.rods.supports import SUPPORTS
 from rodshell.validation import choice
 
 if TYPE_CHECKING:
@@ -50,11 +51,11 @@ def command(name: str, ends: str | None, **values: Any) -> int:
     else:
         stem = path.stem
     if ends is not None:
-        overrides |= {"pop_up.ends": choice("--ends", ends, ("pinned", "clamped"))}
+        overrides |= {"pop_up.ends": choice("--ends", ends, tuple(SUPPORTS))}
     case = load_case(name, overrides)
     if path.is_dir() and case.refine.start is None and all(key.partition(".")[0] in LATER for key in overrides):
         overrides |= _design(path, case)
-    only = ends or case.refine.ends or (case.ends or ("pinned",))[0]
+    only = ends or case.refine.ends or (case.ends or tuple(SUPPORTS))[0]
     vary = case.refine.vary or VARY
     return run_case(
         load_case(name, overrides | {"refine.vary": vary, "refine.ends": only, "pop_up.ends": only}),

@@ -1,11 +1,13 @@
 """What was checked of a shell without loads, and under its own weight."""
 
 from math import inf
+from re import fullmatch
 
 from pydantic import Field
 
 from rodshell.figures.form import Bent
 from rodshell.figures.records import (
+    NAME,
     Flag,
     Number,
     Point,
@@ -13,6 +15,8 @@ from rodshell.figures.records import (
     Real,
     Record,
     Rows,
+    T,
+    TableOr,
     Text,
     Vector,
     Whole,
@@ -20,6 +24,14 @@ from rodshell.figures.records import (
     points,
     rows,
 )
+
+OTHER_SHAPES = ("pop_up", "deployment")  # with figures in addition to those on supports
+
+
+def _by_shape(record: Record, kind: type[T]) -> dict[str, T]:
+    """What a record holds of shapes: by the names of supports, then of the deployment."""
+    known = {name: value for name, value in record if isinstance(value, kind) and fullmatch(f"{NAME}|pop_up", name)}
+    return {name: known[name] for name in sorted(known, key=OTHER_SHAPES.__contains__)}
 
 
 class WorstBent(Bent):
@@ -31,7 +43,9 @@ class WorstBent(Bent):
 
 
 class Bending(Record):
-    """Bending and stress of all rods in the shapes of the shell."""
+    """Bending and stress of all rods in the shapes of the shell: on each support by its name, and of the deployment."""
+
+    __pydantic_extra__: dict[str, TableOr[WorstBent]] = Field(init=False)
 
     strength: Number = key("by which the use of final shapes is counted: permanent, if that is known", "Pa")
     erection_strength: Number = key("by which the use of the deployment's stages is counted", "Pa")
@@ -44,8 +58,7 @@ class Bending(Record):
 
     def shapes(self) -> dict[str, WorstBent]:
         """What is known, by the name of the shape."""
-        known = {"pinned": self.pinned, "clamped": self.clamped, "pop_up": self.pop_up, "deployment": self.deployment}
-        return {name: bent for name, bent in known.items() if bent is not None}
+        return _by_shape(self, WorstBent)
 
 
 class Clearance(Record):
@@ -59,15 +72,21 @@ class Clearance(Record):
 
 
 class Contact(Record):
-    """Contact of rods with each other."""
+    """Contact of rods with each other: in the shape on each support by its name, and in the deployment."""
+
+    __pydantic_extra__: dict[str, TableOr[Clearance]] = Field(init=False)
 
     pinned: Clearance | None = key("final shape with pinned ends")
     clamped: Clearance | None = key("final shape with clamped ends")
     deployment: Clearance | None = key("the worst stage of the deployment")
 
+    def shapes(self) -> dict[str, Clearance]:
+        """What is known, by the name of the shape."""
+        return _by_shape(self, Clearance)
+
     def of(self, shape: str) -> Clearance | None:
-        """Of "pinned", "clamped" or "deployment"."""
-        return {"pinned": self.pinned, "clamped": self.clamped, "deployment": self.deployment}.get(shape)
+        """Of a support by its name, or of the "deployment"."""
+        return self.shapes().get(shape)
 
 
 class Reactions(Record):
@@ -151,7 +170,7 @@ class ClampedDeployment(Record):
 class Deployment(Record):
     """The deployment from flat to popped up with pinned ends, the ends driven along straight lines."""
 
-    ends: Text | None = key('end condition: "pinned"')
+    ends: Text | None = key("name of the support")
     stages: Rows[Stage] = rows("equilibria from flat to popped up")
     snaps: Rows[tuple[Real, Real]] = rows("pairs of shares between which the shell snaps forward")
     snapped_by: Rows[Number] = rows("how far a node moves in each snap", "m")

@@ -8,16 +8,17 @@ of a number, a number that is not finite or a point with two coordinates is refu
 import json
 from collections.abc import Iterator, Mapping
 from math import isfinite
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, FailFast, Field, Tag, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
 from rodshell.arrays import Floats
 
-Ends = Literal["pinned", "clamped"]
+Ends = str  # name of a support
+NAME = "[a-z0-9]{1,40}"  # of a support: it stands in names of states and files
 LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
 MOST = 10**15  # of a count
 FARTHEST = 1e6  # m between two points of a shell, and of each of its lengths
@@ -81,7 +82,15 @@ Text = Annotated[
 _Other = Annotated[Any, _Checked(core_schema.with_info_after_validator_function(_in_range, core_schema.any_schema()))]
 T = TypeVar("T")
 Rows = Annotated[tuple[T, ...], FailFast(), BeforeValidator(_no_rows_for_null)]
-ByEnds = Annotated[dict[Ends, T], BeforeValidator(_no_keys_for_null)]
+TableOr = Annotated[
+    Annotated[T, Tag("(table)")] | Annotated[_Other, Tag("(other)")],
+    Discriminator(lambda value: "(table)" if isinstance(value, dict | BaseModel) else "(other)"),
+]
+"""A key of a record that is not known here, such as the name of a support: what its table holds is a T."""
+ByEnds = Annotated[
+    dict[Annotated[str, _Checked(core_schema.str_schema(pattern=f"^{NAME}$", strict=True))], T],
+    BeforeValidator(_no_keys_for_null),
+]
 Flat = Annotated[tuple[Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 2))]
 _POINT = core_schema.tuple_schema([_NUMBER] * 3)
 Point = Annotated[tuple[Number, Number, Number], _Checked(_POINT)]

@@ -82,7 +82,9 @@ SENTENCES = {
         "no support that was asked for is shown to hold the shell up: with {falls} ends it falls under its own "
         "weight{bracing}, and {unknown}; take stiffer rods, or brace it, and check it again"
     ),
-    "not_checked: clamped": "whether the clamped shape is reached from the pinned one by turning the ends is not known",
+    "not_checked: clamped": (
+        "whether the {ends} shape is reached from the {pinned} one by turning the ends is not known"
+    ),
     "not_checked: contact": (
         "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
         "rod.section.fibre_distances for that"
@@ -152,7 +154,7 @@ SENTENCES = {
         "{shape} bending strains the rods by {strain}: they are too thick for this curvature, and the theory of thin "
         "rods is valid up to about {valid}; use thinner rods or a larger target"
     ),
-    "turned": "turned into their clamps after deployment, the ends lead to another than the clamped shape",
+    "turned": "turned into their clamps after deployment, the ends lead to another than the {ends} shape",
     "unstable": "with {ends} ends the shell is unstable{count} and would snap to another shape",
     "unstable: unloaded": "with {ends} ends the shell is unstable before the loads of {place} act",
 }

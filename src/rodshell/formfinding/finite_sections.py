@@ -19,7 +19,6 @@ from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
-from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.targets import Target
 from rodshell.units import length_text
@@ -264,7 +263,7 @@ def section_rotation(shell: Shell, state: Floats) -> Floats | None:
     state : (N, 3) of the shell, with the source frames there.
     """
     mesh = shell.mesh
-    frames = next((element for element in shell.within if isinstance(element, BendTwist)), None)
+    frames = shell.frames
     if frames is None or not shell.angles:
         return None
     bends = slice(len(mesh.bends))

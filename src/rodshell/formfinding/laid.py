@@ -136,5 +136,5 @@ def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progres
         problem, start, np.zeros(len(mesh.edges)), limit_steps=True, most_iterations=MOST_ITERATIONS,
         progress=lambda k, step: progress("drape", f"flat state, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
-    curvature = bends.curvatures(found.state) / mesh.voronoi_lengths
+    curvature = bends.strains(found.state)[:, 0] / mesh.voronoi_lengths
     return FlatState(found.state[:, :2], 0.5 * rod_breadth(rod) * float(curvature.max(initial=0.0)), found.report)

@@ -10,10 +10,11 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.finite_sections import flat_warnings
 from rodshell.formfinding.methods import Draped
 from rodshell.formfinding.pipeline import Agreement, PatchForm, find_stages
-from rodshell.formfinding.popup import ENDS, Ends, Start
+from rodshell.formfinding.popup import Start
 from rodshell.formfinding.seams import FEWEST, Meeting, PatchNet, lay_patches, patches_of, transported_heading
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
@@ -23,12 +24,13 @@ from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.layout.mesh import SideBySide, side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import BOTH, SUPPORTS, Asked, supports_of
 from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import shown
-from rodshell.validation import choices_of
+from rodshell.validation import either
 
 MANY = 0.1  # of the rods: a larger share left out gives a warning
 ASTRAY = 0.005  # of the size: rod ends that are moved further give a warning
@@ -182,7 +184,7 @@ def find_patched_stages(
     *,
     patch_layouts: Mapping[str, PatchLayout] | None = None,
     joint: Joint | None = None,
-    ends: Ends | Sequence[Ends] = ENDS,
+    ends: Asked = BOTH,
     warm_start: PatchedForm | None = None,
     same_drape: bool = False,
     progress: Progress = silent,
@@ -194,7 +196,9 @@ def find_patched_stages(
     patch_layouts : settings of single patches, by name.
     warm_start, same_drape : as in `find_stages`; patches are matched by their names.
     """
-    layout, ends = require_chebyshev(layout, "seams"), choices_of("ends", ends, ENDS)
+    layout, ends = require_chebyshev(layout, "seams"), tuple(support.name for support in supports_of(ends))
+    if others := set(ends) - set(SUPPORTS):
+        raise InputError(f"patches stand on {either([*SUPPORTS])} supports, not on {others.pop()}: leave out the seams")
     require_joint(joint)
     patch_layouts, joint = dict(patch_layouts or {}), joint or Ball()
     earlier = warm_start.patches if warm_start is not None else {}

@@ -11,10 +11,11 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
 from rodshell.formfinding.methods import Bound, Draped, FlatState, Method
-from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
+from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
     NEAREST_JOINT,
@@ -32,10 +33,11 @@ from rodshell.layout.flatgrid import TOGETHER
 from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import BOTH, PINNED, Asked, Support, supports_of
 from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.units import length_text, percent_text
-from rodshell.validation import choices_of, instance
+from rodshell.validation import instance
 
 STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
 ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other axis
@@ -186,10 +188,13 @@ class PatchForm:
         """Where the rods lie in the plane, where they follow curves of the target."""
         return None if self.lying is None else self.draped.flat_state
 
-    def finished_pop_ups(self, ends: Sequence[Ends]) -> dict[Ends, PopUp]:
-        """The pop-ups with these ends that were not stopped by a time limit."""
-        found = [end for end in ends if end in self.popped]
-        return {end: self.popped[end] for end in found if self.popped[end].report.status is not Status.OUT_OF_TIME}
+    def finished_pop_ups(self, supports: Sequence[Support]) -> dict[Ends, PopUp]:
+        """The pop-ups on these supports that were not stopped by a time limit."""
+        return {
+            ends: shell
+            for ends, shell in self.popped.items()
+            if shell.support in supports and shell.report.status is not Status.OUT_OF_TIME
+        }
 
     @property
     def status(self) -> str:
@@ -234,7 +239,7 @@ def find_stages(
     method: Method = Bound(),
     anchor: tuple[float, float] | None = None,
     joint: Joint | None = None,
-    ends: Ends | Sequence[Ends] = ENDS,
+    ends: Asked = BOTH,
     name: str = "",
     warm_start: PatchForm | None = None,
     same_drape: bool = False,
@@ -250,12 +255,13 @@ def find_stages(
         are taken over, and so are its pop-ups with the same ends, except those that a time limit stopped.
     cut : how the draped shell is trimmed.
     """
-    ends = choices_of("ends", ends, ENDS)
+    supports = supports_of(ends)
     require_joint(joint)
     joint = joint or Ball()
     if warm_start is not None and same_drape and not warm_start.drape_out_of_time:
         draped, trimmed, footprint = warm_start.draped, warm_start.trimmed, warm_start.footprint
-        popped, compared = warm_start.finished_pop_ups(ends), dict(warm_start.agreement)
+        popped = warm_start.finished_pop_ups(supports)
+        compared = {end: gap for end, gap in warm_start.agreement.items() if end in popped}
     else:
         draped = drape(
             layout, rod, target,
@@ -265,16 +271,18 @@ def find_stages(
         trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
         footprint, popped, compared = map_back(trimmed), dict[Ends, PopUp](), dict[Ends, Agreement]()
     earlier = warm_start.popped if warm_start else {}
-    for end in ends if draped.converged else ():
+    for support in supports if draped.converged else ():
+        end = support.name
         if end in popped:
             continue
         popped[end] = pop_up(
             footprint, trimmed.boundary, rod,
-            ends=end, warm_start=earlier.get(end), joint=joint, like=next(iter(popped.values()), None),
+            ends=support, warm_start=earlier.get(end), joint=joint, like=next(iter(popped.values()), None),
             progress=progress,
         )  # fmt: skip
         if popped[end].report.status is Status.OUT_OF_TIME:
             break
+    ends = tuple(support.name for support in supports)
     popped = {end: popped[end] for end in ends if end in popped}
     compared = {
         end: compared[end] if end in compared else agreement(shell, target)
@@ -295,7 +303,8 @@ def popped_again(
     footprint, boundary : the other grid, and where its rod ends go.
     ends : the only end condition of the other form.
     """
-    popped = pop_up(footprint, boundary, form.rod, ends=ends, joint=form.joint, progress=progress)
+    support = form.popped[ends].support if ends in form.popped else ends
+    popped = pop_up(footprint, boundary, form.rod, ends=support, joint=form.joint, progress=progress)
     compared = {ends: agreement(popped, form.target)} if popped.report.converged else {}
     return replace(
         form, ends=(ends,), footprint=footprint, boundary=boundary, popped={ends: popped}, agreement=compared
@@ -308,7 +317,6 @@ def meshed_again(form: PatchForm, ends: Ends) -> PatchForm:
     Parameters
     ----------
     form : of a target, with a pop-up.
-    ends : how the rods' ends are held.
     """
     old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
     mesh, normals = mesh_grid(old.grid, form.layout.longest_edge), None
@@ -365,9 +373,9 @@ def pop_up_stages(
     footprint = Footprint(mesh_grid(kept, edge or even))
     points = finals[rows].reshape(-1, 3)
     boundary = Boundary(points, np.zeros_like(points))
-    popped = pop_up(footprint, boundary, rod, ends="pinned", start="flat", joint=joint, progress=progress)
+    popped = pop_up(footprint, boundary, rod, ends=PINNED, start="flat", joint=joint, progress=progress)
     dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
-    return PatchForm("", rod, joint, ("pinned",), footprint, boundary, {"pinned": popped}, {}, dropped, None)
+    return PatchForm("", rod, joint, (popped.ends,), footprint, boundary, {popped.ends: popped}, {}, dropped, None)
 
 
 def _stretched(draped: Draped) -> tuple[str, ...]:

@@ -15,7 +15,9 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, OutOfTimeError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.finite_sections import node_normals
+from rodshell.formfinding.supports import let_go
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.frames import dot, unit
 from rodshell.geometry.planar_motion import PlanarMotion
@@ -26,15 +28,14 @@ from rodshell.model import Shell
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import CLAMPED, PINNED, Support, support_of
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
 from rodshell.solve.problem import Pattern, Problem, Supports, mean_radius
 from rodshell.units import length_text
 from rodshell.validation import choice, instance, whole
 
-Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
-ENDS: tuple[Ends, ...] = get_args(Ends)
 STARTS: tuple[Start, ...] = get_args(Start)
 
 FIRST_RISE = 0.05  # share of the ends' paths in the step that leaves the plane
@@ -54,13 +55,13 @@ class PopUp:
 
     Parameters
     ----------
-    ends, start : the end condition, and where the solve started from.
+    support, start : what holds the rods' ends, and where the solve started from.
     footprint, boundary : as they were given, in layers where joints are eccentric.
     shell : the mechanical model, its source frames being at the equilibrium.
     equilibrium : with the ends held where they are; its report counts the work of all solves on the way.
     """
 
-    ends: Ends
+    support: Support
     start: Start
     footprint: Footprint
     boundary: Boundary
@@ -72,6 +73,11 @@ class PopUp:
         if self.report.converged:
             state = "stable" if self.report.stable else "unstable"
         return f"<PopUp: {rods} rods, {self.ends} from {self.start}, {state}>"
+
+    @property
+    def ends(self) -> Ends:
+        """Name of the support."""
+        return self.support.name
 
     @cached_property
     def positions(self) -> Floats:
@@ -109,7 +115,7 @@ def pop_up(
     boundary: Boundary,
     rod: Rod,
     *,
-    ends: Ends = "clamped",
+    ends: Ends | Support = CLAMPED,
     start: Start = "draped",
     warm_start: PopUp | None = None,
     joint: Joint | Sequence[Joint] | None = None,
@@ -121,7 +127,8 @@ def pop_up(
 
     Parameters
     ----------
-    ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp).
+    ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp); or a
+        support of your own, which lets go of the ends once the shell has popped up.
     start : "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
         flat grid, which leaves its plane to the side that the boundary's directions point away from (without
         directions to that of +z), then turns the clamps.
@@ -141,14 +148,14 @@ def pop_up(
     InputError : an argument of the wrong kind; `start` is "draped" and the boundary has no draped state; `warm_start`
         has other ends, or comes with start="flat"; the joints do not fit the grid.
     """
-    choice("ends", ends, ENDS)
+    support = support_of(ends)
     choice("start", start, STARTS)
     if warm_start is not None:
         instance("warm_start", warm_start, PopUp, "what an earlier rodshell.pop_up returned")
     if warm_start is not None and start != "draped":
         raise InputError('an earlier pop-up can only be used with start="draped": leave out warm_start, or start')
-    if warm_start is not None and warm_start.ends != ends:
-        raise InputError(f"the earlier pop-up has {warm_start.ends} ends, not {ends}: give one with the same ends")
+    if warm_start is not None and warm_start.ends != support.name:
+        raise InputError(f"the earlier pop-up has {warm_start.ends} ends, not {support}: give one with the same ends")
     if like is not None:
         instance("like", like, PopUp, "what an earlier rodshell.pop_up returned")
     instance("footprint", footprint, Footprint)
@@ -171,15 +178,17 @@ def pop_up(
     known = like.equilibrium.problem.pattern if like is not None else None
     stages = _Stages(footprint, boundary, rod, joint, progress, known, most_factorizations)
     if start == "draped":
-        shell, found = (stages.again(warm_start) if warm_start else None) or stages.release(ends)
+        shell, found = (stages.again(warm_start, support) if warm_start else None) or stages.release(support)
     else:
         shell, found = stages.rise()
-        if ends == "clamped" and found.report.converged:
-            shell, found = stages.turn_clamps(shell, found)
+        if support.holds_directions and found.report.converged:
+            shell, found = stages.turn_clamps(shell, found, support)
     shell = shell.with_elements(found.elements)
     if start == "flat":  # the ends have arrived
         found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
-    return PopUp(ends, start, footprint, boundary, shell, found)
+    if found.report.converged:
+        shell, found = let_go(shell, found, support, boundary.points, stages.counting)
+    return PopUp(support, start, footprint, boundary, shell, found)
 
 
 @dataclass(frozen=True)
@@ -194,12 +203,12 @@ class _Stages:
     pattern: Pattern | None = None
     most_factorizations: int | None = None
 
-    def _counting(self, what: str, most: int) -> Callable[[int, float], None]:
+    def counting(self, what: str, most: int) -> Callable[[int, float], None]:
         return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
 
-    def shell(self, ends: Ends) -> Shell:
+    def shell(self, support: Support) -> Shell:
         mesh = self.footprint.mesh
-        shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
+        shell = Shell.of(mesh, self.rod, clamped=support.holds_directions, joint=self.joint)
         if not shell.angles:
             return shell
         return shell.turned(PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], self.boundary.points).turn)
@@ -245,7 +254,7 @@ class _Stages:
             normals = node_normals(self.footprint.mesh, positions)
         return shell.state(positions, tangents, normals)
 
-    def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
+    def release(self, support: Support) -> tuple[Shell, Equilibrium]:
         """Release the draped state: the ends stay, the target's forces vanish.
 
         In one solve, or, where that fails, by descending the energy. Abandoned where the state has more negative modes
@@ -253,7 +262,7 @@ class _Stages:
         """
         if self.boundary.draped is None:
             raise InputError('this boundary has no draped state to start from: use start="flat"')
-        shell = self.shell(ends)
+        shell = self.shell(support)
         state = self.upright(shell, self.boundary.draped, self.boundary.tangents, self.boundary.normals)
         forces = np.zeros(len(self.footprint.mesh.edges))
         at_once = find_stable(
@@ -263,20 +272,18 @@ class _Stages:
             limit_steps=True,
             most_modes=self.most_modes,
             most_iterations=MOST_AT_ONCE,
-            progress=self._counting(f"{ends}, iteration", MOST_AT_ONCE),
+            progress=self.counting(f"{support}, iteration", MOST_AT_ONCE),
         )
         if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
             return shell, at_once
         relaxed = relax(
             self.problem(shell),
             state,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"{ends}, descending, step {k} of at most {MOST_STEPS}", step
-            ),
+            progress=self.counting(f"{support}, descending, step", MOST_STEPS),
         )
         return shell, replace(relaxed, report=relaxed.report.after(at_once.report))
 
-    def again(self, warm_start: PopUp) -> tuple[Shell, Equilibrium] | None:
+    def again(self, warm_start: PopUp, support: Support) -> tuple[Shell, Equilibrium] | None:
         """Start from the displacements of an earlier pop-up; None where that does not lead to a stable state nearby.
 
         Not for rods with twist angles: these are not transferred, and without them the draped state is a better guess.
@@ -284,7 +291,7 @@ class _Stages:
         here, there = self.boundary.draped, warm_start.boundary.draped
         if here is None or there is None or warm_start.shell.angles:
             return None
-        shell, mesh, before = self.shell(warm_start.ends), self.footprint.mesh, warm_start.footprint.mesh
+        shell, mesh, before = self.shell(support), self.footprint.mesh, warm_start.footprint.mesh
         moved = transferred_nodes(warm_start.positions - there, before, mesh)
         moved[mesh.ends] = 0.0
         state = self.upright(shell, here + moved, self.boundary.tangents)
@@ -294,9 +301,7 @@ class _Stages:
             state,
             stiffer * transferred_edges(warm_start.forces, before, mesh),
             most_iterations=MOST_AGAIN,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"{warm_start.ends}, again, iteration {k} of at most {MOST_AGAIN}", step
-            ),
+            progress=self.counting(f"{support}, again, iteration", MOST_AGAIN),
         )
         strayed = np.abs(shell.positions(found.state) - here - moved).max() > NEARBY * self.length
         return None if strayed or not found.report.stable else (shell, found)
@@ -307,7 +312,7 @@ class _Stages:
         In steps as long as Newton's method allows, or, where these do not lead to a stable shell, in short ones.
         """
         mesh, boundary = self.footprint.mesh, self.boundary
-        shell = self.shell("pinned")
+        shell = self.shell(PINNED)
         flat = flat_below(mesh, boundary.points)
         first = flat[mesh.ends.ravel()]
         arch = self.upright(shell, arched(self.footprint, flat, first, boundary))
@@ -340,9 +345,7 @@ class _Stages:
         here = relax(
             problem_at(FIRST_RISE),
             arch,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"from flat, descending, step {k} of at most {MOST_STEPS}", step
-            ),
+            progress=self.counting("from flat, descending, step", MOST_STEPS),
         )
         if not here.report.stable:
             kept, other = (here, failed) if here.report.status is Status.OUT_OF_TIME else (failed, here)
@@ -370,10 +373,10 @@ class _Stages:
             return replace(failed, report=failed.report.after(here.report, *path.reports))
         return replace(path.found, report=replace(work, status=Status.STALLED))
 
-    def turn_clamps(self, free: Shell, pinned: Equilibrium) -> tuple[Shell, Equilibrium]:
+    def turn_clamps(self, free: Shell, pinned: Equilibrium, support: Support) -> tuple[Shell, Equilibrium]:
         """Turn the end directions of the pinned state to those of the boundary."""
         mesh, outward = self.footprint.mesh, self.boundary.tangents
-        shell, positions = self.shell("clamped"), free.positions(pinned.state)
+        shell, positions = self.shell(support), free.positions(pinned.state)
         now = end_directions(mesh, positions)
         start = self.upright(shell, positions, now)
 

@@ -15,6 +15,7 @@ from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.net_ends import inside_nodes
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import CLAMPED
 from rodshell.targets import Target
 from rodshell.validation import choice, instance, is_auto, number, point, some
 
@@ -155,10 +156,10 @@ def largest_curvature(net: ChebyshevNet) -> float:
 
 
 def _gap(target: Target, layout: GridLayout, rod: Rod, anchor: Point) -> float:
-    form = find_stages(target, layout, rod, anchor=anchor, ends=("clamped",))
+    form = find_stages(target, layout, rod, anchor=anchor, ends=CLAMPED)
     if form.status != "converged":
         raise InputError(form.status)
-    return form.agreement["clamped"].rms_relative
+    return form.agreement[CLAMPED.name].rms_relative
 
 
 def _spread_anchors(target: Target) -> list[Point]:

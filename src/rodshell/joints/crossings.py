@@ -20,7 +20,7 @@ from typing import NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.geometry.frames import adapted, parallel_transport, unit
 from rodshell.kernels import njit
 from rodshell.layout import GridMesh
@@ -136,19 +136,18 @@ class SectionElements(Protocol):
 T = TypeVar("T", bound=SectionElements)
 
 
-def edge_tangents(state: Floats, blocks: Ints, legs: Ints) -> Floats:
+def edge_tangents(state: State, blocks: Ints, legs: Ints) -> Floats:
     """(m, l, 3) unit tangents at `state` (N, 3) of the edges `legs` (l, 4) of the joints on `blocks` (m, k).
 
     Parameters
     ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
     blocks : (m, k) nodes and twist angles of the joints.
     legs : (l, 4) edges of each joint, see `Stencils`.
     """
     return unit(state[blocks[:, legs[:, 1]]] - state[blocks[:, legs[:, 0]]])
 
 
-def with_source(elements: T, state: Floats) -> T:
+def with_source(elements: T, state: State) -> T:
     """An energy of sections with its source frames moved to `state` (N, 3).
 
     Parameters
@@ -423,7 +422,7 @@ class LinkerBend:
         ).relaxed(local)  # fmt: skip
         return LinkerBend(np.ascontiguousarray(blocks), corners.signs, bends)
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         local = _signed(state, self.blocks, self.signs)
         by_local = np.zeros_like(local)
@@ -437,24 +436,19 @@ class LinkerBend:
                 hessians[:, :, column] *= sign
         return energy
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same linkers with their source frames at `state` (N, 3)."""
         return replace(self, bends=self.bends.refreshed(_signed(state, self.blocks, self.signs)))
 
-    def moments(self, state: Floats) -> Floats:
-        """(n, 3) moments of the two bends and of the twist of each linker at `state` (N, 3) [N m].
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def moments(self, state: State) -> Floats:
+        """(n, 3) moments of the two bends and of the twist of each linker at `state` (N, 3) [N m]."""
         bends = self.bends
         strains = bends.strains(_signed(state, self.blocks, self.signs))
         natural = np.column_stack([bends.natural_curvature, bends.natural_twist])
         return np.asarray(np.column_stack([bends.bend_stiffness, bends.twist_stiffness]) * (strains - natural))
 
 
-def _signed(state: Floats, blocks: Ints, signs: Floats) -> Floats:
+def _signed(state: State, blocks: Ints, signs: Floats) -> Floats:
     """(5n, 3) the blocks of each linker, with the signs of its angles."""
     local = state[blocks]
     local[:, 1] *= signs[:, :1]

@@ -23,19 +23,19 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.joints.crossings import RodNodes, stencils
 from rodshell.joints.relative_rotation import RelativeRotation
-from rodshell.rods.joints import Elastic, Joint
+from rodshell.rods.joints import Joint
 
 FIRM = 1e8  # times the half edges next to it: the stiffness of a rigid direction of a joint
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def resists(joint: Elastic) -> bool:
+def resists(joint: Joint) -> bool:
     """Whether a `joint` resists some rotation."""
     return joint.shear + joint.out_of_plane + joint.twist > 0
 
 
 def elastic_joints(
-    rod_nodes: RodNodes, crossings: Ints, joints: Sequence[Elastic], rod_stiffness: Floats, size: int
+    rod_nodes: RodNodes, crossings: Ints, joints: Sequence[Joint], rod_stiffness: Floats, size: int
 ) -> tuple[RelativeRotation, ...]:
     """The joints that resist some rotation, as elements.
 
@@ -87,7 +87,7 @@ def _at_rest(rod_nodes: RodNodes, pairs: Ints, rest: Floats) -> Floats:
 
 
 def _between(
-    rod_nodes: RodNodes, pairs: Ints, nodes: Ints, directions: Floats, joints: Sequence[Elastic], rod_stiffness: Floats
+    rod_nodes: RodNodes, pairs: Ints, nodes: Ints, directions: Floats, joints: Sequence[Joint], rod_stiffness: Floats
 ) -> Floats:
     """(m, 3, 3) stiffness between the two rods of each joint, by the strains of `RelativeRotation` [N m]."""
     halves = np.stack(
@@ -126,7 +126,7 @@ def _deviators(
 
 
 def _to_middle(
-    rod_nodes: RodNodes, pairs: Ints, side: int, directions: Floats, joints: Sequence[Elastic], rod_stiffness: Floats
+    rod_nodes: RodNodes, pairs: Ints, side: int, directions: Floats, joints: Sequence[Joint], rod_stiffness: Floats
 ) -> Floats:
     """(m, 3, 3) stiffness between the edges of the joint's rod `side` and the joint's middle, in x, y, z [N m]."""
     compliance = _compliance(rod_nodes, pairs[:, side], directions[:, side], rod_stiffness)

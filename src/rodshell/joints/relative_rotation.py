@@ -22,18 +22,18 @@ Why not elements from edge to edge, as the paper's linkers are: those also stiff
 by an amount that depends on the mesh. Frames, spin and sources are those of `rods.bend_twist`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
-from typing import Self
+from typing import Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.geometry.frames import adapted, cross, dot
 from rodshell.joints.crossings import by_edge, edge_tangents, frame, of_edge, spread, with_source
 from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.validation import brief
 
 
@@ -69,7 +69,7 @@ class RelativeRotation:
         cls,
         blocks: Ints,
         legs: Ints,
-        state: Floats,
+        state: State,
         directors: Floats,
         *,
         weights: Floats,
@@ -81,7 +81,6 @@ class RelativeRotation:
 
         Parameters
         ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
         directors : (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for all.
         blocks, legs, weights, stiffness, deviators, rest_angle : see the class.
         """
@@ -90,7 +89,7 @@ class RelativeRotation:
         rows = np.ascontiguousarray(blocks)
         return cls(rows, legs, weights, stiffness, deviators, rest_angle, tangents, adapted(wanted, tangents))
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _relative_rotation(
@@ -103,17 +102,16 @@ class RelativeRotation:
     def angle_columns(self) -> Ints:
         return self.legs[:, 2]
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same joints with their source frames at `state` (N, 3)."""
         return with_source(self, state)
 
-    def sections(self, state: Floats) -> Floats:
-        """(m, 2, 2, 3) tangent T and normal N of the sections of A and of B at `state` (N, 3).
+    def with_stiffness_of(self, other: "RelativeRotation") -> Self:
+        """The same joints as stiff as others."""
+        return replace(self, stiffness=other.stiffness, deviators=other.deviators)
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def sections(self, state: State) -> Floats:
+        """(m, 2, 2, 3) tangent T and normal N of the sections of A and of B at `state` (N, 3)."""
         moved = self.refreshed(state)
         t, d1 = moved.source_tangents, moved.source_directors
         theta = state[self.blocks[:, self.legs[:, 2]], 0][..., None]
@@ -126,32 +124,22 @@ class RelativeRotation:
             result[:, side, 1] = (weights * m1)[:, of_rod].sum(axis=1)
         return result
 
-    def strains(self, state: Floats) -> Floats:
-        """(m, 3) shear, and tilt about minus A's tangent and across it, at `state` (N, 3) [rad].
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def strains(self, state: State) -> Floats:
+        """(m, 3) shear, and tilt about minus A's tangent and across it, at `state` (N, 3) [rad]."""
         full = self._both_tilts(state)
         of_a, of_b = full[:, 1] + 1j * full[:, 2], full[:, 3] + 1j * full[:, 4]
         tilt = 0.5 * (of_a + of_b * np.exp(-1j * (full[:, 0] + self.rest_angle)))
         return np.column_stack([full[:, 0], tilt.real, tilt.imag])
 
-    def moments(self, state: Floats) -> Floats:
-        """(m, 3) moments of the joint, conjugate to the strains [N m]: about its normal, and two in its plane.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def moments(self, state: State) -> Floats:
+        """(m, 3) moments of the joint, conjugate to the strains [N m]: about its normal, and two in its plane."""
         forces, scrap = self._both_tilts(state), np.empty((5, 5))
         parts = (forces, self.rest_angle, self.stiffness, self.deviators)
         for strain, rest_angle, stiffness, deviators in zip(*parts, strict=True):
             _respond(strain.copy(), rest_angle, stiffness, deviators, strain, scrap)
         return forces[:, :3] * [1.0, 2.0, 2.0]  # B's half of the tilt moment is the same, by B's axes
 
-    def _both_tilts(self, state: Floats) -> Floats:
+    def _both_tilts(self, state: State) -> Floats:
         """(m, 5) shear, and the tilts eA and eB [rad]."""
         (ta, na), (tb, nb_) = self.sections(state).transpose(1, 2, 0, 3)
         normal = na + nb_
@@ -159,6 +147,11 @@ class RelativeRotation:
         shear -= 2 * pi * np.round(shear / (2 * pi))
         lean = cross(nb_, na)
         return np.column_stack([shear, dot(lean, ta), dot(nb_, ta), dot(lean, tb), -dot(na, tb)])
+
+
+def is_elastic(element: Elements) -> TypeGuard[RelativeRotation]:
+    """Whether an energy is that of elastic joints."""
+    return isinstance(element, RelativeRotation)
 
 
 @njit(error_model="numpy")

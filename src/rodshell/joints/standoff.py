@@ -12,7 +12,7 @@ from typing import Self
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 
@@ -36,7 +36,7 @@ class Standoffs:
 
     __repr__ = brief
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         x = state[self.blocks]
         a, b = x[:, 2] - x[:, 4], x[:, 3] - x[:, 5]
@@ -58,7 +58,7 @@ class Standoffs:
             hessians[:] = self.stiffness[:, None, None] * np.einsum("mij,mik->mjk", dg, dg) + curved
         return 0.5 * float(np.vdot(force, gap))
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same: there are no source frames."""
         return self
 

@@ -17,7 +17,7 @@ from typing import Self
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.geometry.frames import adapted
 from rodshell.joints.crossings import (
     RodNodes,
@@ -133,7 +133,7 @@ class Ties:
 
     __repr__ = brief
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         apart = state[self.blocks[:, 0]] - state[self.blocks[:, 1]]
         force = self.stiffness[:, None] * apart
@@ -146,7 +146,7 @@ class Ties:
                 hessians[:, k, k + 3] = hessians[:, k + 3, k] = -self.stiffness
         return 0.5 * float(np.vdot(force, apart))
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same: there are no source frames."""
         return self
 
@@ -176,7 +176,7 @@ class OffsetTie:
 
     __repr__ = brief
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _offset_tie(
@@ -189,7 +189,7 @@ class OffsetTie:
     def angle_columns(self) -> Ints:
         return self.legs[:, 2]
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same ties with their source frames at `state` (N, 3)."""
         return with_source(self, state)
 

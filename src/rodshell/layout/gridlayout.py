@@ -189,10 +189,6 @@ class GridLayout:
         count = self.rods[side]
         return np.asarray(self.offset[1 - side] + (np.arange(count) - (count - 1) / 2) * self.spacing[side])
 
-    def half_length(self) -> float:
-        """Half the length of every rod [m]; infinite where the length is "auto"."""
-        return np.inf if self.length == "auto" else self.length / 2
-
     def middle(self, family: Family) -> float:
         """Material coordinate of the middle of the rods of a family [m]: the layout moves with its offset."""
         return self.offset[0 if family == "u" else 1]

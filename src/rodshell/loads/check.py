@@ -16,17 +16,16 @@ import numpy as np
 from pydantic import Field
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks.bending import require_known_stress, rod_frames
+from rodshell.checks.bending import require_known_stress
 from rodshell.checks.self_weight import self_weight, shown_limit
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.figures import loads as figures
 from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.loads import Governs, Utilisations
-from rodshell.figures.records import Found
+from rodshell.figures.records import Ends, Found
 from rodshell.formfinding import PatchForm, PopUp, pop_up
 from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.popup import Ends
 from rodshell.layout import GridMesh
 from rodshell.loads.bracing import stressed
 from rodshell.loads.combinations import Loads
@@ -159,7 +158,7 @@ def check_shells(
     try:
         for ends, popped in done.items():
             if limits.bending:
-                require_known_stress(stages.rod, twisted=rod_frames(popped.shell) is not None)
+                require_known_stress(stages.rod, twisted=popped.shell.frames is not None)
             structure = _locked(popped, ends, loads, stages)
             braced = structure.braced
             vibrations[ends] = structure.frequencies(loads.stability.modes)

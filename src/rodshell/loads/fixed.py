@@ -4,9 +4,9 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.pipeline import PatchForm
-from rodshell.formfinding.popup import Ends
 from rodshell.loads.check import tributary_of
 from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, SelfWeight
@@ -20,7 +20,6 @@ def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, comb
     Parameters
     ----------
     stages : of a form in one piece, popped up with these ends.
-    ends : how the rods' ends are held.
 
     Returns
     -------

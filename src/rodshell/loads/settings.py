@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 from rodshell.errors import InputError
 from rodshell.quantities import Distance, Factor, Force, Share, SlipMoment, Stiffness, Stress, Value, Whole
 from rodshell.rods.design_strength import DURATIONS, Duration
-from rodshell.rods.joints import Joint, Pin
+from rodshell.rods.joints import Joint
 from rodshell.rods.section import Rod
 from rodshell.schema import Inline, checked
 from rodshell.units import read_quantity, shown
@@ -113,7 +113,7 @@ class LockedJoints:
 
     def require_pins(self, joint: Joint) -> None:
         """Raise InputError where joints of a kind cannot be locked."""
-        if not isinstance(joint, Pin):
+        if not joint.locks:
             raise InputError(
                 f"locked_joints: {joint.name} joints cannot be locked: pins are free about their normal until they are "
                 'tightened: set joint.kind = "pin", or leave locked_joints out'

@@ -27,7 +27,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.checks.bending import VON_MISES, Bending, bending_of
 from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
@@ -178,7 +178,7 @@ class Utilisation:
 
 
 def utilisation(
-    shell: Shell, state: Floats, rod: Rod, *,
+    shell: Shell, state: State, rod: Rod, *,
     forces: Floats, limits: Limits, asked: Strength, duration: Duration, bent: Bending | None = None,
     moments: Floats | None = None, slip_moment: float | None = None,
 ) -> Utilisation:  # fmt: skip
@@ -187,7 +187,6 @@ def utilisation(
     Parameters
     ----------
     shell : with its source frames at the state.
-    state : (N, 3) node positions [m] and twist angles [rad].
     rod : section and material of every rod.
     forces : (e,) axial force of each edge, tension positive [N].
     asked : holes, slip and effective lengths.

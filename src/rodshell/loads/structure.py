@@ -15,7 +15,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.errors import ConvergenceError
 from rodshell.formfinding.popup import PopUp
-from rodshell.joints.relative_rotation import RelativeRotation
+from rodshell.joints.relative_rotation import is_elastic
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.rod_sections import RodSections
@@ -132,9 +132,8 @@ class Structure:
         """
         if not self.locked:
             return np.zeros(0)
-        result, elements = np.zeros(len(self.mesh.grid.crossings)), self.shell_at(found).elements
-        for crossings, element in zip(self.locked, elements[-len(self.locked) :], strict=True):
-            assert isinstance(element, RelativeRotation)
+        result, joints = np.zeros(len(self.mesh.grid.crossings)), [*filter(is_elastic, self.shell_at(found).between)]
+        for crossings, element in zip(self.locked, joints[-len(self.locked) :], strict=True):
             result[crossings] = element.moments(found.state)[:, 0]
         return result
 

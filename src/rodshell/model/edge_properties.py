@@ -18,14 +18,12 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from rodshell.arrays import Floats, Ints
-from rodshell.joints import Joint, Linker
+from rodshell.joints import Joint
 from rodshell.joints.crossings import RodNodes, stencils
 from rodshell.joints.joint import elastic_joints, resists
-from rodshell.joints.relative_rotation import RelativeRotation
+from rodshell.joints.relative_rotation import RelativeRotation, is_elastic
 from rodshell.model.shell import Shell
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements, each_curvature, each_gradient
-from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
+from rodshell.rods.elements import Elements, each_curvature, each_gradient, is_bends
 
 EA, EI1, EI2, GJ, LENGTH = range(5)
 PROPERTIES = 5
@@ -147,18 +145,10 @@ class EdgeProperties:
         return result.ravel()
 
     def _with_stiffness(self, element: Elements, table: Floats, joints: Iterator[RelativeRotation]) -> Elements:
-        if isinstance(element, IsotropicBend):
-            return replace(element, stiffness=self._in_series(table, EI1, len(element.blocks)))
-        if isinstance(element, BendTwist):
-            count = len(element.blocks)
-            bend = np.column_stack([self._in_series(table, kind, count) for kind in (EI1, EI2)])
-            if not element.bend_stiffness.any():  # its bending is another's, see `Shell`
-                bend[:] = 0.0
-            return replace(element, bend_stiffness=bend, twist_stiffness=self._in_series(table, GJ, count))
-        if isinstance(element, RelativeRotation):
-            now = next(joints)
-            return replace(element, stiffness=now.stiffness, deviators=now.deviators)
-        return element
+        if is_bends(element):
+            per_length = [self._in_series(table, kind, len(element.blocks)) for kind in (EI1, EI2, GJ)]
+            return element.with_stiffness(np.column_stack(per_length))
+        return element.with_stiffness_of(next(joints)) if is_elastic(element) else element
 
     def _in_series(self, table: Floats, kind: int, count: int) -> Floats:
         """(count,) stiffness of the half edges at the first bends [N m]."""
@@ -168,18 +158,9 @@ class EdgeProperties:
 
     def _parts(self) -> Iterator[tuple[Elements, csr_array]]:
         """Energies with one stiffness each, and the derivatives (b, 5e) of the logarithms of their stiffnesses."""
-        for element in self.shell.elements:
-            if isinstance(element, IsotropicBend):
-                kinds: tuple[int, ...] = (EI1,)
-            elif isinstance(element, IsotropicBendTwist):
-                kinds = (EI1, GJ)
-            elif isinstance(element, BendTwist):
-                kinds = (EI1, EI2, GJ)
-            else:
-                continue
-            parts: tuple[Elements, ...] = element.parts
-            for part, kind in zip(parts, kinds, strict=True):
-                yield part, self._by_properties(kind, len(element.blocks))
+        for element in filter(is_bends, self.shell.elements):
+            for part, modulus in zip(element.parts, element.moduli, strict=True):
+                yield part, self._by_properties(EI1 + modulus, len(element.blocks))
 
     def _by_properties(self, kind: int, count: int) -> csr_array:
         half, before, after = 0.5 * self.table[:, LENGTH] / self.table[:, kind], self.before[:count], self.after[:count]
@@ -217,29 +198,23 @@ class EdgeProperties:
         return np.asarray(length / compliance)
 
     @property
-    def _of_crossings(self) -> tuple[Ints, list[Joint]]:
-        """The crossings whose joints are not linkers, and these joints."""
-        count = len(self.shell.mesh.grid.crossings)
-        each = self.joint if isinstance(self.joint, Sequence) else (self.joint,) * count
-        kept = [k for k, joint in enumerate(each) if not isinstance(joint, Linker)]
-        return np.array(kept, dtype=np.intp), [each[k] for k in kept]
+    def _every_joint(self) -> Sequence[Joint]:
+        """That of each crossing."""
+        return self.joint if isinstance(self.joint, Sequence) else (self.joint,) * len(self.shell.mesh.grid.crossings)
 
     def _joints(self, at_nodes: Floats) -> tuple[RelativeRotation, ...]:
         """The elastic joints of rods with these stiffnesses (k, 3) at their nodes."""
-        if not any(isinstance(element, RelativeRotation) for element in self.shell.elements):
-            return ()
-        crossings, joints = self._of_crossings
-        return elastic_joints(self._rod_nodes, crossings, joints, at_nodes, len(self.shell.like))  # type: ignore[arg-type]
+        joints = self._every_joint
+        return elastic_joints(self._rod_nodes, np.arange(len(joints)), joints, at_nodes, len(self.shell.like))
 
     def _of_joints(self, evaluate: Callable[[RelativeRotation], Floats]) -> Iterator[tuple[Floats, Ints, csr_array]]:
         """Derivatives (m, ..) of what is evaluated of each joint by the logarithm of one stiffness of one of its
         sections; the joints' blocks; and the derivatives (m, 5e) of that logarithm by those of the properties."""
-        present = [element for element in self.shell.elements if isinstance(element, RelativeRotation)]
+        present = [*filter(is_elastic, self.shell.elements)]
         if not present:
             return
         nodes, at_nodes = self._rod_nodes, self._at_nodes(self.table)
-        crossings, joints = self._of_crossings
-        pairs = nodes.at_crossings[[k for k, joint in zip(crossings, joints, strict=True) if resists(joint)]]  # type: ignore[arg-type]
+        pairs = nodes.at_crossings[[resists(joint) for joint in self._every_joint]]
         rows = [pairs[stencil.members] for stencil in stencils(nodes, pairs)]
         for side in range(2):
             for kind in range(3):
@@ -250,10 +225,7 @@ class EdgeProperties:
                     probed.append(self._joints(changed))
                 by_edge = self._of_nodes(kind, at_nodes)
                 for element, at, ahead, behind in zip(present, rows, *probed, strict=True):
-                    values = [
-                        evaluate(replace(element, stiffness=there.stiffness, deviators=there.deviators))
-                        for there in (ahead, behind)
-                    ]
+                    values = [evaluate(element.with_stiffness_of(there)) for there in (ahead, behind)]
                     yield (values[0] - values[1]) / (2.0 * PROBE), element.blocks, by_edge[at[:, side]]
 
     def _of_nodes(self, kind: int, at_nodes: Floats) -> csr_array:

@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csc_matrix
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
 from rodshell.model.assembly import Freedom
 from rodshell.model.potential import Potential
 from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements, Stretch
+from rodshell.rods.bend_twist import BendTwist, frames_among
+from rodshell.rods.elements import BendElements, Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.validation import brief, described, direction, finite, flag, short, vector
 
@@ -72,7 +72,7 @@ class ElasticRod:
 
     rest: Floats
     closed: bool
-    elements: tuple[Elements, ...]
+    elements: tuple[BendElements, ...]
     stretch: Stretch
     mass: Floats
     bend_lengths: Floats
@@ -127,7 +127,7 @@ class ElasticRod:
         rate = finite("natural_twist", natural_twist, int(bends.like.max()) + 1)[bends.like]
         straight = isinstance(natural, str) and natural == "straight"
         free_spin = straight and bool((bends.stiffness[:, 0] == bends.stiffness[:, 1]).all())
-        elements: Elements
+        elements: BendElements
         if twist:
             elements = _bend_twist(line, bends, line.directors(director), natural, rate, isotropic=free_spin)
         elif closed or not free_spin or rate.any():
@@ -172,14 +172,13 @@ class ElasticRod:
     @property
     def bend_energy(self) -> float:
         """EI/L [J] of the softer direction, the mean along the rod: about the energy of a bend by a radian."""
-        bends = self.elements[0]
-        stiffness = bends.stiffness if isinstance(bends, IsotropicBend) else self._bend_twist.bend_stiffness.min(axis=1)
+        stiffness = self.elements[0].bend_stiffness.min(axis=1)
         return float((stiffness * self.bend_lengths).mean() / self.length)
 
     @property
     def twists(self) -> bool:
         """Whether the rod has twist angles."""
-        return isinstance(self.elements[0], BendTwist)
+        return bool(self.elements[0].angle_columns)
 
     @property
     def nodes(self) -> slice:
@@ -263,46 +262,25 @@ class ElasticRod:
         """The same rod with its source frames moved to `state`: no strain and no angle changes."""
         return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
 
-    def reference_directors(self, state: Floats) -> Floats:
-        """(edges + clamps, 3) first reference director of each edge, then of each ghost edge, at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def reference_directors(self, state: State) -> Floats:
+        """(edges + clamps, 3) first reference director of each edge, then of each ghost edge, at `state` (N, 3)."""
         bends = self._bend_twist.refreshed(state)
         directors = np.empty((self.block_count, 3))
         for side in range(2):
             directors[bends.blocks[:, 1 + 2 * side]] = bends.source_directors[:, side]
         return np.vstack([directors[self.angles], directors[self.ghost_angles]])
 
-    def material_frames(self, state: Floats) -> Floats:
-        """(edges, 3, 3) rows m1, m2, t of each edge at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def material_frames(self, state: State) -> Floats:
+        """(edges, 3, 3) rows m1, m2, t of each edge at `state` (N, 3)."""
         edge = state[self.stretch.blocks[:, 1]] - state[self.stretch.blocks[:, 0]]
         d1, t = self.reference_directors(state)[: self.edge_count], unit(edge)
         theta = state[self.angles, :1]
         m1 = np.cos(theta) * d1 + np.sin(theta) * cross(t, d1)
         return np.stack([m1, cross(t, m1), t], axis=1)
 
-    def strains(self, state: Floats) -> RodStrains:
-        """Strains at `state` (N, 3); without twist angles there are no directors: curvatures are (size, 0).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
-        bends = self.elements[0]
-        if isinstance(bends, IsotropicBend):
-            curvature = bends.curvatures(state)
-            strains = np.column_stack([curvature, 0 * curvature, 0 * curvature])
-        else:
-            strains = self._bend_twist.strains(state)
-        strains = strains / self.bend_lengths[:, None]
+    def strains(self, state: State) -> RodStrains:
+        """Strains at `state` (N, 3); without twist angles there are no directors: curvatures are (size, 0)."""
+        strains = self.elements[0].strains(state) / self.bend_lengths[:, None]
         return RodStrains(self.stretch.strains(state), strains[:, :2], strains[:, 2])
 
     def energy(self, state: Floats) -> float:
@@ -313,12 +291,11 @@ class ElasticRod:
         """(N, 3) gradient of the energy at `state` (N, 3) [N, for angles N m]."""
         return self._potential.gradient(state)
 
-    def hessian(self, state: Floats, freedom: Freedom | None = None) -> csc_matrix:
+    def hessian(self, state: State, freedom: Freedom | None = None) -> csc_matrix:
         """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's.
 
         Parameters
         ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
         freedom : free directions of the blocks.
         """
         return self._potential.matrix(state, self.freedom() if freedom is None else freedom)
@@ -340,8 +317,7 @@ class ElasticRod:
 
     @property
     def _bend_twist(self) -> BendTwist:
-        bends = self.elements[0]
-        if not isinstance(bends, BendTwist):
+        if (bends := frames_among(self.elements)) is None:
             raise InputError("this rod has no frames: build it with twist=True")
         return bends
 

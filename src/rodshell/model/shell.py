@@ -10,7 +10,7 @@ mass of that block is divided equally among its copies, so that none is counted 
 Eccentric joints lay the rods in two layers, whose mesh gives each rod its own nodes (`GridMesh.in_layers`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle, unit
 from rodshell.joints import (
@@ -27,7 +27,6 @@ from rodshell.joints import (
     ExplicitPenalty,
     ImplicitPenalty,
     Joint,
-    Linker,
     SharedDofs,
     Ties,
     require_joint,
@@ -39,16 +38,17 @@ from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
 from rodshell.model.potential import Potential
 from rodshell.model.rod_sections import RodSections
-from rodshell.rods.bend_twist import BendTwist
+from rodshell.rods.bend_twist import BendTwist, frames_among
 from rodshell.rods.elements import Elements, Stretch, turned, with_frames
 from rodshell.rods.isotropic import IsotropicBend
-from rodshell.rods.joints import Elastic
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import CLAMPED, PINNED
 from rodshell.validation import flag, instance
 
 UP = (0.0, 0.0, 1.0)
 OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
 ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
+Direction = tuple[float, float, float]
 Item = TypeVar("Item")
 COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
 
@@ -72,6 +72,8 @@ class Shell:
     edge_mass : (e,) mass of each edge [kg].
     edge_inertia : (e,) moment of inertia of each edge about its tangent [kg m2].
     joint_mass : (c,) mass of each crossing's joint [kg].
+    springs : energies of the supports, which act on the rods' ends.
+    slides : orthonormal directions along which rod ends may move, by the number of the end; others are held.
     turn : (2, 2) how the flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
 
@@ -89,10 +91,12 @@ class Shell:
     edge_mass: Floats
     edge_inertia: Floats
     joint_mass: Floats
+    springs: tuple[Elements, ...] = ()
+    slides: Mapping[int, Sequence[Direction]] = field(default_factory=dict)
     turn: Floats = field(default_factory=lambda: np.eye(2))
 
     def __repr__(self) -> str:
-        ends = "clamped" if len(self.ghosts) else "pinned"
+        ends = CLAMPED if len(self.ghosts) else PINNED
         coupled = "" if isinstance(self.coupling, SharedDofs) else f", {self.coupling.name} coupling"
         return f"Shell({self.node_count} nodes, {len(self.stretch.blocks)} edges, {ends}{coupled})"
 
@@ -135,7 +139,7 @@ class Shell:
     @property
     def elements(self) -> tuple[Elements, ...]:
         """All energies but the stretch, those of explicit ties included: an equilibrium is the same."""
-        return (*self.within, *self.between)
+        return (*self.within, *self.between, *self.springs)
 
     @property
     def energies(self) -> Potential:
@@ -146,6 +150,16 @@ class Shell:
     def explicit(self) -> tuple[Elements, ...]:
         """The elements whose forces a motion freezes at the start of each step."""
         return self.between if isinstance(self.coupling, ExplicitPenalty) else ()
+
+    @cached_property
+    def frames(self) -> BendTwist | None:
+        """The elements that carry the rods' material frames; None where rods have none."""
+        return frames_among(self.within)
+
+    @property
+    def yields(self) -> bool:
+        """Whether its supports let the rods' ends move."""
+        return bool(self.slides or self.springs)
 
     @property
     def first_angle(self) -> int:
@@ -204,13 +218,8 @@ class Shell:
             self._turn_directors(state, normals)
         return state
 
-    def positions(self, state: Floats) -> Floats:
-        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def positions(self, state: State) -> Floats:
+        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean."""
         if self.node_count == self.mesh.node_count:  # nodes that rods share
             return state[: self.node_count].copy()
         result, visits = np.zeros((self.mesh.node_count, 3)), np.zeros(self.mesh.node_count)
@@ -231,10 +240,10 @@ class Shell:
 
         Parameters
         ----------
-        elements : those within rods and linkers, then those between them.
+        elements : those within rods and linkers, those between them, those of supports.
         """
-        count = len(self.within)
-        return replace(self, within=elements[:count], between=elements[count:])
+        first, last = len(self.within), len(self.within) + len(self.between)
+        return replace(self, within=elements[:first], between=elements[first:last], springs=elements[last:])
 
     def turned(self, turn: Floats) -> "Shell":
         """The same shell of a flat grid that is turned in its plane, so that no edge of a shell that lies the other way
@@ -257,8 +266,11 @@ class Shell:
         return self.with_elements(tuple(map(with_frames, self.elements, elements)))
 
     def held_ends(self) -> Freedom:
-        """As `freedom`, with every rod end held in place."""
-        return self.freedom().with_directions(self.ends)
+        """As `freedom`, with every rod end held in place, or along all but its directions."""
+        held = self.freedom().with_directions(self.ends)
+        for end, directions in self.slides.items():
+            held = held.with_directions(self.ends[[end]], *directions)
+        return held
 
     def _turn_directors(self, state: Floats, normals: Floats) -> None:
         """Set the twist angles so that the first directors are as near to the normals as they can be."""
@@ -401,18 +413,14 @@ class _Builder:
 
     def _elastic(self) -> tuple[Elements, ...]:
         """Joints other than linkers."""
-        elastic = [isinstance(joint, Elastic) and joint.turns_frames for joint in self.joints]
-        if not any(elastic):
-            return ()
-        crossings = np.flatnonzero(np.array(elastic)[self.joint_of])
-        joints = [self.joints[kind] for kind in self.joint_of[crossings].tolist()]
-        return elastic_joints(self.rod_nodes, crossings, joints, self.stiffness, self.size)
+        joints = [self.joints[kind] for kind in self.joint_of.tolist()]
+        return elastic_joints(self.rod_nodes, np.arange(len(joints)), joints, self.stiffness, self.size)
 
     def _linkers(self) -> tuple[list[Elements], list[Elements]]:
         """Linkers, and the ties of those with their own unknowns, whose blocks are added here."""
         linkers, ties = list[Elements](), list[Elements]()
         for kind, joint in enumerate(self.joints):
-            if not isinstance(joint, Linker):
+            if not joint.corners:
                 continue
             crossings = np.flatnonzero(self.joint_of == kind)
             corners = Corners.of(self.rod_nodes, crossings, joint.corners)
@@ -445,7 +453,7 @@ class _Builder:
         if not self.apart:
             return []
         eccentricity = self._of_joints(lambda joint: joint.eccentricity)
-        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not isinstance(joint, Linker), bool)
+        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not joint.corners, bool)
         pairs = self.rod_nodes.blocks[self.rod_nodes.at_crossings[centric]]
         ties = [_ties(pairs, self._penalties()[0])] if centric.any() else []
         return [*ties, *offset_ties(self.rod_nodes, eccentricity, self._offset_stiffness(), self.size)]

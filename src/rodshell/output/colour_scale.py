@@ -1,5 +1,6 @@
 """Colours that stand for numbers: of rods in a picture (gap, stress, height), and of the trials of a search."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from html import escape
@@ -13,7 +14,7 @@ from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import number
 from rodshell.results.archive import Archive, made_once
-from rodshell.results.states import SHELLS
+from rodshell.results.states import is_shell, shells_among
 from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
 
@@ -26,9 +27,6 @@ STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
 HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
 STAGES = "history_stress"
-STRESSES = ("stress_pinned", "stress_clamped", STAGES)
-CURVATURES = ("curvature_pinned", "curvature_clamped", "history_curvature")
-FORCES = ("force_pinned", "force_clamped")
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
 
 
@@ -122,7 +120,7 @@ def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
 @made_once
 def _largest_of_all_gaps(archive: Archive) -> float:
     """The largest gap [mm], without its sign, of all shapes that have one."""
-    shapes = [shape_of(archive, name) for name in SHELLS if name in archive.states]
+    shapes = [shape_of(archive, name) for name in shells_among(archive.states)]
     return max((abs(largest_gap(archive, shape)[0]) for shape in shapes if shape.gap is not None), default=0.0)
 
 
@@ -136,13 +134,20 @@ def length_unit(largest: float) -> tuple[float, str]:
     return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
 
 
+def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, Floats]]:
+    """The arrays of stress, curvature or force in the shapes on all supports, and in the stages of the deployment."""
+    for name, values in archive.states.items():
+        if name.startswith(f"{what}_") or name == f"history_{what}":
+            yield name, values
+
+
 def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     """Utilisation where the strength is known, else the stress in a unit of its size."""
     assert shape.stress is not None
-    bending, final = archive.results.bending, shape.name in SHELLS
+    bending, final = archive.results.bending, is_shell(shape.name)
     strength = bending.strength if bending else None
     erection = (bending.erection_strength if bending else None) or strength
-    known = [(name, float(np.max(values))) for name, values in archive.states.items() if name in STRESSES]
+    known = [(name, float(np.max(values))) for name, values in _of_all_shapes(archive, "stress")]
     if strength and erection:
         unit, caption = (strength if final else erection) / 100, "utilisation in %"
         if strength != erection:
@@ -159,7 +164,7 @@ def _stress_scale(archive: Archive, shape: Shape) -> Scale:
 
 def _curvature_scale(archive: Archive, shape: Shape) -> Scale:
     assert shape.curvature is not None
-    top = max(float(np.max(values)) for name, values in archive.states.items() if name in CURVATURES)
+    top = max(float(np.max(values)) for _, values in _of_all_shapes(archive, "curvature"))
     limit = _rounded_up(max(top, FINEST))
     caption = f"curvature in 1/m, here up to {float(np.max(shape.curvature)):.3g}"
     return Scale(np.asarray(shape.curvature, dtype=float), 0.0, limit, STRESS, caption)
@@ -168,7 +173,7 @@ def _curvature_scale(archive: Archive, shape: Shape) -> Scale:
 def _force_scale(archive: Archive, shape: Shape) -> Scale:
     """Normal forces; signed as gaps are, so that rods without a force are drawn in ink."""
     assert shape.force is not None
-    known = [values for name, values in archive.states.items() if name in FORCES]
+    known = [values for _, values in _of_all_shapes(archive, "force")]
     top = max(float(np.abs(values).max()) for values in known)
     unit, name = (1e3, "kN") if top >= 1e3 else (1.0, "N") if top >= 1.0 else (1e-3, "mN")
     limit = _rounded_up(max(top / unit, FINEST))

@@ -14,7 +14,7 @@ from rodshell.errors import InputError, OutOfTimeError, OutputWarning
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results.archive import Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
-from rodshell.results.states import SHELLS
+from rodshell.results.states import DRAPED, POPPED, shells_among
 from rodshell.validation import described, flag, instance, mapping
 
 if TYPE_CHECKING:
@@ -310,7 +310,7 @@ def _report(content: Content) -> Files:
 
 
 def _shells(archive: Archive) -> list[str]:
-    return [state for state in SHELLS if state in archive.states]
+    return shells_among(archive.states)
 
 
 def _meshed(archive: Archive) -> bool:
@@ -326,23 +326,25 @@ DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another pac
 
 _DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
 _SCHEDULES = ("rods", "joints", "supports", "foundations", "bracing", "stock", "sections", "seams", "end_paths")
-_STAGES = ("flat", "stage_[0-9]*", "popped_pinned")
+_STAGES = ("flat", "stage_[0-9]*", f"{POPPED}*")
+
+_SHELLS = (DRAPED, f"{POPPED}*")
 
 NAMES: dict[str, list[str]] = {
     "dxf": [f"drawings/{name}.dxf" for name in _DRAWINGS],
     "svg": [f"drawings/{name}.svg" for name in _DRAWINGS],
     "pdf": ["drawings/drawings.pdf"],
     "csv": [f"schedule/{name}.csv" for name in _SCHEDULES],
-    "obj": [f"model/{state}.obj" for state in SHELLS],
-    "gltf": [f"model/{state}.glb" for state in SHELLS],
+    "obj": [f"model/{state}.obj" for state in _SHELLS],
+    "gltf": [f"model/{state}.glb" for state in _SHELLS],
     "vtp": [
-        *(f"model/{state}.vtp" for state in SHELLS), "model/pop_up.pvd",
+        *(f"model/{state}.vtp" for state in _SHELLS), "model/pop_up.pvd",
         *(f"model/pop_up/{state}.vtp" for state in _STAGES),
     ],
-    "compas": [f"model/{state}.json" for state in SHELLS],
+    "compas": [f"model/{state}.json" for state in _SHELLS],
     "3dm": ["model/rodshell.3dm"],
     "png": [
-        *(f"pictures/{state}{what}.png" for state in ("flat", *SHELLS) for what in ("", "-stress")),
+        *(f"pictures/{state}{what}.png" for state in ("flat", *_SHELLS) for what in ("", "-stress")),
         "pictures/pop_up.png",
     ],
     "report": ["report.html"],

@@ -13,14 +13,10 @@ from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
 from rodshell.results.archive import Archive, made_once
 from rodshell.results.laths import laths_on
-from rodshell.results.states import BENT, GAPS, SHELLS
+from rodshell.results.states import BENT, DRAPED, GAP, POPPED, shells_among
+from rodshell.rods.supports import SUPPORTS
 
-CAPTIONS = {
-    "flat": "Flat, as cut and laid out",
-    "draped": "Draped on the target",
-    "popped_pinned": "Popped up, pinned ends (free to turn)",
-    "popped_clamped": "Popped up, clamped ends (directions held)",
-}
+CAPTIONS = {"flat": "Flat, as cut and laid out", DRAPED: "Draped on the target"}
 STAGE = "stage_"
 FEWEST = 3  # ends of an outline
 STRAIGHT = 1e-6  # of a rod's length, which it leaves its chord by: it is straight
@@ -237,7 +233,7 @@ def shape_names(archive: Archive) -> list[str]:
     """All shapes, in the order of the deployment."""
     stages = [f"{STAGE}{k}" for k in range(1, len(archive.states.get("history_share", ())) - 1)]
     states, flat = archive.states, ("flat",) if lies_flat(archive) else ()
-    return [name for name in (*flat, *stages, *SHELLS) if name.startswith(STAGE) or name in states]
+    return [name for name in (*flat, *stages, *shells_among(states)) if name.startswith(STAGE) or name in states]
 
 
 def lies_flat(archive: Archive) -> bool:
@@ -251,11 +247,18 @@ def caption_of(archive: Archive, state: str) -> str:
 
     Parameters
     ----------
-    state : a key of `CAPTIONS`.
+    state : "flat", or one in space.
     """
     if archive.is_lost(state):
-        return f"Not popped up, {state.removeprefix('popped_')} ends: where the computation stopped"
-    return CAPTIONS[state]
+        return f"Not popped up, {state.removeprefix(POPPED)} ends: where the computation stopped"
+    return CAPTIONS.get(state) or f"Popped up, {supported(state)}"
+
+
+def supported(state: str, *more: str) -> str:
+    """With which ends a popped-up state is, with notes on them."""
+    name = state.removeprefix(POPPED)
+    notes = "; ".join([*([SUPPORTS[name].note] if name in SUPPORTS else []), *more])
+    return f"{name} ends{f' ({notes})' if notes else ''}"
 
 
 def shape_of(archive: Archive, name: str) -> Shape:
@@ -277,9 +280,9 @@ def shape_of(archive: Archive, name: str) -> Shape:
         caption = f"Deployment at {100 * states['history_share'][k]:.0f} %"
         curvature, stress = (states[f"history_{what}"][k] if f"history_{what}" in states else None for what in BENT)
         return Shape(name, caption, np.asarray(states["history"][k], dtype=float), None, stress, curvature)
-    ends = name.removeprefix("popped_")
+    ends = name.removeprefix(POPPED)
     curvature, stress = (states.get(f"{what}_{ends}") for what in BENT)
-    gap = states.get(GAPS.get(name, ""))
+    gap = states.get(GAP + ends)
     force = states.get(f"force_{ends}")
     return Shape(name, caption_of(archive, name), np.asarray(states[name], dtype=float), gap, stress, curvature, force)
 

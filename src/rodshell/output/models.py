@@ -78,7 +78,7 @@ def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
     if not stages:
         return
     shares = archive.states["history_share"]
-    last = "popped_pinned"
+    last = archive.deployed
     entries = []
     for share, name in zip(shares.tolist(), ["flat", *stages, last], strict=True):
         yield f"pop_up/{name}.vtp", vtp_text(archive, name)

@@ -24,8 +24,9 @@ from rodshell.output.grid import (
 )
 from rodshell.output.svg import number, picture_document
 from rodshell.results.archive import Archive, made_once
-from rodshell.results.states import SHELLS
+from rodshell.results.states import DRAPED, POPPED, is_shell, shells_among
 from rodshell.results.wording import MINUS, UNDER, nice_ticks, shown_length
+from rodshell.rods.supports import clamped_among
 
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(27.0)  # of the eye
 _C, _S, _CE, _SE = np.cos(AZIMUTH), np.sin(AZIMUTH), np.cos(ELEVATION), np.sin(ELEVATION)
@@ -216,10 +217,9 @@ def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
 
     Parameters
     ----------
-    ends : end condition of the shell.
     state : name of the mode's array (n, 3).
     """
-    shape, pencil = shape_of(archive, f"popped_{ends}"), Pencil()
+    shape, pencil = shape_of(archive, POPPED + ends), Pencil()
     motion = archive.states[state]
     size = MODE * float(np.ptp(shape.positions[:, 0]))
     moved = replace(shape, positions=shape.positions + size * motion / max(float(np.abs(motion).max()), 1e-300))
@@ -238,7 +238,7 @@ def deployment_picture(archive: Archive) -> Drawing:
     archive : one that holds stages of a deployment.
     """
     known = shape_names(archive)
-    names = [name for name in known if name.startswith(STAGE) or name in ("flat", "popped_pinned")]
+    names = [name for name in known if name.startswith(STAGE) or name in ("flat", archive.deployed)]
     chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
     view, rods, whole, last = _view_of_all(archive), rods_of(archive), Pencil(), None
     width = WIDTH + 2 * SIDE
@@ -276,17 +276,17 @@ def _view(archive: Archive, shape: Shape) -> View:
     """One view for all shapes in space, and one for the flat grid; stages spread further than the final shell."""
     if shape.flat:
         return View.of(shape.positions, WIDTH)
-    return _view_of_shells(archive) if shape.name in SHELLS else _view_of_all(archive)
+    return _view_of_shells(archive) if is_shell(shape.name) else _view_of_all(archive)
 
 
 @made_once
 def _view_of_shells(archive: Archive) -> View:
-    return View.of(np.concatenate([archive.states[name] for name in SHELLS if name in archive.states]), WIDTH)
+    return View.of(np.concatenate([archive.states[name] for name in shells_among(archive.states)]), WIDTH)
 
 
 @made_once
 def _view_of_all(archive: Archive) -> View:
-    shells = [archive.states[name] for name in SHELLS if name in archive.states]
+    shells = [archive.states[name] for name in shells_among(archive.states)]
     return View.of(np.concatenate([*shells, *archive.states["history"]]), WIDTH)
 
 
@@ -391,10 +391,10 @@ def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[GridRod]
 
 def _supports(pencil: Pencil, view: View, ends: Floats, state: str, count: int) -> None:
     """Some of a shell's `count` rod ends: rings where they turn freely, discs where they are clamped."""
-    if state in ("flat", "draped"):
+    if state in ("flat", DRAPED):
         return
     radius = float(np.clip(200 / count, 0.6, 2.6))
-    fill = INK if state == "popped_clamped" else PAPER
+    fill = INK if clamped_among([state.removeprefix(POPPED)]) else PAPER
     for at in view.project(ends):
         _dot(pencil, at, radius, Pen(INK, 0.4 * radius, fill=fill))
 

@@ -11,14 +11,14 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from rodshell.figures.checks import Clearance, Reactions
+from rodshell.figures.checks import OTHER_SHAPES, Clearance, Reactions
 from rodshell.figures.fabrication import Stock
 from rodshell.figures.form import Agreement, Drape, Gate, PopUp
 from rodshell.figures.records import Ends, Record
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
-from rodshell.output.grid import CAPTIONS, caption_of, shape_names
+from rodshell.output.grid import caption_of, shape_names
 from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
 from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
@@ -30,10 +30,11 @@ from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
 from rodshell.results.laths import laths_text
-from rodshell.results.states import SHELLS
-from rodshell.results.strength_used import ENDS, by_design_strength
+from rodshell.results.states import is_shell, shells_among
+from rodshell.results.strength_used import by_design_strength
 from rodshell.results.verdict import facts, unknown_below
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
+from rodshell.rods.supports import finals_first
 from rodshell.units import places_text
 
 IN_PAGE = ("supports", "elevations", "erection")
@@ -68,7 +69,8 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
     results, tables = archive.results, _tables(archive)
-    states = [name for name in shape_names(archive) if name in CAPTIONS and "rod_nodes" in archive.states]
+    shown_as = ("flat", *shells_among(archive.states))
+    states = [name for name in shape_names(archive) if name in shown_as and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
         name=archive.name,
         note=NOTE,
@@ -82,7 +84,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         supports=supports_table(results),
         checks=checks_table(results),
         pictures=[(caption_of(archive, state), shown(picture_svg(archive, state))) for state in states],
-        one_scale=sum(state in SHELLS for state in states) > 1,
+        one_scale=sum(map(is_shell, states)) > 1,
         loads=loads_page(archive),
         figures=key_figures(results, plan),
         levels=levels_table(results),
@@ -243,7 +245,7 @@ _NET_DEVIATION: tuple[Entry, ...] = (
 
 def supports_table(results: Results) -> dict[str, Any] | None:
     """Both end conditions side by side: `ends` and `rows` of (title, a value for each of the ends)."""
-    ends = [end for end in ENDS if end in results.agreement or end in results.pop_up]
+    ends = finals_first({**results.pop_up, **results.agreement})
     rounding = rounding_of(results)
     gaps = [results.agreement.get(end) or Agreement() for end in ends]
     rows = _side_by_side(_AGREEMENT, gaps, rounding)
@@ -284,7 +286,8 @@ def checks_table(results: Results) -> dict[str, Any] | None:
     shapes = results.bending.shapes() if results.bending else {}
     unknown, rounding = unknown_below(results), rounding_of(results)
     stages = "deployment" if "deployment" in shapes else "pop_up"  # the second with the final shape
-    columns = [shape for shape in (*ENDS, stages) if shape in shapes and (shape in ENDS or unknown < 1)]
+    columns = finals_first(shape for shape in shapes if shape not in OTHER_SHAPES)
+    columns += [stages] * (stages in shapes and unknown < 1)
     rows = _side_by_side(_BENDING, [shapes[column] for column in columns], rounding)
     rows = [row for title, values in rows for row in _with_strength(results, columns, title, values)]
     met = results.contact
@@ -304,7 +307,7 @@ def _with_strength(results: Results, columns: Sequence[str], title: str, values:
         return [(title, values)]
     design = "design " if by_design_strength(results) else ""
     whose = f"{bending.strength_of}'s {design}strength" if bending.strength_of else f"the given {design}strength"
-    strengths = [bending.strength if column in ENDS else bending.erection_strength for column in columns]
+    strengths = [bending.erection_strength if column in OTHER_SHAPES else bending.strength for column in columns]
     shown = [_shown(wording.stress, strength, rounding_of(results)) for strength in strengths]
     return [(title.replace("the strength", whose), values), ("\N{EN DASH} which is", shown)]
 

@@ -21,8 +21,9 @@ from rodshell.geometry.frames import unit
 from rodshell.output.grid import GridRod, joints_of, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
-from rodshell.results.strength_used import ENDS
+from rodshell.results.states import POPPED
 from rodshell.results.wording import FINEST, Rounding, rounding_of
+from rodshell.rods.supports import finals_first
 
 Rows = list[list[str]]
 Table = tuple[list[str], Rows]
@@ -211,8 +212,7 @@ _NOT_BRIEF = {"rod_a", "rod_b", "flat_x_mm", "flat_y_mm", "final_state", "scisso
 
 def _joint_loads(archive: Archive, final: str | None) -> dict[tuple[str, str], dict[str, str]]:
     """By the two rods: what the joint carries, as the second rod feels it."""
-    ends = next((ends for ends in ENDS if final == f"popped_{ends}"), None)
-    loads = archive.results.joint_loads.get(ends, ()) if ends else ()
+    loads = archive.results.joint_loads.get((final or "").removeprefix(POPPED), ())
     found = dict[tuple[str, str], dict[str, str]]()
     for load in loads:
         force = None if load.force is None else float(np.linalg.norm(np.array(load.force, dtype=float)))
@@ -259,7 +259,7 @@ def seam_meetings(results: Results) -> Iterator[tuple[str, Meeting]]:
 def seams_table(archive: Archive) -> Table:
     """One row a meeting: the two rod ends (0 start, 1 end), their place, and the sum of both rods' support forces."""
     seams, mm = archive.results.seams, rounding_of(archive.results).mm
-    ends = [end for end in ENDS if all(end in seam.forces for seam in seams)]
+    ends = [end for end in finals_first(seams[0].forces if seams else ()) if all(end in seam.forces for seam in seams)]
     columns = ["meeting", "first_end", "second_end", "x_mm", "y_mm", "z_mm"]
     columns += [f"{end}_f{axis}_N" for end in ends for axis in "xyz"]
     rows = [[number, *meeting.ends, *map(mm, meeting.point)] for number, meeting in seam_meetings(archive.results)]

@@ -20,6 +20,7 @@ from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, 
 from rodshell.paper.genetic_records import WINDOW, History, stored
 from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
 from rodshell.progress import Progress, silent
+from rodshell.rods.supports import PINNED
 
 SEED = 1
 SEARCHES = Path("out") / "genetic-searches"
@@ -212,7 +213,7 @@ def compare(case: Case, history: History) -> Comparison:
     popped = Design.of(direct).pop_up(history.variables)
     best = agreement(popped, case.target) if popped is not None and popped.report.stable else None
     apart = np.linalg.norm(history.footprint - direct.footprint.points, axis=1)
-    return Comparison(case, history, direct.agreement["pinned"], best, apart)
+    return Comparison(case, history, direct.agreement[PINNED.name], best, apart)
 
 
 def convergence_svg(comparisons: Sequence[Comparison]) -> str:
@@ -232,7 +233,7 @@ def convergence_svg(comparisons: Sequence[Comparison]) -> str:
 
 
 def _direct(case: Case) -> PatchForm:
-    return find_stages(case.target, case.layout, ROD, ends=("pinned",))
+    return find_stages(case.target, case.layout, ROD, ends=PINNED)
 
 
 def _shape(gap: Agreement | None) -> tuple[str, str]:

@@ -27,6 +27,7 @@ from rodshell.layout.mesh import CROWDED
 from rodshell.paper.figure import ROD
 from rodshell.paper.genetic_records import GAIN, Evaluate, Generation, Judged, StoredValues, gain
 from rodshell.progress import Progress
+from rodshell.rods.supports import PINNED
 from rodshell.sweeps.asktell import AskTell
 from rodshell.targets import Target
 
@@ -122,7 +123,7 @@ class Design:
 
         try:
             return pop_up(
-                footprint, self.boundary, ROD, ends="pinned", start="flat", most_factorizations=NEVER_REACHED,
+                footprint, self.boundary, ROD, ends=PINNED, start="flat", most_factorizations=NEVER_REACHED,
                 progress=count_iteration,
             )  # fmt: skip
         except _OutOfPatience:

@@ -13,9 +13,9 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
-from rodshell.formfinding.popup import Ends
 from rodshell.progress import Progress, silent
 from rodshell.refining.gates import GATES, LARGEST_ERROR, SPAN_ERROR, Gates, gates, span_lengths, worst_with_errors
 from rodshell.refining.gauss_newton import Step

@@ -15,6 +15,8 @@ from rodshell.refining.length_families import FIRST, MOST, usual_span
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
+from rodshell.rods.supports import CLAMPED
+from rodshell.units import shown
 
 MOST_TURN, FIRST_TURN = radians(15.0), radians(1.0)
 PROBE = 1e-5  # of the target's size: differences of points on it are then exact to 1e-8
@@ -95,7 +97,7 @@ class Clamps:
         InputError : its ends are pinned.
         """
         if not len(structure.popped.shell.ghosts):
-            raise InputError('the directions of clamps can only vary with ends = "clamped"')
+            raise InputError(f"the directions of clamps can only vary with ends = {shown(CLAMPED.name)}")
         boundary = structure.popped.boundary
         normals = structure.target.gap(boundary.points).normal
         within = unit(cross(normals, boundary.tangents))

@@ -163,9 +163,9 @@ def worst_with_errors(form: PatchForm, span_error: float, progress: Progress = s
 
 
 def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
-    (ends,) = form.popped
+    (shell,) = form.popped.values()
     found = pop_up(
-        form.footprint, form.boundary, form.rod, ends=ends, start="flat", joint=form.joint,
+        form.footprint, form.boundary, form.rod, ends=shell.support, start="flat", joint=form.joint,
         most_factorizations=MOST_FROM_FLAT, progress=progress,
     )  # fmt: skip
     made = found.report.factorizations

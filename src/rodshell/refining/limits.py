@@ -14,9 +14,7 @@ from rodshell.geometry.frames import dot
 from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES
 from rodshell.refining.change import STIFFNESSES
 from rodshell.refining.structure import Point
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements, each_gradient
-from rodshell.rods.isotropic import IsotropicBend
+from rodshell.rods.elements import BendElements, each_gradient, is_bends
 
 PROBE = 1e-5  # of the logarithms of properties: the energy's derivative is then exact to 1e-8
 
@@ -141,10 +139,8 @@ def curvatures(here: Point) -> Floats:
     ----------
     here : a design and its equilibrium.
     """
-    element, lengths = _bending(here), _bend_lengths(here)
-    if isinstance(element, IsotropicBend):
-        return element.curvatures(here.state) / lengths
-    return np.asarray(np.linalg.norm(element.strains(here.state)[:, :2], axis=1) / lengths)
+    strains = _bending(here).strains(here.state)[:, :2]
+    return np.asarray(np.linalg.norm(strains, axis=1) / _bend_lengths(here))
 
 
 def curvature_slopes(here: Point) -> Floats:
@@ -161,22 +157,17 @@ def curvature_slopes(here: Point) -> Floats:
     clamp = (before == after)[:, None]
     longer = np.where(clamp, 0.5 * lengthened[before], 0.5 * (lengthened[before] + lengthened[after]))
     # a part's gradient over its stiffness is that of half its strain's square
-    parts: tuple[Elements, ...] = element.parts[:2] if isinstance(element, BendTwist) else (element,)
     squares = np.zeros((len(lengths), element.blocks.shape[1], 3))
-    for k, part in enumerate(parts):
-        stiffness = element.bend_stiffness[:, k] if isinstance(element, BendTwist) else element.stiffness
+    for part, stiffness in zip(element.parts, element.bend_stiffness.T, strict=False):  # the last part is the twist
         squares += each_gradient(part, here.state) / stiffness[:, None, None]
     change = np.stack([np.einsum("bkx,bkx->b", squares, motion[element.blocks]) for motion in here.response.motions], 1)
     whole = (found * lengths)[:, None]
     return np.asarray(change / np.maximum(whole, 1e-12) / lengths[:, None] - (found / lengths)[:, None] * longer)
 
 
-def _bending(here: Point) -> IsotropicBend | BendTwist:
+def _bending(here: Point) -> BendElements:
     """The energy of bending."""
-    for element in here.edges.shell.elements:
-        if isinstance(element, IsotropicBend) or (isinstance(element, BendTwist) and element.bend_stiffness.any()):
-            return element
-    raise AssertionError("rods bend")
+    return next(element for element in filter(is_bends, here.edges.shell.within) if element.bend_stiffness.any())
 
 
 def _bend_lengths(here: Point) -> Floats:

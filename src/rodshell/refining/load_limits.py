@@ -21,7 +21,7 @@ from rodshell.arrays import Floats
 from rodshell.model import Potential
 from rodshell.model.potential import product, room_for
 from rodshell.refining.structure import Point
-from rodshell.rods.elements import Stressed
+from rodshell.rods.elements import is_stressed
 from rodshell.solve.modes import LinearBuckling, linear_buckling
 
 STEP, MOST_MOVED = 1e-3, 1e-4  # of a logarithm, and a motion: differences of fourth order are then exact to 1e-7
@@ -161,7 +161,7 @@ class _Loaded:
 
 def _stressed(energies: Potential, state: Floats, rate: Floats, shape: Floats) -> float:
     """v'Ks(u)v of the change of the internal forces with a rate u of the state [J]."""
-    stressed = [elements for elements in energies.sets if isinstance(elements, Stressed)]
+    stressed = [*filter(is_stressed, energies.sets)]
     blocks = [elements.blocks for elements in stressed]
     hessians = room_for(blocks)
     for elements, of_set in zip(stressed, hessians, strict=True):

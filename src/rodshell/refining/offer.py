@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.errors import InputError, OutOfTimeError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
-from rodshell.formfinding.popup import Ends, PopUp
+from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import Footprint
 from rodshell.layout.profile import DOUBLE, Profile
 from rodshell.model import Shell
@@ -35,7 +36,6 @@ class Offer:
 
     Parameters
     ----------
-    ends : how the rods' ends are held.
     before, after : root mean square of the gap over the target's size, as the form is and with double laths.
     shares : smallest and largest share of a rod's length that is then double, patch by patch.
     others : the gap with the form's other ends, as it is.
@@ -91,7 +91,8 @@ def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Of
         return None
     patches = [stages] if isinstance(stages, PatchForm) else list(stages.patches.values())
     ends: Ends = next(iter(stages.agreement))
-    if not all(patch.popped[ends].report.stable for patch in patches):
+    shells = [patch.popped[ends] for patch in patches]
+    if not all(shell.report.stable and not shell.shell.yields for shell in shells):
         return None
 
     def telling(number: int) -> None:
@@ -158,8 +159,8 @@ def _next_share(found: Sequence[_Design], before: Agreement) -> float | None:
 def _popped_up(patch: PatchForm, share: float, like: PopUp) -> PopUp:
     """The shell with double laths over a share of every rod, from the equilibrium of one with others."""
     mesh = like.shell.mesh.with_profiles(Profile.double(share))
-    shell = Shell.of(mesh, patch.rod, clamped=like.ends == "clamped", joint=patch.joint)
+    shell = Shell.of(mesh, patch.rod, clamped=like.support.holds_directions, joint=patch.joint)
     shell = shell.with_frames_of(like.shell.elements)
     problem = Problem.of_shell(shell, like.boundary.points, pattern=like.equilibrium.problem.pattern)
     found = find_equilibrium(problem, like.state, like.forces)
-    return PopUp(like.ends, "draped", Footprint(mesh), like.boundary, shell.with_elements(found.elements), found)
+    return PopUp(like.support, "draped", Footprint(mesh), like.boundary, shell.with_elements(found.elements), found)

@@ -12,9 +12,10 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
-from rodshell.formfinding.popup import Ends, PopUp
+from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import Footprint
 from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
@@ -26,7 +27,6 @@ from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
 from rodshell.refining.structure import Point, Structure, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
-from rodshell.rods.joints import Elastic
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.units import percent_text
@@ -64,7 +64,6 @@ class Refinement:
 
     Parameters
     ----------
-    ends : how the rods' ends are held.
     before, after : the stages, with the popped-up shell of these ends alone.
     designs : those that were accepted on the way, the last best; the first is the shell before.
     converged : whether no further step would gain much.
@@ -236,8 +235,7 @@ def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
     joint = structure.joint
-    given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
-    springs = any(0.0 < stiffness < inf for stiffness in given)
+    springs = any(0.0 < stiffness < inf for stiffness in (joint.shear, joint.out_of_plane, joint.twist))
     if point.equilibrium.problem.load is None and not springs and not as_found:
         profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
         thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)
@@ -268,10 +266,6 @@ def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family
 
 def structure_of(stages: PatchForm, ends: Ends) -> Structure:
     """The shell that is refined.
-
-    Parameters
-    ----------
-    ends : how the rods' ends are held.
 
     Raises
     ------
@@ -337,14 +331,14 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
     Parameters
     ----------
     design : what is built, and the equilibrium that was found for it.
-    ends : how the rods' ends are held.
 
     Raises
     ------
     InputError : it has no stable equilibrium there after all.
     """
     grid, here = design.grid, design.point.equilibrium
-    shell = Shell.of(grid.mesh, stages.rod, clamped=ends == "clamped", joint=stages.joint)
+    support = stages.popped[ends].support
+    shell = Shell.of(grid.mesh, stages.rod, clamped=support.holds_directions, joint=stages.joint)
     shell = shell.with_frames_of(here.elements)
     problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
     if here.problem.load is None:
@@ -355,7 +349,7 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
         found = replace(unloaded or found, problem=replace((unloaded or found).problem, load=None))
     shell = shell.with_elements(found.elements)
     footprint = Footprint(grid.mesh)
-    popped = PopUp(ends, "draped", footprint, grid.boundary, shell, found)
+    popped = PopUp(support, "draped", footprint, grid.boundary, shell, found)
     result = replace(
         stages, ends=(ends,), footprint=footprint, boundary=grid.boundary,
         popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
@@ -369,7 +363,6 @@ def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
     Parameters
     ----------
     design : of which it is built, with its loaded equilibrium.
-    ends : how the rods' ends are held.
     """
     popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
     load = np.zeros_like(popped.state)

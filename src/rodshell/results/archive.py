@@ -22,9 +22,10 @@ from rodshell.errors import InputError, OutputError
 from rodshell.results.folder import ResultFolder, reading
 from rodshell.results.manifest import inside
 from rodshell.results.results import Results, Verdict, read_results
-from rodshell.results.states import SHELLS, packed, read_states
+from rodshell.results.states import DRAPED, POPPED, packed, read_states, shells_among
 from rodshell.results.summary import summary_text
 from rodshell.results.verdict import CONVERGED, verdict_of
+from rodshell.rods.supports import PINNED, finals_first
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import file_path, instance, mapping
 
@@ -197,10 +198,9 @@ class Archive:
         }  # which is made again, and whose keys are functions that pickle does not find
 
     def __repr__(self) -> str:
-        shells = [name for name in SHELLS if name in self.states]
         return (
             f"<Archive {self.name}: {self.verdict.level}, {len(self.results.rods)} rods, "
-            f"{', '.join(shells) or 'no shell in space'}>"
+            f"{', '.join(shells_among(self.states)) or 'no shell in space'}>"
         )
 
     def summary(self) -> str:
@@ -220,10 +220,16 @@ class Archive:
 
     @property
     def final(self) -> str | None:
-        """The best state in space that there is: clamped, else pinned, else draped; where a solve stopped before it
-        converged only if there is no other."""
-        shells = [state for state in SHELLS if state in self.states]
-        return max(shells, key=lambda state: (not self.is_lost(state), SHELLS.index(state)), default=None)
+        """The best state in space that there is: on supports of one's own, else clamped, else pinned, else draped;
+        where a solve stopped before it converged only if there is no other."""
+        popped = [name.removeprefix(POPPED) for name in shells_among(self.states) if name != DRAPED]
+        shells = [*(POPPED + support for support in finals_first(popped)), *({DRAPED} & self.states.keys())]
+        return min(shells, key=self.is_lost, default=None)
+
+    @property
+    def deployed(self) -> str:
+        """The state that the stages of the deployment lead to."""
+        return POPPED + ((self.results.deployment.ends if self.results.deployment else None) or PINNED.name)
 
     def is_lost(self, state: str) -> bool:
         """Whether a state is where the solve of a shell stopped before it converged.
@@ -232,7 +238,7 @@ class Archive:
         ----------
         state : of `states`, such as "popped_pinned".
         """
-        shells = {f"popped_{ends}": shell for ends, shell in self.results.pop_up.items()}
+        shells = {POPPED + ends: shell for ends, shell in self.results.pop_up.items()}
         return state in shells and shells[state].status not in (None, CONVERGED)
 
 

@@ -20,8 +20,7 @@ from rodshell.loads.strength import Limits
 from rodshell.results.results import Drawings, Results
 from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import verdict
-
-PREFERRED: tuple[Ends, Ends] = ("clamped", "pinned")  # the final shape is the first of these that is there
+from rodshell.rods.supports import finals_first
 
 
 def sharpest(checks: Checks) -> Floats | None:
@@ -31,8 +30,8 @@ def sharpest(checks: Checks) -> Floats | None:
 
 
 def final_ends(checks: Checks) -> Ends | None:
-    """The end condition of the final shape: clamped if that was checked, else pinned; None: neither was."""
-    return next((ends for ends in PREFERRED if ends in checks.bending), None)
+    """The support of the final shape; None: none was checked."""
+    return next(iter(finals_first(checks.bending)), None)
 
 
 def checked_results(

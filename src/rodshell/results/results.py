@@ -342,9 +342,8 @@ def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
             for what, where in (("governs", loaded.governs), ("euler_at", loaded.euler_at)):
                 if where is not None:
                     yield f"loads.{name}.{support}.{what}.rod", where.rod
-    for shape in ("pinned", "clamped", "deployment"):
-        nearest = results.contact.of(shape) if results.contact else None
-        yield from ((f"contact.{shape}.rods", name) for name in (nearest.rods if nearest else None) or ())
+    for shape, nearest in results.contact.shapes().items() if results.contact else ():
+        yield from ((f"contact.{shape}.rods", name) for name in nearest.rods or ())
 
 
 def json_schema() -> dict[str, Any]:
@@ -355,7 +354,8 @@ def json_schema() -> dict[str, Any]:
 def _first_fault(error: ValidationError) -> str:
     """The first fault in a sentence that names its key as it stands in the file, "rods[3].joints[0].at"."""
     fault = error.errors(include_url=False)[0]
-    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"]).lstrip(".")
+    parts = (part for part in fault["loc"] if part not in ("(table)", "(other)"))  # which kind a `TableOr` was read as
+    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
     where = printable(where)[:200] or "the file"
     if fault["type"] == "missing":
         return f"{where} is missing"

@@ -1,10 +1,8 @@
 """How much of their strength the rods of a result use, and by which strength that is counted."""
 
-from rodshell.figures.checks import WorstBent
-from rodshell.figures.records import Ends
+from rodshell.figures.checks import OTHER_SHAPES, WorstBent
 from rodshell.results.results import Results
 
-ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
 THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
 
 
@@ -14,7 +12,7 @@ def bent_of(results: Results, shape: str) -> WorstBent:
     Parameters
     ----------
     results : with or without checks of bending.
-    shape : "pinned", "clamped", or one of the deployment.
+    shape : the name of a support, or a shape of the deployment.
     """
     return (results.bending.shapes() if results.bending else {}).get(shape) or WorstBent()
 
@@ -24,14 +22,14 @@ def strength_name(results: Results, shape: str) -> str:
 
     Parameters
     ----------
-    shape : "pinned", "clamped", or one of the deployment.
+    shape : the name of a support, or a shape of the deployment.
     """
     preset = results.bending.strength_of if results.bending else None
     if preset is None:
         return "the given strength"
     if not by_design_strength(results):
         return f"{preset}'s strength, which is characteristic and short-term"
-    return f"{preset}'s {'permanent design strength' if shape in ENDS else 'design strength for erection'}"
+    return f"{preset}'s {'design strength for erection' if shape in OTHER_SHAPES else 'permanent design strength'}"
 
 
 def by_design_strength(results: Results) -> bool:

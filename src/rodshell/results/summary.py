@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees
 
-from rodshell.figures.checks import Bending, SelfWeight
+from rodshell.figures.checks import OTHER_SHAPES, Bending, SelfWeight
 from rodshell.figures.form import Bent, RodType
 from rodshell.figures.loads import DesignStrength
 from rodshell.figures.records import printable
@@ -26,6 +26,7 @@ from rodshell.results.wording import (
     stress,
     whole_percent,
 )
+from rodshell.rods.supports import CLAMPED, PINNED, clamped_among
 from rodshell.units import places_text
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
@@ -121,7 +122,7 @@ def _reached(bending: Bending | None) -> str:
     """How a section was chosen, and the share of the strength that the final shapes use."""
     if bending is None or bending.strength is None:
         return ", as slender as the paper's rods, since no strength is known"
-    final = [bent.utilisation for bent in (bending.pinned, bending.clamped) if bent]
+    final = [bent.utilisation for shape, bent in bending.shapes().items() if shape not in OTHER_SHAPES]
     known = [used for used in final if used is not None]
     reached = f"reached {percent(max(known))} in the final shape" if known else "what is reached is not known"
     return f", sized for the permanent strength; {reached}"
@@ -301,13 +302,14 @@ def _deployment(results: Results) -> Iterator[str]:
             False: "ends in another shape",
             None: "not known whether it is reached",
         }
-        yield f"  from flat {deployment.ends or 'pinned':<8}{words[deployment.reached_from_flat]}"
+        yield f"  from flat {deployment.ends or PINNED.name:<8}{words[deployment.reached_from_flat]}"
         if deployment.clamped and deployment.clamped.reached_from_flat is not None:
             turned = {
                 True: "reached: the ends are turned into their clamps after the deployment",
                 False: "turning the ends into their clamps ends in another shape",
             }
-            yield f"  from flat clamped {turned[deployment.clamped.reached_from_flat]}"
+            held = clamped_among(results.pop_up) or CLAMPED.name
+            yield f"  from flat {held:<8}{turned[deployment.clamped.reached_from_flat]}"
     for ends, searched in results.other_shapes.items():
         others = [shape for shape in searched.found if not shape.mirror]
         found = ["its mirror image"] if len(others) < len(searched.found) else []

@@ -7,7 +7,7 @@ not checked, and then the result is not good.
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rodshell.figures.checks import Clearance, Deployment, WorstBent
+from rodshell.figures.checks import OTHER_SHAPES, Clearance, Deployment, WorstBent
 from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
 from rodshell.figures.form import Agreement, PopUp
 from rodshell.figures.loads import LoadedShell
@@ -16,14 +16,7 @@ from rodshell.figures.sentences import ANOTHER_WAY, SENTENCES
 from rodshell.results.own_weight import falling, is_braced, none_stands, reserve, weight_findings
 from rodshell.results.results import Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
-from rodshell.results.strength_used import (
-    ENDS,
-    THIN,
-    bent_of,
-    by_design_strength,
-    holds_while_erected,
-    strength_name,
-)
+from rodshell.results.strength_used import THIN, bent_of, by_design_strength, holds_while_erected, strength_name
 from rodshell.results.supports import air_findings, width
 from rodshell.results.wording import (
     FORM_AGAIN,
@@ -37,6 +30,7 @@ from rodshell.results.wording import (
     whole_percent,
 )
 from rodshell.rods.design_strength import RESERVED
+from rodshell.rods.supports import PINNED, clamped_among, finals_first
 
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
@@ -248,8 +242,8 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[Said]:
     bent = bent_of(results, shape)
     used, strain = bent.utilisation, bent.max_bending_strain
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
-    if used is not None and used > 1 and not (shape not in ENDS and holds_while_erected(results, used)):
-        if shape in ENDS and results.rod and "section" in (results.rod.chosen or {}):
+    if used is not None and used > 1 and not (shape in OTHER_SHAPES and holds_while_erected(results, used)):
+        if shape not in OTHER_SHAPES and results.rod and "section" in (results.rod.chosen or {}):
             where += ": the section that was chosen is too thick; give a thinner one (rod.section)"
         yield said(
             "strength" if by_design_strength(results) else "strength: given", _ends(shape), used, 1, place=bent.rod,
@@ -288,13 +282,13 @@ def _erection(results: Results) -> Iterator[Said]:
 
 
 def _ends(shape: str) -> Ends | None:
-    """The end condition of a shape; None for the flat grid and the deployment."""
-    return shape if shape in ENDS else None
+    """The support of a shape; None for the flat grid and the deployment."""
+    return None if shape in OTHER_SHAPES else shape
 
 
 def _shape(shape: str, found: WorstBent | Clearance) -> str:
     """The shape that a sentence is about."""
-    if shape in ENDS:
+    if shape not in OTHER_SHAPES:
         return f"with {shape} ends"
     return "during deployment" if found.share is None else f"at {whole_percent(found.share)} of the deployment"
 
@@ -314,7 +308,7 @@ def _off(results: Results, ends: Ends, gap: Agreement) -> Said:
     kind = (results.joint.kind if results.joint else None) or "ball"
     against_shear = kind not in ("ball", "pin")
     bound = drape is not None and drape.method == "bound"
-    dips = ends == "clamped" and bound and not buckles and not against_shear
+    dips = clamped_among([ends]) and bound and not buckles and not against_shear
     advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
     return said(
         "off_target", ends, gap.max_relative, OFF,
@@ -392,7 +386,7 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
     name = results.bending.strength_of
     used = max((bent_of(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
     if name and used > RESERVED and not by_design_strength(results):
-        whose = strength_name(results, ENDS[0])
+        whose = strength_name(results, usable[0])
         yield said("strength_not_reduced", None, used, RESERVED, share=percent(used), whose=whose)
 
 
@@ -402,16 +396,17 @@ def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[
     if flat is not None and not flat.lies_flat:
         return  # it is assembled in place
     if not deployment:
-        remedy = "" if late else ": this needs pinned ends (pop_up.ends) and checks.stages above 0"
-        failed = _status(results.pop_up.get("pinned")) != CONVERGED
-        why = ", since the pinned shell was not found" if failed else remedy
+        remedy = "" if late else f": this needs {PINNED} ends (pop_up.ends) and checks.stages above 0"
+        upright = clamped_among(results.pop_up, False)
+        failed = upright and _status(results.pop_up[upright]) != CONVERGED
+        why = f", since the {upright} shell was not found" if failed else remedy
         yield said("not_checked: deployment", why=why)
     elif (
-        "clamped" in usable
+        (clamped := clamped_among(usable))
         and deployment.reached_from_flat
         and (deployment.clamped is None or deployment.clamped.reached_from_flat is None)
     ):
-        yield said("not_checked: clamped", "clamped")
+        yield said("not_checked: clamped", clamped, pinned=deployment.ends or PINNED)
 
 
 def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -478,7 +473,7 @@ def _gaps(results: Results) -> Iterator[str]:
     faults = {ends: [*_shell_faults(results, ends)] for ends in results.pop_up}
     known = {
         ends: gap.max
-        for ends in ENDS
+        for ends in finals_first(results.agreement)
         if (gap := results.agreement.get(ends)) is not None
         and gap.max is not None
         and (shell := results.pop_up.get(ends)) is not None
@@ -488,22 +483,24 @@ def _gaps(results: Results) -> Iterator[str]:
         size = results.agreement[ends].max_relative
         share = "" if size is None else f" ({percent(size)} of its size)"
         yield f"With {ends} ends the largest gap to the target is {_mm(results, largest)}{share}."
-    if len(known) == len(ENDS) and not any(faults.values()):
-        yield from _advice(known, results.agreement["pinned"].max_relative)
+    clamped, pinned = clamped_among(known), clamped_among(known, False)
+    if clamped and pinned and not any(faults.values()):
+        yield from _advice(clamped, pinned, known, results.agreement[pinned].max_relative)
     elif faults and not results.target:
         yield "This result has no target, so no gap can be stated."
 
 
-def _advice(gaps: Mapping[Ends, float], relative: float | None) -> Iterator[str]:
+def _advice(clamped: Ends, pinned: Ends, gaps: Mapping[Ends, float], relative: float | None) -> Iterator[str]:
     """Which of two supports that can both be used is worth its effort.
 
     relative : the pinned gap over the target's size.
     """
-    if gaps["clamped"] < MUCH_LESS * gaps["pinned"] and (relative is None or relative > NEGLIGIBLE):
-        share = percent(gaps["clamped"] / gaps["pinned"])
-        yield f"Supports that hold the rods' directions (clamped) leave {share} of the gap that pinned ones leave."
+    if gaps[clamped] < MUCH_LESS * gaps[pinned] and (relative is None or relative > NEGLIGIBLE):
+        share = percent(gaps[clamped] / gaps[pinned])
+        yield f"Supports that hold the rods' directions ({clamped}) leave {share} of the gap that {pinned} ones leave."
     elif relative is None or relative <= OFF:
-        yield "Supports that hold the rods' directions (clamped) bring the unloaded shell little nearer to the target."
+        said_of = f"Supports that hold the rods' directions ({clamped})"
+        yield f"{said_of} bring the unloaded shell little nearer to the target."
 
 
 def _strength(results: Results) -> Iterator[str]:

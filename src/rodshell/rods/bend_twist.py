@@ -28,16 +28,17 @@ source. An edge that turns by half a revolution from its source has no frame: th
 The branch of m_ref holds while m_ref changes by less than pi, which a node that is nearly folded may exceed.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
 from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.validation import brief
 
 
@@ -67,14 +68,15 @@ class BendTwist:
     source_directors: Floats
     source_twist: Floats
 
-    angle_columns = 1, 3
+    angle_columns: ClassVar[tuple[int, ...]] = (1, 3)
+    moduli: ClassVar[tuple[int, ...]] = (0, 1, 2)
     __repr__ = brief
 
     @classmethod
     def starting_at(
         cls,
         blocks: Ints,
-        state: Floats,
+        state: State,
         directors: ArrayLike,
         *,
         bend_stiffness: ArrayLike,
@@ -87,7 +89,6 @@ class BendTwist:
         Parameters
         ----------
         blocks : (b, 5), see the class.
-        state : (N, 3) node positions [m] and twist angles [rad].
         directors : (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for
             all, such as z on a flat grid. Only their part perpendicular to the edge is used.
         bend_stiffness, twist_stiffness, natural_curvature, natural_twist : see the class; broadcast over the elements.
@@ -107,15 +108,25 @@ class BendTwist:
             _reference_twist(tangents, first_directors),
         )
 
-    def relaxed(self, state: Floats) -> Self:
-        """The same elements with `state` (N, 3) as their stress-free state, as linkers have the flat grid.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def relaxed(self, state: State) -> Self:
+        """The same elements with `state` (N, 3) as their stress-free state, as linkers have the flat grid."""
         strains = self.strains(state)
         return replace(self, natural_curvature=strains[:, :2].copy(), natural_twist=strains[:, 2].copy())
+
+    def between(self, held: Self, t: float) -> Self:
+        """See `BendElements.between`."""
+        if t >= 1 or held is self:
+            return self
+        return replace(
+            self,
+            natural_curvature=(1 - t) * held.natural_curvature + t * self.natural_curvature,
+            natural_twist=(1 - t) * held.natural_twist + t * self.natural_twist,
+        )
+
+    def with_stiffness(self, stiffness: Floats) -> Self:
+        """See `BendElements.with_stiffness`; without bending they stay so."""
+        bend = stiffness[:, :2].copy() if self.bend_stiffness.any() else 0.0 * self.bend_stiffness
+        return replace(self, bend_stiffness=bend, twist_stiffness=stiffness[:, 2].copy())
 
     @property
     def parts(self) -> tuple[Self, ...]:
@@ -127,13 +138,8 @@ class BendTwist:
             replace(self, bend_stiffness=no_bend),
         )
 
-    def strains(self, state: Floats) -> Floats:
-        """(b, 3) curvatures k1, k2 (integrated, [-]) and twist tau [rad] at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def strains(self, state: State) -> Floats:
+        """(b, 3) curvatures k1, k2 (integrated, [-]) and twist tau [rad] at `state` (N, 3)."""
         moved = self.refreshed(state)
         theta, m1 = state[self.blocks[:, 1:4:2], 0], moved.material_directors(state)
         te, tf = moved.source_tangents[:, 0], moved.source_tangents[:, 1]
@@ -142,18 +148,13 @@ class BendTwist:
         k1, k2 = ((dot(tf, m[:, 0]) - dot(te, m[:, 1])) / both for m in (m1, m2))
         return np.column_stack([k1, k2, theta[:, 1] - theta[:, 0] + moved.source_twist])
 
-    def material_directors(self, state: Floats) -> Floats:
-        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def material_directors(self, state: State) -> Floats:
+        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`."""
         theta = state[self.blocks[:, 1:4:2], 0, None]
         d1 = self.source_directors
         return np.asarray(np.cos(theta) * d1 + np.sin(theta) * cross(self.source_tangents, d1))
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _bend_twist(
@@ -171,7 +172,7 @@ class BendTwist:
             )
         )
 
-    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+    def stress_stiffness(self, state: State, motion: Floats, hessians: Floats) -> None:
         """Of the change of the moments: see `Stressed.stress_stiffness`.
 
         The energy is quadratic in the strains, so that natural strains less by their change add just these moments.
@@ -187,7 +188,7 @@ class BendTwist:
         less.evaluate(state, scrap, hessians)
         hessians -= before
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same elements with their source frames at `state` (N, 3): strains and angles do not change."""
         source = self.source_tangents, self.source_directors, self.source_twist
         tangents, directors, twist = (np.empty_like(part) for part in source)
@@ -199,7 +200,12 @@ class BendTwist:
 PROBE = 1e-5  # of the shortest edge, or rad: motion over which the change of strains is taken; good to 1e-9
 
 
-def strain_rates(elements: BendTwist, state: Floats, motion: Floats) -> Floats:
+def frames_among(sets: Sequence[Elements]) -> BendTwist | None:
+    """The first of these energies that carries frames of rods."""
+    return next((elements for elements in sets if isinstance(elements, BendTwist)), None)
+
+
+def strain_rates(elements: BendTwist, state: State, motion: Floats) -> Floats:
     """(b, 3) derivative of the strains along a motion, by central differences.
 
     Parameters
@@ -217,7 +223,7 @@ def strain_rates(elements: BendTwist, state: Floats, motion: Floats) -> Floats:
     return np.asarray((ahead - behind) / (2 * step))
 
 
-def _tangents(state: Floats, blocks: Ints) -> Floats:
+def _tangents(state: State, blocks: Ints) -> Floats:
     """(b, 2, 3) unit tangents of the edges e and f."""
     return unit(state[blocks[:, 2:5:2]] - state[blocks[:, 0:3:2]])
 

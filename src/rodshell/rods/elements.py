@@ -13,12 +13,12 @@ edge: at the solution the strain vanishes and N0 is the axial force.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.kernels import njit
 from rodshell.threads import in_threads
 from rodshell.validation import brief
@@ -38,28 +38,62 @@ class Elements(Protocol):
     @property
     def blocks(self) -> Ints: ...
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], with its gradient and, where wanted, its Hessians.
 
         Parameters
         ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
         gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
         hessians : (m, 3k, 3k), filled with the element Hessians unless empty; rows and columns of the unused
             components of a twist angle are zero.
         """
         ...
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same energy with its source frames moved to `state`; called at each accepted iterate."""
         ...
 
 
-@runtime_checkable
+class BendElements(Elements, Protocol):
+    """Bending between consecutive edges of rods, and twist where they have it.
+
+    Attributes
+    ----------
+    bend_stiffness : (b, 1) or (b, 2) EI over the Voronoi length, of both directions [N m].
+    parts : the energies of each stiffness alone, bending first.
+    moduli : for each part 0, 1 or 2: it resists with EI1, EI2 or GJ.
+    """
+
+    angle_columns: ClassVar[tuple[int, ...]]
+    moduli: ClassVar[tuple[int, ...]]
+
+    @property
+    def bend_stiffness(self) -> Floats: ...
+
+    @property
+    def parts(self) -> tuple[Self, ...]: ...
+
+    def strains(self, state: State) -> Floats:
+        """(b, 3) curvatures (integrated, [-]) and twist [rad] at `state` (N, 3)."""
+        ...
+
+    def with_stiffness(self, stiffness: Floats) -> Self:
+        """The same elements with EI1, EI2 and GJ over the Voronoi length, (b, 3) [N m]; what they lack is left out."""
+        ...
+
+    def relaxed(self, state: State) -> Self:
+        """The same elements with `state` (N, 3) as their stress-free state; naturally straight ones stay so."""
+        ...
+
+    def between(self, held: Self, t: float) -> Self:
+        """The same elements, their natural strains, if any, only the share t of the way from those of `held`."""
+        ...
+
+
 class Stressed(Elements, Protocol):
     """Energies of strains whose internal forces stiffen or soften a structure: those that buckling looks at."""
 
-    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+    def stress_stiffness(self, state: State, motion: Floats, hessians: Floats) -> None:
         """How the Hessians change with the internal forces alone, the geometry being frozen: the sum over the strains e
         of (ds/de de/dx . motion) d2e/dx2, with s the internal force. The rest of the Hessian's derivative turns the
         stiffness of the material with the motion, and is wrong by far without its terms of second order.
@@ -71,6 +105,16 @@ class Stressed(Elements, Protocol):
         hessians : (m, 3k, 3k), which are filled.
         """
         ...
+
+
+def is_bends(element: Elements) -> TypeGuard[BendElements]:
+    """Whether an energy is that of bends of rods."""
+    return hasattr(element, "moduli")
+
+
+def is_stressed(element: Elements) -> TypeGuard[Stressed]:
+    """Whether buckling looks at an energy."""
+    return hasattr(element, "stress_stiffness")
 
 
 def twist_angles(sets: Sequence[Elements], count: int) -> NDArray[np.bool_]:
@@ -115,7 +159,7 @@ def turned(element: Elements, turn: Floats) -> Elements:
     return replace(element, **sources)
 
 
-def each_gradient(elements: Elements, state: Floats) -> Floats:
+def each_gradient(elements: Elements, state: State) -> Floats:
     """(m, k, 3) gradient of each element alone [N, for angles N m].
 
     It is that of the same energy on an exploded state, in which no two elements share a block. An energy is linear in
@@ -124,7 +168,6 @@ def each_gradient(elements: Elements, state: Floats) -> Floats:
     Parameters
     ----------
     elements : m of them, with one stiffness each (see `parts` of those that have several).
-    state : (N, 3) node positions [m] and twist angles [rad].
     """
     apart, local = _exploded(elements, state)
     gradient = np.zeros_like(local)
@@ -132,12 +175,11 @@ def each_gradient(elements: Elements, state: Floats) -> Floats:
     return gradient.reshape(*elements.blocks.shape, 3)
 
 
-def each_curvature(elements: Elements, state: Floats, motion: Floats) -> Floats:
+def each_curvature(elements: Elements, state: State, motion: Floats) -> Floats:
     """(m,) v'Hv of each element alone for displacements `motion` (N, 3) [J], H being its Hessian.
 
     Parameters
     ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
     motion : (N, 3) displacements v [m, rad].
     """
     m, k = elements.blocks.shape
@@ -147,7 +189,7 @@ def each_curvature(elements: Elements, state: Floats, motion: Floats) -> Floats:
     return np.asarray(np.einsum("mi,mij,mj->m", local, hessians, local))
 
 
-def _exploded(elements: Elements, state: Floats) -> tuple[Elements, Floats]:
+def _exploded(elements: Elements, state: State) -> tuple[Elements, Floats]:
     """The elements on blocks of their own, and the state there."""
     rows = np.arange(elements.blocks.size, dtype=elements.blocks.dtype).reshape(elements.blocks.shape)
     return replace(elements, blocks=rows), state[elements.blocks].reshape(-1, 3)  # type: ignore[type-var]
@@ -174,7 +216,7 @@ def in_parts(elements: Elements, most: int) -> list[Elements]:
     ]
 
 
-def evaluate_all(sets: Sequence[Elements], state: Floats, gradient: Floats, hessians: Sequence[Floats]) -> None:
+def evaluate_all(sets: Sequence[Elements], state: State, gradient: Floats, hessians: Sequence[Floats]) -> None:
     """Evaluate sets of elements, see `Elements.evaluate`; threads share large ones.
 
     Each thread has half of every set. The halves have gradients of their own, which are added in the end, so that the
@@ -247,52 +289,40 @@ class Stretch:
         multipliers = self.multipliers if multipliers is None else multipliers
         return Stretch(self.blocks, self.rest_lengths, self.stiffness, multipliers, forces)
 
-    def strains(self, state: Floats) -> Floats:
+    def strains(self, state: State) -> Floats:
         """(e,) axial strains [-] at `state` (N, 3)."""
         return np.asarray(_strains(state, self.blocks, self.rest_lengths))
 
-    def elongation(self, state: Floats, motion: Floats) -> Floats:
+    def elongation(self, state: State, motion: Floats) -> Floats:
         """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`.
 
         Parameters
         ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
         motion : (N, 3) displacements [m].
         """
         return np.asarray(_elongation(state, motion, self.blocks, self.rest_lengths))
 
-    def pulls(self, state: Floats) -> Floats:
-        """(e, 2, 3) gradient of each edge alone under an axial force of 1 N, at `state` (N, 3) [-].
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def pulls(self, state: State) -> Floats:
+        """(e, 2, 3) gradient of each edge alone under an axial force of 1 N, at `state` (N, 3) [-]."""
         along = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
         along /= np.linalg.norm(along, axis=1)[:, None]
         return np.stack([-along, along], axis=1)
 
-    def by_rest_lengths(self, state: Floats) -> Floats:
-        """(e,) change of each edge's axial force by its rest length, -EA |e| / l^2 [N/m], at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def by_rest_lengths(self, state: State) -> Floats:
+        """(e,) change of each edge's axial force by its rest length, -EA |e| / l^2 [N/m], at `state` (N, 3)."""
         return np.asarray(-self.stiffness * (1.0 + self.strains(state)) / self.rest_lengths)
 
-    def add_axial(self, state: Floats, forces: Floats, gradient: Floats) -> None:
+    def add_axial(self, state: State, forces: Floats, gradient: Floats) -> None:
         """Add to `gradient` (N, 3) that of edges with the axial `forces` (e,) [N].
 
         Parameters
         ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
         forces : (e,) axial forces [N].
         gradient : (N, 3), to which theirs is added [N].
         """
         _add_axial(state, self.blocks, forces, gradient)
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         exact = self.forces is None
         forces = self.rest_lengths if self.forces is None else self.forces
@@ -310,23 +340,22 @@ class Stretch:
             )
         )
 
-    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+    def stress_stiffness(self, state: State, motion: Floats, hessians: Floats) -> None:
         """Of the change of the axial forces: see `Stressed.stress_stiffness`."""
         self.axial_stiffness(state, self.stiffness * self.elongation(state, motion), hessians)
 
-    def axial_stiffness(self, state: Floats, forces: Floats, hessians: Floats) -> None:
+    def axial_stiffness(self, state: State, forces: Floats, hessians: Floats) -> None:
         """Geometric stiffness of axial forces alone.
 
         Parameters
         ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
         forces : (e,) axial forces [N].
         hessians : (e, 6, 6), which are filled [N/m].
         """
         limp = replace(self, stiffness=np.zeros_like(self.stiffness), forces=forces)
         limp.evaluate(state, np.zeros_like(state), hessians)
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same: there are no source frames."""
         return self
 

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import array, function_of
@@ -47,7 +47,7 @@ class LocalEnergy:
         wanted = "a function of the positions (m, k, 3) of nodes"
         function_of("the formula of an energy", self.formula, wanted, np.zeros((*blocks.shape, 3)))
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         at = state[self.blocks]
         np.add.at(gradient, self.blocks, self._gradient(at))
         if hessians.size:
@@ -61,7 +61,7 @@ class LocalEnergy:
             hessians[:] = 0.5 * (hessians + hessians.swapaxes(1, 2))
         return float(self._energies(at).sum())
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         return self
 
     def _gradient(self, at: Floats) -> Floats:

@@ -60,6 +60,8 @@ class _Shape:
 class _Round(_Shape):
     """A section whose second moment of area is the same about every diameter."""
 
+    round = True
+
     @property
     def outer_radius(self) -> float:
         """[m]"""

@@ -17,7 +17,7 @@ from typing import Self
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch
 from rodshell.solve.problem import Problem
@@ -51,13 +51,12 @@ class Load:
         """
         return load if isinstance(load, Load) else cls(forces=load)
 
-    def elements(self, elements: Sequence[Elements], state: Floats, factor: float) -> tuple[Elements, ...]:
+    def elements(self, elements: Sequence[Elements], state: State, factor: float) -> tuple[Elements, ...]:
         """The energies of a structure and of this load, with their source frames at a state.
 
         Parameters
         ----------
         elements : of the structure alone, or of both as this function returned them.
-        state : (N, 3) node positions [m] and twist angles [rad].
         """
         structure = [element.refreshed(state) for element in elements if not isinstance(element, _Proportional)]
         before = [element.potential for element in elements if isinstance(element, _Proportional)] or self.potentials
@@ -134,13 +133,8 @@ class LoadedAssembly:
         self.problem = replace(problem, elements=load.elements(problem.elements, state, 0.0))
         self._assembly = TangentAssembly(self.problem, state)
 
-    def strains(self, state: Floats, factor: float) -> Floats:
-        """(e,) elastic strains of the edges [-].
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def strains(self, state: State, factor: float) -> Floats:
+        """(e,) elastic strains of the edges [-]."""
         return self.load.stretch(self.problem.stretch, factor).strains(state)
 
     def gradient(self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float) -> Floats:
@@ -194,12 +188,11 @@ class LoadedAssembly:
         change = self.change(state, rate, 0.0, 1.0)
         return self._assembly.stress_values(elements, state, change, rate)
 
-    def change(self, state: Floats, rate: Floats, factor: float, per: float = 1.0) -> Floats:
+    def change(self, state: State, rate: Floats, factor: float, per: float = 1.0) -> Floats:
         """(e,) rate of the axial forces [N].
 
         Parameters
         ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
         rate : (N, 3) of the state [m, rad].
         """
         stretch = self.load.stretch(self.problem.stretch, factor)

@@ -15,8 +15,7 @@ from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, si
 from rodshell.model import Freedom, Potential
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.rod_line import End
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import Elements, is_bends
 from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.solve.path import followed
 from rodshell.solve.problem import Problem, Supports
@@ -356,16 +355,17 @@ def solve_rod(
     path, load = SupportPath.of(rod, state, supports), loads.on(rod, supports.spinning)
     if path.holds_spin and load[rod.angles.start :, 0].any():
         raise InputError("nothing keeps this rod from spinning under its moments: hold an angle, or clamp an end")
-    held: tuple[Elements, ...] = ()
+    held = rod.elements
     if isinstance(start, RodShape):
         axial = start.axial_forces
     else:
         axial = rod.stretch.stiffness * rod.stretch.strains(state)
-        held = tuple(_stress_free(element, state) for element in rod.elements)
-    before = _gradient(held or rod.elements, rod, state, axial)  # this load makes the start an equilibrium
+        held = tuple(element.relaxed(state) for element in rod.elements)
+    before = _gradient(held, rod, state, axial)  # this load makes the start an equilibrium
 
     def problem_at(t: float) -> Problem:
-        elements, pulls = _released(held, rod.elements, t), (1 - t) * before + t * load
+        pulls = (1 - t) * before + t * load
+        elements = tuple(last.between(first, t) for first, last in zip(held, rod.elements, strict=True))
         return Problem(elements, rod.stretch, path.at(t), rod.length, load=pulls)
 
     way = followed(
@@ -386,7 +386,14 @@ def solve_rod(
             "to the side that it is to take; or pass stable=False to have it as it is",
             report,
         )
-    return _shape(replace(rod, elements=way.found.elements), way.found.state, way.found.forces, load, path.free, report)
+    return _shape(
+        replace(rod, elements=tuple(filter(is_bends, way.found.elements))),
+        way.found.state,
+        way.found.forces,
+        load,
+        path.free,
+        report,
+    )
 
 
 def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
@@ -406,25 +413,6 @@ def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Fr
     reactions = gradient - free.expand(free.reduce(gradient))
     residual = float(np.abs(gradient[rod.nodes] - reactions[rod.nodes]).max())
     return RodShape(rod, state, axial, load, reactions, replace(report, force_residual=residual))
-
-
-def _stress_free(element: Elements, state: Floats) -> Elements:
-    """The element without stress at `state`, if it has natural strains to choose."""
-    return element.relaxed(state) if isinstance(element, BendTwist) else element
-
-
-def _released(held: tuple[Elements, ...], elements: tuple[Elements, ...], t: float) -> tuple[Elements, ...]:
-    """The elements, their natural strains only the share t of the way from those of `held`, if any."""
-    result = list(elements)
-    for k, first in enumerate(held):
-        last = elements[k]
-        if isinstance(first, BendTwist) and isinstance(last, BendTwist) and t < 1:
-            result[k] = replace(
-                last,
-                natural_curvature=(1 - t) * first.natural_curvature + t * last.natural_curvature,
-                natural_twist=(1 - t) * first.natural_twist + t * last.natural_twist,
-            )
-    return tuple(result)
 
 
 def _gradient(elements: tuple[Elements, ...], rod: ElasticRod, state: Floats, axial: Floats) -> Floats:

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, State
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.model.potential import product, room_for
-from rodshell.rods.elements import NO_HESSIANS, Elements, Stressed, Stretch, evaluate_all
+from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch, evaluate_all, is_stressed
 from rodshell.solve.problem import NO_CURVATURE, Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
@@ -218,13 +218,12 @@ class TangentAssembly:
         """Whether the constraint turns its free directions."""
         return len(self.hessians[-1]) > 0
 
-    def gradient(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Floats:
+    def gradient(self, elements: Sequence[Elements], state: State, forces: Floats) -> Floats:
         """(N, 3) gradient [N] of energy and load, the edges carrying the axial forces (e,) [N].
 
         Parameters
         ----------
         elements : with their source frames at, or near, the state.
-        state : (N, 3) node positions [m] and twist angles [rad].
         forces : (e,) axial forces of the edges [N].
         """
         return self._gradient(elements, state, forces, [NO_HESSIANS] * len(elements))[1]
@@ -280,19 +279,18 @@ class TangentAssembly:
         stretch.add_axial(state, forces, whole)
         return gradient, whole
 
-    def stress_values(self, elements: Sequence[Elements], state: Floats, change: Floats, motion: Floats) -> Floats:
+    def stress_values(self, elements: Sequence[Elements], state: State, change: Floats, motion: Floats) -> Floats:
         """(nnz,) values of the change of K with the internal forces alone, the geometry being frozen.
 
         Parameters
         ----------
         elements : with their source frames at, or near, the state.
-        state : (N, 3) node positions [m] and twist angles [rad].
         change : (e,) of the axial forces [N].
         motion : (N, 3) along which moments change, of the elements that are `Stressed` [m, rad].
         """
         hessians = room_for(self.blocks)
         for element, values in zip(elements, hessians, strict=False):
-            if isinstance(element, Stressed):
+            if is_stressed(element):
                 element.stress_stiffness(state, motion, values)
         self._problem.stretch.axial_stiffness(state, change, hessians[-2])
         return self.pattern.assembly.assemble(hessians, self.blocks, self._problem.constraint.freedom(state))

@@ -15,7 +15,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.layout import GridMesh
 from rodshell.output.colour_scale import Colour, gap_scale
-from rodshell.output.grid import CAPTIONS, Shape
+from rodshell.output.grid import CAPTIONS, Shape, supported
 from rodshell.output.models import section_outline
 from rodshell.output.viewer.scene import Coloured, Drawn
 from rodshell.results import wording
@@ -68,7 +68,9 @@ class Preview:
         shapes = [Shape("draped", CAPTIONS["draped"], draped, gaps), Shape("flat", CAPTIONS["flat"], mesh.flat)]
         for ends, shell in form.popped.items():
             name, found = f"popped_{ends}", form.agreement.get(ends)
-            shapes.append(Shape(name, CAPTIONS[name], shell.positions, None if found is None else found.gaps))
+            shapes.append(
+                Shape(name, f"Popped up, {supported(name)}", shell.positions, None if found is None else found.gaps)
+            )
             if found is not None:
                 where[name], largest[name] = np.array(found.where), found.max
         rounding, top = rounding_of(form), 1e3 * max(largest.values())

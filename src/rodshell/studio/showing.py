@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from rodshell.figures.checks import OTHER_SHAPES
 from rodshell.output.viewer import scene_of
 from rodshell.results import wording
 from rodshell.results.verdict import facts as facts_of
@@ -46,7 +47,7 @@ def _checked(archive: "Archive") -> Figures:
     """Figures of checks, refinement and loads, by which variants are compared."""
     results, rows = archive.results, []
     for shape, bent in (results.bending.shapes() if results.bending else {}).items():
-        if shape in ("pinned", "clamped") and bent.utilisation is not None:
+        if shape not in OTHER_SHAPES and bent.utilisation is not None:
             rows.append((f"utilisation, {shape}, unloaded", wording.percent(bent.utilisation)))
     for ends, weight in results.self_weight.items():
         rows.append((f"carries, {ends}", wording.share_of_weight(weight)))

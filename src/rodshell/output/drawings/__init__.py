@@ -3,6 +3,7 @@
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.figures.checks import OTHER_SHAPES
 from rodshell.output.drawing import TEXT, Drawing
 from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan, per_sheet, strips_drawing
 from rodshell.output.drawings.sheets import (
@@ -24,7 +25,7 @@ from rodshell.output.drawings.shell import (
     rod_curves,
     supports_drawing,
 )
-from rodshell.output.grid import lies_flat
+from rodshell.output.grid import lies_flat, supported
 from rodshell.output.schedules import (
     bracing_table,
     joints_table,
@@ -37,7 +38,8 @@ from rodshell.output.schedules import (
 from rodshell.output.settings import PAPERS
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
-from rodshell.results.strength_used import ENDS
+from rodshell.results.states import DRAPED, POPPED
+from rodshell.rods.supports import clamped_among, finals_first
 
 __all__ = ["drawing_set", "sheet_set"]
 
@@ -80,16 +82,17 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
 
 def _held(archive: Archive) -> str:
     """With which ends the final shape is; directions in the table of supports are those of the draped shell."""
-    if archive.final == "popped_clamped":
-        return ", clamped ends (directions held)"
-    directions = "; directions as on the target" if archive.results.end_tangents else ""
-    return f", pinned ends (free to turn{directions})" if archive.final == "popped_pinned" else ""
+    final = archive.final or DRAPED
+    if final == DRAPED:
+        return ""
+    turns = archive.results.end_tangents and not clamped_among([final.removeprefix(POPPED)])
+    return f", {supported(final, *(['directions as on the target'] if turns else []))}"
 
 
 def _checked(results: Results) -> str:
     """With which ends the final shape is that the bending of rods and the lengths of the bracing are of."""
     shapes = results.bending.shapes() if results.bending else {}
-    return next((f", final shape with {ends} ends" for ends in ENDS if ends in shapes), "")
+    return next((f", final shape with {ends} ends" for ends in finals_first(shapes) if ends not in OTHER_SHAPES), "")
 
 
 @made_once
