@@ -13,12 +13,10 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.case import Case
 from rodshell.checks import Checks, check
-from rodshell.checks.check import merged_checks
-from rodshell.checks.contact import contact_of_patches
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
-from rodshell.formfinding.patches import MergedPopUp, PatchedForm
+from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
@@ -172,7 +170,7 @@ class Form:
         return self.stages.boundary
 
     @property
-    def popped(self) -> Mapping[Ends, PopUp | MergedPopUp]:
+    def popped(self) -> Mapping[Ends, PopUp]:
         """The popped-up shell with each kind of ends; of several patches that of all together."""
         return self.stages.popped
 
@@ -380,16 +378,7 @@ class Form:
     def _checked(self, progress: Progress) -> Checks:
         self.options.require_known_stress(self.rod, self.joint)
         settings: dict[str, Any] = {"stages": self.options.stages, "shear_weight": self._weight(self.options)}
-        if not isinstance(self.stages, PatchedForm):
-            return check(self.stages.popped, self.rod, **settings, progress=progress)
-        found = self.stages.patches
-        each = {name: check(patch.popped, self.rod, **settings, progress=progress) for name, patch in found.items()}
-        met = {}
-        for ends in self.stages.popped:
-            shells = [patch.popped[ends] for patch in found.values()]
-            states = [(shell.shell, shell.state) for shell in shells]
-            met[ends] = contact_of_patches(self.footprint.mesh, states, self.rod)
-        return merged_checks(each, met)
+        return check(self.stages.popped, self.rod, **settings, progress=progress)
 
     @property
     def _design(self) -> dict[str, Floats]:

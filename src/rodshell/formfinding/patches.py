@@ -2,7 +2,7 @@
 rod ends of both sides meet at common points [HQK 3.4, the outlook]."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import degrees
 
@@ -12,8 +12,8 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.finite_sections import flat_warnings
 from rodshell.formfinding.methods import Draped
-from rodshell.formfinding.pipeline import Agreement, PatchForm, find_stages
-from rodshell.formfinding.popup import ENDS, Ends, Start
+from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement, find_stages
+from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
 from rodshell.formfinding.seams import FEWEST, Meeting, PatchNet, lay_patches, patches_of, transported_heading
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
@@ -22,7 +22,7 @@ from rodshell.layout import GridLayout
 from rodshell.layout.mesh import SideBySide, side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
-from rodshell.solve.equilibrium import SolveReport, Status
+from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.targets.patch_layout import PatchLayout
@@ -34,24 +34,6 @@ ASTRAY = 0.005  # of the size: rod ends that are moved further give a warning
 GAP = 2.0  # spacings between the flat grids of neighbouring patches
 
 
-@dataclass(frozen=True, eq=False)
-class MergedPopUp:
-    """The popped-up shells of all patches, merged; the mechanical models stay separate.
-
-    Parameters
-    ----------
-    positions : (n, 3) of the nodes of all patches, one after the other [m].
-    report : the merged report of all solves.
-    """
-
-    ends: Ends
-    start: Start
-    footprint: Footprint
-    boundary: Boundary
-    positions: Floats
-    report: SolveReport
-
-
 @dataclass(frozen=True)
 class PatchedForm:
     """A form in patches.
@@ -59,6 +41,7 @@ class PatchedForm:
     Parameters
     ----------
     patch_nets, patches : of each patch by its name: its rods, and every stage of its form.
+    popped : all patches as one shell, by end condition; missing where the drape of a patch did not converge.
     meetings : where rods of two patches end at one point.
     moved : of each patch the largest distance between a rod end of its mesh and that point, to which it was moved [m].
     """
@@ -74,6 +57,7 @@ class PatchedForm:
     meetings: tuple[Meeting, ...]
     moved: dict[str, float]
     ends: tuple[Ends, ...]
+    popped: dict[Ends, PopUp] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
@@ -109,11 +93,6 @@ class PatchedForm:
         """Where the target is cut: along creases that seams are drawn near to."""
         return next(iter(self.patch_nets.values())).patch.seams
 
-    def parameters(self) -> dict[str, object]:
-        """Seams and what patches have of their patch_layouts, as they stand in a case file."""
-        patches = [{"name": name, **_given(overrides)} for name, overrides in self.patch_layouts.items()]
-        return {"lines": [seam.points.tolist() for seam in self.seams], "patches": patches}
-
     @cached_property
     def flat(self) -> SideBySide:
         """The flat grids of all patches in a row."""
@@ -133,26 +112,7 @@ class PatchedForm:
     @cached_property
     def boundary(self) -> Boundary:
         """Of all patches, rod by rod."""
-        parts = [form.boundary for form in self.patches.values()]
-        points, tangents = (np.concatenate([getattr(part, what) for part in parts]) for what in ("points", "tangents"))
-        return Boundary(points, tangents, self.draped)
-
-    @cached_property
-    def popped(self) -> dict[Ends, MergedPopUp]:
-        """The shells of all patches as one, for each kind of ends that all were popped up with."""
-        forms = list(self.patches.values())
-        return {
-            ends: MergedPopUp(
-                ends,
-                "draped",
-                self.footprint,
-                self.boundary,
-                np.concatenate([form.popped[ends].positions for form in forms]),
-                merged_report([form.popped[ends].report for form in forms]),
-            )
-            for ends in forms[0].popped
-            if all(ends in form.popped for form in forms)
-        }
+        return Boundary.of_grids([form.boundary for form in self.patches.values()])
 
     @property
     def agreement(self) -> dict[Ends, Agreement]:
@@ -212,13 +172,69 @@ def find_patched_stages(
 
         found[name] = find_stages(
             patch.patch, patch.layout, rod,
-            anchor=patch.anchor, joint=joint, ends=ends, warm_start=earlier.get(name), same_drape=same_drape,
+            anchor=patch.anchor, joint=joint, ends=(), warm_start=earlier.get(name), same_drape=same_drape,
             name=name, cut=partial(cut_with_ends, end_points=end_points), progress=patch_progress,
         )  # fmt: skip
         moved[name] = _moved(found[name])
-    return PatchedForm(
+    laid = PatchedForm(
         target, tuple(seams), layout, rod, joint, patch_layouts, patch_nets, found, meetings, moved, ends
     )
+    return _popped_up(laid, warm_start, same_drape, progress)
+
+
+def _popped_up(form: PatchedForm, earlier: PatchedForm | None, same_drape: bool, progress: Progress) -> PatchedForm:
+    """The form with its pop-ups: of all patches as one shell, or of those alone whose drape converged."""
+    draped = {name: patch for name, patch in form.patches.items() if patch.draped.converged}
+    found = {name: dict[Ends, PopUp]() for name in draped}
+    popped = dict[Ends, PopUp]()
+    before = {} if earlier is None else earlier.popped
+    known = dict[Ends, PopUp]()
+    if (
+        same_drape
+        and earlier is not None
+        and all(patch.draped is earlier.patches[name].draped for name, patch in form.patches.items())
+    ):
+        known = {ends: shell for ends, shell in before.items() if shell.report.status is not Status.OUT_OF_TIME}
+    for ends in form.ends:
+        if earlier is not None and ends in known:
+            popped[ends] = known[ends]
+            for name, patch in earlier.patches.items():
+                found[name][ends] = patch.popped[ends]
+            continue
+        if len(draped) < len(form.patches):
+            for name, patch in draped.items():
+                found[name][ends] = pop_up(
+                    patch.footprint, patch.boundary, form.rod, ends=ends, joint=form.joint, progress=progress
+                )
+            continue
+        popped[ends] = pop_up(
+            form.footprint, form.boundary, form.rod,
+            ends=ends, warm_start=before.get(ends), joint=form.joint, like=next(iter(popped.values()), None),
+            progress=progress,
+        )  # fmt: skip
+        for k, (name, patch) in enumerate(draped.items()):
+            found[name][ends] = _of_patch(popped[ends], k, patch)
+        if popped[ends].report.status is Status.OUT_OF_TIME:
+            break
+    patches = {name: _compared(patch, form.ends, found.get(name, {})) for name, patch in form.patches.items()}
+    return replace(form, patches=patches, popped=popped)
+
+
+def _of_patch(popped: PopUp, k: int, patch: PatchForm) -> PopUp:
+    """The shell of the k-th patch, of all that were popped up together, on the patch's own mesh."""
+    footprint, found = patch.footprint, popped.alone[k]
+    shell = replace(found.shell, mesh=footprint.mesh)
+    return replace(found, footprint=footprint, boundary=patch.boundary, shell=shell)
+
+
+def _compared(patch: PatchForm, ends: tuple[Ends, ...], popped: dict[Ends, PopUp]) -> PatchForm:
+    """A patch with its shells, and how far they are from its target."""
+    gaps = {
+        end: patch.agreement.get(end) or agreement(shell, patch.target)
+        for end, shell in popped.items()
+        if shell.report.converged
+    }
+    return replace(patch, ends=ends, popped=popped, agreement=gaps)
 
 
 def best_heading(
@@ -311,25 +327,6 @@ def _moved(form: PatchForm) -> float:
     return float(
         np.linalg.norm(draped.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0)
     )
-
-
-def _given(overrides: PatchLayout) -> dict[str, object]:
-    return {key: value for key, value in asdict(overrides).items() if value is not None}
-
-
-def merged_report(reports: Sequence[SolveReport]) -> SolveReport:
-    """Of solves that have nothing to do with each other."""
-    worst = next((report.status for report in reports if not report.converged), Status.CONVERGED)
-    total = replace(
-        reports[0],
-        status=worst,
-        reason=next((report.reason for report in reports if report.reason), ""),
-        dofs=sum(report.dofs for report in reports),
-        force_residual=max(report.force_residual for report in reports),
-        max_strain=max(report.max_strain for report in reports),
-        negative_modes=sum(report.negative_modes for report in reports),
-    )
-    return total.after(*reports[1:])
 
 
 def merged_agreement(parts: Sequence[Agreement]) -> Agreement:

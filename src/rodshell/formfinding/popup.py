@@ -6,7 +6,7 @@ hold the direction of the draped rods as well. The end condition decides the sha
 A warm start transfers displacements and forces from an earlier pop-up, as the first guess of the solve.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, get_args
@@ -27,6 +27,7 @@ from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
+from rodshell.solve.grids import alone, together
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
 from rodshell.solve.problem import Pattern, Problem, Supports, mean_radius
 from rodshell.units import length_text
@@ -58,6 +59,7 @@ class PopUp:
     footprint, boundary : as they were given, in layers where joints are eccentric.
     shell : the mechanical model, its source frames being at the equilibrium.
     equilibrium : with the ends held where they are; its report counts the work of all solves on the way.
+    alone : of grids side by side the shell of each; of one grid none.
     """
 
     ends: Ends
@@ -66,6 +68,7 @@ class PopUp:
     boundary: Boundary
     shell: Shell
     equilibrium: Equilibrium
+    alone: tuple["PopUp", ...] = ()
 
     def __repr__(self) -> str:
         rods, state = len(self.footprint.rods), self.report.status.value
@@ -119,6 +122,9 @@ def pop_up(
 ) -> PopUp:
     """Move the rod ends of `footprint` to `boundary` and find the equilibrium of the free grid.
 
+    Grids that lie side by side are one shell. From flat, and where all together are not stable, each is popped up
+    alone, so that what becomes of one does not depend on the others.
+
     Parameters
     ----------
     ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp).
@@ -170,16 +176,7 @@ def pop_up(
         )
     known = like.equilibrium.problem.pattern if like is not None else None
     stages = _Stages(footprint, boundary, rod, joint, progress, known, most_factorizations)
-    if start == "draped":
-        shell, found = (stages.again(warm_start) if warm_start else None) or stages.release(ends)
-    else:
-        shell, found = stages.rise()
-        if ends == "clamped" and found.report.converged:
-            shell, found = stages.turn_clamps(shell, found)
-    shell = shell.with_elements(found.elements)
-    if start == "flat":  # the ends have arrived
-        found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
-    return PopUp(ends, start, footprint, boundary, shell, found)
+    return stages.popped(ends, start, warm_start)
 
 
 @dataclass(frozen=True)
@@ -202,7 +199,8 @@ class _Stages:
         shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
         if not shell.angles:
             return shell
-        return shell.turned(PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], self.boundary.points).turn)
+        motions = [PlanarMotion.onto(*ends) for ends in _ends_of_grids(mesh, self.boundary.points)]
+        return shell.turned(np.array([motion.turn for motion in motions]))
 
     @property
     def length(self) -> float:
@@ -217,7 +215,8 @@ class _Stages:
         states far from the target. None where rods can roll at their joints: laths on edge have as many modes, and
         lie down.
         """
-        return None if self.rolls else int(MODES_PER_JOINT * len(self.footprint.mesh.grid.crossings))
+        fewest = min(len(mesh.grid.crossings) for mesh in self.footprint.mesh.grids)
+        return None if self.rolls else int(MODES_PER_JOINT * fewest)
 
     @property
     def most_rolling(self) -> int | None:
@@ -231,6 +230,51 @@ class _Stages:
         """Whether rods can roll at their joints."""
         joints = self.joint if isinstance(self.joint, Sequence) else (self.joint,)
         return not all(joint.holds_normals for joint in joints)
+
+    def popped(self, ends: Ends, start: Start, warm_start: PopUp | None) -> PopUp:
+        """Of several grids as one shell, or each alone: from flat, and where all together are not stable."""
+        grids = self._of_grids()
+        if start == "flat" and grids:
+            return self._one_by_one(grids, ends, start)
+        if start == "draped":
+            shell, found = (self.again(warm_start) if warm_start else None) or self.release(ends)
+            if grids and not found.report.stable and found.report.status is not Status.OUT_OF_TIME:
+                return self._one_by_one(grids, ends, start, found.report)
+        else:
+            shell, found = self.rise()
+            if ends == "clamped" and found.report.converged:
+                shell, found = self.turn_clamps(shell, found)
+        shell = shell.with_elements(found.elements)
+        if start == "flat":  # the ends have arrived
+            found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
+        each = list[PopUp]()
+        for k, grid in enumerate(grids):
+            part = grid.shell(ends)
+            state = alone(shell, found, k, part, grid.problem(part))
+            each.append(PopUp(ends, start, grid.footprint, grid.boundary, *state))
+        return PopUp(ends, start, self.footprint, self.boundary, shell, found, tuple(each))
+
+    def _one_by_one(
+        self, grids: Sequence["_Stages"], ends: Ends, start: Start, first: SolveReport | None = None
+    ) -> PopUp:
+        """Each grid popped up alone, after a `first` solve of all that was not stable."""
+        each, shell = tuple(grid.popped(ends, start, None) for grid in grids), self.shell(ends)
+        parts = [(grid.shell, grid.equilibrium) for grid in each]
+        found = together(shell, self.problem(shell), parts, *(() if first is None else (first,)))
+        shell = shell.with_elements(found.elements)
+        return PopUp(ends, start, self.footprint, self.boundary, shell, found, each)
+
+    def _of_grids(self) -> list["_Stages"]:
+        """Those of each grid, where several lie side by side."""
+        mesh, every = self.footprint.mesh, self.joint
+        stops = np.cumsum([0, *(len(grid.grid.crossings) for grid in mesh.side_by_side)])
+        return [
+            replace(
+                self, footprint=Footprint(grid), boundary=self.boundary.of_grid(mesh, k), pattern=None,
+                joint=every[stops[k] : stops[k + 1]] if isinstance(every, Sequence) else every,
+            )
+            for k, grid in enumerate(mesh.side_by_side)
+        ]  # fmt: skip
 
     def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
         """The shell with its ends (and ghost nodes) held at the boundary, or at `goals`."""
@@ -256,6 +300,7 @@ class _Stages:
         shell = self.shell(ends)
         state = self.upright(shell, self.boundary.draped, self.boundary.tangents, self.boundary.normals)
         forces = np.zeros(len(self.footprint.mesh.edges))
+        several = len(self.footprint.mesh.grids) > 1  # then each leaves its own saddle, to its own side
         at_once = find_stable(
             self.problem(shell),
             state,
@@ -263,9 +308,11 @@ class _Stages:
             limit_steps=True,
             most_modes=self.most_modes,
             most_iterations=MOST_AT_ONCE,
+            slide=not several,
             progress=self._counting(f"{ends}, iteration", MOST_AT_ONCE),
         )
-        if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
+        given_up = at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME)
+        if at_once.report.stable or given_up or several:
             return shell, at_once
         relaxed = relax(
             self.problem(shell),
@@ -407,24 +454,35 @@ def turned(now: Floats, goal: Floats, t: float) -> Floats:
     return unit(np.where(angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * goal) / sine, now))
 
 
-def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
-    """The flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
+def laid_below(mesh: GridMesh, points: Floats, height: Callable[[Floats], float]) -> Floats:
+    """Each flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
 
     Parameters
     ----------
     points : (2m, 3) where both ends of each rod in turn are to go [m].
-    height : of the grid's plane [m].
+    height : of a grid's plane, from the heights (k,) of the points to which its own ends go [m].
 
     Returns
     -------
     (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
     """
-    return PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], points).moved(mesh.flat, height)
+    laid = np.empty_like(mesh.flat)
+    for k, (ends, goals) in enumerate(_ends_of_grids(mesh, points)):
+        nodes = mesh.grid_of_nodes == k
+        laid[nodes] = PlanarMotion.onto(ends, goals).moved(mesh.flat[nodes], float(height(goals[:, 2])))
+    return laid
+
+
+def _ends_of_grids(mesh: GridMesh, points: Floats) -> Iterator[tuple[Floats, Floats]]:
+    """Of each grid its rods' ends (2k, 3) in the flat state, and where they are to go (2k, 3) [m]."""
+    ends, of_ends = mesh.flat[mesh.ends.ravel()], np.repeat(mesh.grid_of_rods, 2)
+    for k in range(len(mesh.grids)):
+        yield ends[of_ends == k], points[of_ends == k]
 
 
 def flat_below(mesh: GridMesh, points: Floats) -> Floats:
-    """(n, 3) the flat grid laid out at the mean height of the points (2m, 3) to which its ends go [m]."""
-    return laid_below(mesh, points, float(points.mean(axis=0)[2]))
+    """(n, 3) each flat grid laid out at the mean height of those points (2m, 3) to which its own ends go [m]."""
+    return laid_below(mesh, points, np.mean)
 
 
 def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary) -> Floats:

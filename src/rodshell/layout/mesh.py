@@ -40,6 +40,7 @@ class GridMesh:
     stations : (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
     joint_nodes : (c,) node of each of the grid's crossings, on its first rod.
     second_nodes : (c,) the same on its second rod, where rods are in layers and share no nodes; None: the same node.
+    side_by_side : the grids that it consists of, in the order of their rods, nodes and crossings; empty: of one.
     """
 
     grid: FlatGrid
@@ -49,6 +50,22 @@ class GridMesh:
     stations: Floats
     joint_nodes: Ints
     second_nodes: Ints | None = None
+    side_by_side: tuple["GridMesh", ...] = ()
+
+    @property
+    def grids(self) -> tuple["GridMesh", ...]:
+        """The meshes of all grids that lie side by side, of which it is the only one or consists."""
+        return self.side_by_side or (self,)
+
+    @cached_property
+    def grid_of_rods(self) -> Ints:
+        """(m,) grid that each rod belongs to."""
+        return np.repeat(np.arange(len(self.grids)), [len(mesh.grid.rods) for mesh in self.grids])
+
+    @cached_property
+    def grid_of_nodes(self) -> Ints:
+        """(n,) grid that each node belongs to."""
+        return np.repeat(np.arange(len(self.grids)), [mesh.node_count for mesh in self.grids])
 
     @cached_property
     def apart(self) -> "GridMesh":
@@ -624,4 +641,5 @@ def _merged(meshes: list[GridMesh]) -> GridMesh:
         np.concatenate([mesh.joint_pairs[:, 1] + by for mesh, by in zip(meshes, nodes, strict=False)])
         if any(mesh.layered for mesh in meshes)
         else None,
+        tuple(meshes),
     )

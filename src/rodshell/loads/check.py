@@ -24,7 +24,7 @@ from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.loads import Governs, Utilisations
 from rodshell.figures.records import Found
-from rodshell.formfinding import PatchForm, PopUp, pop_up
+from rodshell.formfinding import PatchForm, PopUp
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
 from rodshell.layout import GridMesh
@@ -51,7 +51,6 @@ BRACED: dict[type, Callable[..., Structure]] = {Cables: stressed, Laths: laid}
 
 PERMANENT: Duration = "permanent"
 ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
-SAME_SHAPE = 1e-4  # of the size: patches together are where each is alone
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
@@ -151,7 +150,7 @@ def check_shells(
     if loads.locked_joints is not None:
         loads.locked_joints.require_pins(stages.joint)
     areas = tributary_of(stages)
-    done = {ends: popped for ends, popped in _popped_up(stages).items() if popped.report.converged}
+    done = {ends: popped for ends, popped in stages.popped.items() if popped.report.converged}
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
     stopped, braced, vibrations = "", np.empty((0, 2), dtype=np.intp), dict[Ends, Floats]()
@@ -203,29 +202,6 @@ def unchecked(loads: Loads, *, refused: str = "", stopped: str = "") -> LoadChec
 
 def _said(progress: Progress, where: str, what: str) -> None:
     progress("loads", f"{where}, {what}", 0.0)
-
-
-def _popped_up(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
-    """The popped-up shells; those of patches as one model of all, found again from the draped state.
-
-    Raises
-    ------
-    ConvergenceError : the model of all patches has another shape than each of them alone.
-    """
-    if isinstance(stages, PatchForm):
-        return dict(stages.popped)
-    found = dict[Ends, PopUp]()
-    for ends, alone in stages.popped.items():
-        if not alone.report.converged:
-            continue
-        found[ends] = pop_up(stages.footprint, stages.boundary, stages.rod, ends=ends, joint=stages.joint)
-        off = float(np.abs(found[ends].positions - alone.positions).max())
-        if not found[ends].report.converged or off > SAME_SHAPE * stages.target.size:
-            raise ConvergenceError(
-                f"with {ends} ends the patches take another shape together than each alone, and cannot be checked "
-                "under loads: check each patch as a case of its own"
-            )
-    return found
 
 
 def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm | PatchedForm) -> Structure:

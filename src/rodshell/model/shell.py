@@ -72,7 +72,7 @@ class Shell:
     edge_mass : (e,) mass of each edge [kg].
     edge_inertia : (e,) moment of inertia of each edge about its tangent [kg m2].
     joint_mass : (c,) mass of each crossing's joint [kg].
-    turn : (2, 2) how the flat grid, from which frames are transported, is turned in its plane, of rows x, y.
+    turns : (g, 2, 2) how each flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
 
     mesh: GridMesh
@@ -89,7 +89,7 @@ class Shell:
     edge_mass: Floats
     edge_inertia: Floats
     joint_mass: Floats
-    turn: Floats = field(default_factory=lambda: np.eye(2))
+    turns: Floats = field(default_factory=lambda: np.eye(2)[None])
 
     def __repr__(self) -> str:
         ends = "clamped" if len(self.ghosts) else "pinned"
@@ -236,16 +236,25 @@ class Shell:
         count = len(self.within)
         return replace(self, within=elements[:count], between=elements[count:])
 
-    def turned(self, turn: Floats) -> "Shell":
-        """The same shell of a flat grid that is turned in its plane, so that no edge of a shell that lies the other way
-        round has to be turned right round from there.
+    @cached_property
+    def grid_of(self) -> Ints:
+        """(N,) which of the grids that lie side by side each block belongs to."""
+        of_rods = self.mesh.grid_of_rods
+        of_ends, of_edges = np.repeat(of_rods, 2), of_rods[self.mesh.edge_rods]
+        of_angles = np.append(of_edges, of_ends)[: self.angles]
+        return np.concatenate([self.mesh.grid_of_nodes, of_ends[: len(self.ghosts)], of_angles])[self.like]
+
+    def turned(self, turns: Floats) -> "Shell":
+        """The same shell of flat grids that are turned in their plane, so that no edge of a shell that lies the other
+        way round has to be turned right round from there.
 
         Parameters
         ----------
-        turn : (2, 2), of rows x, y.
+        turns : (g, 2, 2) of each grid, of rows x, y.
         """
-        frames = self.with_elements(tuple(turned(element, turn) for element in self.elements))
-        return replace(frames, turn=self.turn @ turn)
+        of_grids = [turns[self.grid_of[element.blocks[:, 0]]] for element in self.elements]
+        frames = self.with_elements(tuple(map(turned, self.elements, of_grids)))
+        return replace(frames, turns=self.turns @ turns)
 
     def with_frames_of(self, elements: tuple[Elements, ...]) -> "Shell":
         """The same shell with the source frames of another one, so that twist angles mean the same in both.
@@ -264,7 +273,7 @@ class Shell:
         """Set the twist angles so that the first directors are as near to the normals as they can be."""
         flat = self.mesh.flat[self.mesh.edges]
         before, now = (unit(np.diff(ends, axis=1)[:, 0]) for ends in (flat, state[self.stretch.blocks]))
-        before[:, :2] @= self.turn
+        before[:, :2] = (before[:, None, :2] @ self.turns[self.grid_of[self.stretch.blocks[:, 0]]])[:, 0]
         moved = parallel_transport(adapted(np.broadcast_to(UP, before.shape), before), before, now)
         wanted = adapted(unit(normals[self.mesh.edges].sum(axis=1)), now)
         self.turn_edges(state, signed_angle(moved, wanted, now))
@@ -450,16 +459,18 @@ class _Builder:
         ties = [_ties(pairs, self._penalties()[0])] if centric.any() else []
         return [*ties, *offset_ties(self.rod_nodes, eccentricity, self._offset_stiffness(), self.size)]
 
-    def _offset_stiffness(self) -> float:
-        """Stiffness of eccentric ties [N/m].
+    def _offset_stiffness(self) -> Floats:
+        """(c,) stiffness of eccentric ties [N/m].
 
         Ties a hundred thousand times stiffer, as of a penalty, would have a geometric stiffness that outweighs bending
         already at the micrometres by which rods miss their distance in an initial guess.
         """
+        mesh, rods = self.mesh, self.mesh.grid.crossings.rods
         if not isinstance(self.coupling, SharedDofs):
-            return self._penalties()[0]
-        edge = np.median(self.mesh.edge_lengths)
-        return OFFSET_STIFFNESS * min(rod.stretch_stiffness for rod in self.rods) / edge
+            return np.full(len(rods), self._penalties()[0])
+        edges = np.array([np.median(grid.edge_lengths) for grid in mesh.grids])
+        least = min(rod.stretch_stiffness for rod in self.rods)
+        return OFFSET_STIFFNESS * least / edges[mesh.grid_of_rods[rods[:, 0]]]
 
     def _penalties(self) -> tuple[float, float]:
         """C1 [N/m] and C2 [N m/rad]; by default those of the softest rod."""
