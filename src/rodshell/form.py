@@ -15,8 +15,7 @@ from rodshell.case import Case
 from rodshell.checks import Checks, check
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
-from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
-from rodshell.formfinding.patches import PatchedForm
+from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PopUp, Stages, Trimmed
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
@@ -55,8 +54,6 @@ if TYPE_CHECKING:
     from rodshell.loads.check import LoadChecks
     from rodshell.loads.combinations import Loads
     from rodshell.refining.acceptance import Refined
-
-Stages = PatchForm | PatchedForm
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,24 +122,24 @@ class Form:
     @property
     def from_table(self) -> bool:
         """Whether it comes from a table of rods, which has no target."""
-        return isinstance(self.stages, PatchForm) and self.stages.from_table
+        return self.stages.from_table
 
     # The stages
 
     @property
-    def patches(self) -> tuple[PatchForm, ...]:
+    def patches(self) -> tuple[Stages, ...]:
         """The stages of each patch; a form in one piece has one."""
-        return tuple(self.stages.patches.values()) if isinstance(self.stages, PatchedForm) else (self.stages,)
+        return self.stages.parts
 
     @property
     def seams(self) -> tuple[Seam, ...]:
         """The lines along which the target was cut: where it is creased along a seam, its crease."""
-        return self.stages.cut_along if isinstance(self.stages, PatchedForm) else ()
+        return self.stages.seams.lines if self.stages.seams else ()
 
     @property
     def meetings(self) -> tuple[Meeting, ...]:
         """Where rods of two patches end at one point of a seam."""
-        return self.stages.meetings if isinstance(self.stages, PatchedForm) else ()
+        return self.stages.seams.meetings if self.stages.seams else ()
 
     @property
     def draped(self) -> Draped:
@@ -152,12 +149,12 @@ class Form:
         ------
         InputError : the form has several patches, or comes from a table of rods; so for `trimmed`.
         """
-        return self._only_patch("draped").draped
+        return self.stages.draped
 
     @property
     def trimmed(self) -> Trimmed:
         """The draped grid cut to its target, of a form in one piece."""
-        return self._only_patch("trimmed").trimmed
+        return self.stages.trimmed
 
     @property
     def footprint(self) -> Footprint:
@@ -367,11 +364,6 @@ class Form:
     def _shapes(self) -> dict[str, Floats]:
         return {"flat": self.footprint.mesh.flat} | {ends: shell.positions for ends, shell in self.popped.items()}
 
-    def _only_patch(self, what: str) -> PatchForm:
-        if isinstance(self.stages, PatchedForm):
-            raise InputError(f"this form has {len(self.patches)} patches: take patches[k].{what}")
-        return self.stages
-
     def _weight(self, options: OutputOptions) -> float:
         return options.judged_by(self.rod).shear_weight
 
@@ -390,8 +382,8 @@ class Form:
     def _archive(self) -> Archive:
         checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
         results = self.results()
-        if isinstance(self.stages, PatchedForm):
-            results = with_seam_forces(results, self.stages, checks)
+        if self.stages.seams is not None:
+            results = with_seam_forces(results, self.stages.seams, checks)
         mesh, asked = self.footprint.mesh, self.case.strength
         results = checked_results(
             results, mesh, checks, self.fabrication,

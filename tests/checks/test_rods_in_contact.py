@@ -264,7 +264,7 @@ def test_rods_that_leave_no_room_for_joints_are_warned_of() -> None:
 def beside_each_other(first: list[FlatRod], second: list[FlatRod], *, gap: float = 0.2) -> rs.Shell:
     """Patches A and B of these rods as one shell."""
     meshes = {"A": mesh_grid(FlatGrid.of(first), 0.02), "B": mesh_grid(FlatGrid.of(second), 0.02)}
-    return rs.Shell.of(side_by_side_meshes(meshes, gap).mesh, round_rod(5e-3))
+    return rs.Shell.of(side_by_side_meshes(meshes, gap), round_rod(5e-3))
 
 
 def test_on_their_way_rods_of_two_patches_are_not_looked_at_and_those_of_each_are() -> None:

@@ -119,7 +119,7 @@ def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
 @every_case
 def test_every_patch_lies_on_the_target_on_its_own_side(name: str) -> None:
     form = sewn(name)
-    for found, laid in zip(form.stages.patches.values(), form.stages.patch_nets.values(), strict=True):
+    for found, laid in zip(form.stages.patches.values(), form.stages.seams.nets.values(), strict=True):
         x = found.trimmed.positions
         assert np.abs(form.target.gap(x).distance).max() < 1e-9 * form.target.size
         assert laid.patch.margin(x).min() > -3e-3 * form.target.size  # straight chords beside a curved edge
@@ -140,7 +140,7 @@ def test_shells_are_stable_and_stay_near(name: str) -> None:
 @every_case
 def test_ends_hardly_move_to_their_points(name: str) -> None:
     """What the mesh of a patch alone misses them by; second order in its edges."""
-    assert max(sewn(name).stages.moved.values()) < 3e-3 * CASES[name][0].size
+    assert max(sewn(name).stages.seams.moved.values()) < 3e-3 * CASES[name][0].size
 
 
 @pytest.mark.slow
@@ -150,7 +150,7 @@ def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
     form = sewn(name)
     for meeting in form.meetings:
         end = meeting.ends[1]
-        laid = form.stages.patch_nets[end.patch]
+        laid = form.stages.seams.nets[end.patch]
         rod = next(rod for rod in laid.rods if rod.name == end.rod)
         if [other.ends[1].rod for other in form.meetings if other.ends[1].patch == end.patch].count(end.rod) > 1:
             continue
@@ -164,7 +164,7 @@ def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
 def test_a_patch_alone_is_the_same_form() -> None:
     """One job with the patch's boundary and rods; only its ends are not moved (0.03 mm) to where the others are."""
     form = sewn("dome, diagonal")
-    for name, laid in form.stages.patch_nets.items():
+    for name, laid in form.stages.seams.nets.items():
         alone = rs.find_form(laid.patch, laid.layout, ROD, anchor=laid.anchor, ends=("clamped",))
         found = form.stages.patches[name]
         held = found.footprint.mesh.ends.ravel()
@@ -172,7 +172,7 @@ def test_a_patch_alone_is_the_same_form() -> None:
         np.testing.assert_array_equal(found.trimmed.positions[free], alone.trimmed.positions[free])
         np.testing.assert_array_equal(found.footprint.points, alone.footprint.points)
         apart = np.linalg.norm(found.popped["clamped"].positions - alone.popped["clamped"].positions, axis=1)
-        assert apart.max() < 3 * form.stages.moved[name] < 1.2e-4
+        assert apart.max() < 3 * form.stages.seams.moved[name] < 1.2e-4
 
 
 @pytest.mark.slow
@@ -244,7 +244,7 @@ def test_a_sphere_beyond_the_nets_limit_is_formed_in_two() -> None:
     with pytest.raises(NetLimitError):
         rs.find_form(BALL, layout_of(0.035), ROD)
     form = sewn("ball")
-    assert min(laid.net.min_angle for laid in form.stages.patch_nets.values()) > np.radians(20)
+    assert min(laid.net.min_angle for laid in form.stages.seams.nets.values()) > np.radians(20)
     assert all("would swing" in why for _, why in form.dropped)
 
 
@@ -267,8 +267,8 @@ def test_the_search_leaves_out_no_more_rods_than_the_default_heading() -> None:
 def test_a_patch_may_have_its_own_spacing_and_anchor() -> None:
     own = {"B": rs.PatchLayout(anchor=(0.1, -0.1), spacing=(0.05, 0.05))}
     form = rs.find_form(DOME, layout_of(0.04), ROD, seams=[DIAGONAL], patches=own, ends=())
-    assert form.stages.patch_nets["B"].layout.spacing == (0.05, 0.05)
-    np.testing.assert_allclose(form.stages.patch_nets["B"].anchor, (0.1, -0.1), atol=0.03 * 0.05)
+    assert form.stages.seams.nets["B"].layout.spacing == (0.05, 0.05)
+    np.testing.assert_allclose(form.stages.seams.nets["B"].anchor, (0.1, -0.1), atol=0.03 * 0.05)
     assert len(form.meetings) > 10
 
 
@@ -446,24 +446,22 @@ def test_grids_side_by_side_are_the_same_grids() -> None:
     meshes = {name: found.footprint.mesh for name, found in form.stages.patches.items()}
     both = side_by_side(meshes, 0.05)
     at = 0
-    for name, mesh in meshes.items():
-        moved = both.mesh.flat[at : at + mesh.node_count]
-        np.testing.assert_allclose(
-            moved - mesh.flat, np.broadcast_to([*both.shifts[name], 0.0], moved.shape), atol=1e-15
-        )
+    for mesh in meshes.values():
+        moved = both.flat[at : at + mesh.node_count]
+        shift = moved[0] - mesh.flat[0]
+        np.testing.assert_allclose(moved - mesh.flat, np.broadcast_to(shift, moved.shape), atol=1e-15)
         at += mesh.node_count
     spans = [
-        (x.min(), x.max())
-        for x in np.split(both.mesh.flat[:, 0], np.cumsum([m.node_count for m in meshes.values()])[:-1])
+        (x.min(), x.max()) for x in np.split(both.flat[:, 0], np.cumsum([m.node_count for m in meshes.values()])[:-1])
     ]
     for (_, end), (start, _) in pairwise(spans):
         assert start - end == pytest.approx(0.05)
-    for (a, b), (s, t) in zip(both.mesh.grid.crossings.rods, both.mesh.grid.crossings.at, strict=True):
-        rods = both.mesh.grid.rods
+    for (a, b), (s, t) in zip(both.grid.crossings.rods, both.grid.crossings.at, strict=True):
+        rods = both.grid.rods
         np.testing.assert_allclose(rods[a].point(s), rods[b].point(t), atol=1e-14)
-    for k, rod in enumerate(both.mesh.grid.rods):
+    for k, rod in enumerate(both.grid.rods):
         np.testing.assert_allclose(
-            both.mesh.flat[both.mesh.nodes_of(k), :2], rod.point(both.mesh.stations[both.mesh.rod_slice(k)]), atol=1e-14
+            both.flat[both.nodes_of(k), :2], rod.point(both.stations[both.rod_slice(k)]), atol=1e-14
         )
 
 

@@ -12,7 +12,7 @@ import rodshell as rs
 from rodshell.case.stage_tables import FAMILIES as WORDS
 from rodshell.cli import main
 from rodshell.errors import OutOfTimeError
-from rodshell.formfinding.pipeline import Agreement, PatchForm
+from rodshell.formfinding.pipeline import Agreement, Stages
 from rodshell.formfinding.popup import PopUp
 from rodshell.output.viewer.scene import scene_of
 from rodshell.refining import acceptance
@@ -149,7 +149,7 @@ def test_the_offer_says_that_no_gain_was_found() -> None:
 def test_the_offer_is_of_the_designs_that_are_stable(stable: int, monkeypatch: pytest.MonkeyPatch) -> None:
     plain, popped_up, shares = rs.Job.load("hemisphere", PINNED).run(until="pop-up"), of_offer._popped_up, list[float]()
 
-    def first_ones(patch: PatchForm, share: float, like: PopUp) -> PopUp:
+    def first_ones(patch: Stages, share: float, like: PopUp) -> PopUp:
         shares.append(share)
         found = popped_up(patch, share, like)
         lost = replace(found.equilibrium.report, negative_modes=1)
@@ -284,7 +284,7 @@ def test_a_design_that_passes_all_gates_but_is_not_nearer_than_the_form_is_not_t
     )
     gap, tried = before.agreement["pinned"].rms, list[float]()
 
-    def gates(form: PatchForm, **_: object) -> Gates:
+    def gates(form: Stages, **_: object) -> Gates:
         tried.append(form.agreement["pinned"].rms)
         return Gates({"tolerance": tried[-1] > gap}, "" if tried[-1] > gap else "tolerance: refused", 0)
 

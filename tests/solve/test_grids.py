@@ -38,7 +38,7 @@ def together(kind: str, **options: Any) -> rs.PopUp:
     rod, joint = KINDS[kind]
     parts = caps(kind)
     meshes = {name: form.footprint.mesh for name, form in zip("AB", parts, strict=True)}
-    mesh = side_by_side(meshes, 0.1).mesh
+    mesh = side_by_side(meshes, 0.1)
     boundary = Boundary.of_grids([form.boundary for form in parts])
     return rs.pop_up(Footprint(mesh), boundary, rod, ends="pinned", joint=joint, **options)
 

@@ -23,6 +23,7 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
 from rodshell.layout.transfer import transferred_edges, transferred_nodes
 from rodshell.model import Shell
+from rodshell.model.rod_sections import RodSections
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
@@ -190,13 +191,14 @@ class _Stages:
     progress: Progress
     pattern: Pattern | None = None
     most_factorizations: int | None = None
+    isotropic: bool | None = None
 
     def _counting(self, what: str, most: int) -> Callable[[int, float], None]:
         return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
 
     def shell(self, ends: Ends) -> Shell:
         mesh = self.footprint.mesh
-        shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
+        shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint, isotropic=self.isotropic)
         if not shell.angles:
             return shell
         motions = [PlanarMotion.onto(*ends) for ends in _ends_of_grids(mesh, self.boundary.points)]
@@ -267,11 +269,15 @@ class _Stages:
     def _of_grids(self) -> list["_Stages"]:
         """Those of each grid, where several lie side by side."""
         mesh, every = self.footprint.mesh, self.joint
+        if not mesh.side_by_side:
+            return []
+        sections = RodSections.of(mesh, [self.rod] * len(mesh.grid.rods)).nodes
+        isotropic = bool((sections[:, 0] == sections[:, 1]).all())  # else each grid needs frames, as the whole does
         stops = np.cumsum([0, *(len(grid.grid.crossings) for grid in mesh.side_by_side)])
         return [
             replace(
                 self, footprint=Footprint(grid), boundary=self.boundary.of_grid(mesh, k), pattern=None,
-                joint=every[stops[k] : stops[k + 1]] if isinstance(every, Sequence) else every,
+                isotropic=isotropic, joint=every[stops[k] : stops[k + 1]] if isinstance(every, Sequence) else every,
             )
             for k, grid in enumerate(mesh.side_by_side)
         ]  # fmt: skip

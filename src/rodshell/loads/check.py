@@ -24,8 +24,7 @@ from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.loads import Governs, Utilisations
 from rodshell.figures.records import Found
-from rodshell.formfinding import PatchForm, PopUp
-from rodshell.formfinding.patches import PatchedForm
+from rodshell.formfinding import PopUp, Stages
 from rodshell.formfinding.popup import Ends
 from rodshell.layout import GridMesh
 from rodshell.loads.bracing import stressed
@@ -130,7 +129,7 @@ class LoadChecks:
 
 
 def check_shells(
-    stages: PatchForm | PatchedForm, loads: Loads, *,
+    stages: Stages, loads: Loads, *,
     limits: Limits = Limits(), progress: Progress = silent,
 ) -> LoadChecks:  # fmt: skip
     """Check every shell of a form that converged under each combination.
@@ -145,7 +144,7 @@ def check_shells(
     ------
     InputError : a load does not fit the form; a strength is given, and the stress of its rods is not known.
     """
-    if isinstance(stages, PatchForm) and stages.from_table:
+    if stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
     if loads.locked_joints is not None:
         loads.locked_joints.require_pins(stages.joint)
@@ -204,7 +203,7 @@ def _said(progress: Progress, where: str, what: str) -> None:
     progress("loads", f"{where}, {what}", 0.0)
 
 
-def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm | PatchedForm) -> Structure:
+def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: Stages) -> Structure:
     """The erected shell with its bracing locked, and then its joints.
 
     Raises
@@ -243,7 +242,7 @@ def mechanism(structure: Structure) -> str | None:
     )
 
 
-def tributary_of(stages: PatchForm | PatchedForm) -> Tributary:
+def tributary_of(stages: Stages) -> Tributary:
     """The areas of the target that each node of a form takes.
 
     Parameters
@@ -251,11 +250,11 @@ def tributary_of(stages: PatchForm | PatchedForm) -> Tributary:
     stages : of a form that has a target.
     """
     layout, anchor = stages.layout, stages.target.summit
-    if isinstance(stages, PatchForm):
-        positions, anchor = stages.trimmed.positions, stages.draped.anchor or anchor
-    else:
-        positions = np.concatenate([patch.trimmed.positions for patch in stages.patches.values()])
-    return tributary_areas(stages.target, positions, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing))
+    if stages.seams is None:
+        anchor = stages.draped.anchor or anchor
+    return tributary_areas(
+        stages.target, stages.on_target, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing)
+    )
 
 
 def _load(structure: Structure, nodes: LoadedNodes, loads: Loads, factors: Mapping[str, float]) -> Load:

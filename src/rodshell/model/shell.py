@@ -105,6 +105,7 @@ class Shell:
         joint: Joint | Sequence[Joint] | None = None,
         coupling: Coupling | None = None,
         twist: bool | None = None,
+        isotropic: bool | None = None,
     ) -> "Shell":
         """Assemble a mesh.
 
@@ -119,6 +120,7 @@ class Shell:
         joint : the same for all, or one for each crossing of the grid; None: ball joints.
         coupling : None: shared DOFs. Eccentric joints are tied by springs with any coupling.
         twist : give the rods twist angles; None: if any energy depends on them.
+        isotropic : False: give all rods frames, as one of them needs in a larger shell; None: if these rods need them.
 
         Raises
         ------
@@ -130,7 +132,7 @@ class Shell:
         if coupling is not None:
             instance("coupling", coupling, Coupling, COUPLING)
         clamped, twist = flag("clamped", clamped), None if twist is None else flag("twist", twist)
-        return _Builder(mesh, rod, joint, coupling or SharedDofs(), clamped, twist).shell()
+        return _Builder(mesh, rod, joint, coupling or SharedDofs(), clamped, twist, isotropic).shell()
 
     @property
     def elements(self) -> tuple[Elements, ...]:
@@ -302,6 +304,7 @@ class _Builder:
         coupling: Coupling,
         clamped: bool,
         twist: bool | None,
+        isotropic: bool | None = None,
     ) -> None:
         for item in rod if isinstance(rod, Sequence) else (rod,):
             instance("rod", item, Rod)
@@ -317,7 +320,7 @@ class _Builder:
         self.mesh, self.coupling = mesh, coupling
         self.sections = RodSections.of(mesh, self.rods)
         self.stiffness = self.sections.nodes
-        self.isotropic = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
+        self.isotropic = isotropic is not False and bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
         needed = not self.isotropic or any(item.turns_frames for item in self.joints)
         self.twist = needed if twist is None else twist
         if needed and not self.twist:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding.patches import PatchedForm
 from rodshell.layout import GridMesh
 from rodshell.output.colour_scale import Colour, gap_scale
 from rodshell.output.grid import CAPTIONS, Shape
@@ -104,8 +103,7 @@ def figures(form: "Form") -> Figures:
     """Figures of a form in words, by their names."""
     rods, rounding = form.footprint.rods, rounding_of(form)
     stages = form.stages
-    nets = [laid.net for laid in stages.patch_nets.values()] if isinstance(stages, PatchedForm) else [stages.draped.net]
-    angles = [net.min_angle for net in nets if net is not None]
+    angles = [part.draped.net.min_angle for part in stages.parts if part.draped.net is not None]
     return lengths([rod.length for rod in rods], rounding) + [
         *(("smallest angle between rods", wording.degrees(degrees(min(angles)))) for _ in angles[:1]),
         *(gap(ends, found.max, found.max_relative, rounding) for ends, found in form.agreement.items()),
