@@ -200,6 +200,23 @@ def test_the_offer_for_patches_is_of_all_of_them() -> None:
     assert found.after < found.before == plain.agreement["pinned"].rms_relative
 
 
+def test_a_refined_form_in_patches_is_one_shell_in_the_states_of_all() -> None:
+    seam = {"seams.lines": [[["0 mm", "-1 m"], ["0 mm", "1 m"]]]}
+    better = rs.refine(rs.Job.load("hemisphere", PINNED | seam).run(until="pop-up"), "double", ends="pinned")
+    assert better.refined is not None
+    assert better.refined.changed
+    popped = better.popped["pinned"]
+    assert popped.report.stable
+    assert popped.footprint is better.footprint
+    assert popped.shell.mesh.grid.rods[0].profile is not None
+    assert better.agreement["pinned"].rms == better.refined.gap_after.rms < better.refined.gap_before.rms
+    for patch, grid in zip(better.patches, popped.alone, strict=True):
+        start = replace(patch.boundary, draped=patch.popped["pinned"].positions)
+        alone = rs.pop_up(patch.footprint, start, better.rod, ends="pinned")
+        assert alone.report.iterations <= 3  # it is there
+        np.testing.assert_allclose(grid.positions, alone.positions, rtol=0, atol=1e-12)
+
+
 def test_refine_pops_up_ends_that_the_form_did_not_have() -> None:
     plain = job().changed(refine__vary="").run(until="pop-up")
     better = rs.refine(plain, "taper", ends="clamped")

@@ -9,6 +9,7 @@ import pytest
 import rodshell as rs
 from rodshell.formfinding.trim import Boundary, Footprint
 from rodshell.layout.mesh import side_by_side
+from rodshell.layout.profile import Profile
 from rodshell.solve.equilibrium import find_equilibrium
 
 MATERIAL = rs.Material(youngs_modulus=1e9, density=1e3)
@@ -82,6 +83,23 @@ def test_grids_that_popped_up_alone_are_in_equilibrium_together(kind: str, monke
     assert again.report.iterations <= 2
     np.testing.assert_allclose(again.state, found.state, rtol=0, atol=1e-9)
     assert again.gradient == pytest.approx(found.equilibrium.gradient, abs=1e-9 * np.abs(found.forces).max())
+
+
+def test_a_grid_of_other_sections_may_need_frames_that_the_others_share() -> None:
+    """Square rods bend without frames, and spin freely; where those of a grid are broader than high, all have frames."""
+    square = rs.Rod(rs.RectangularSection(width=2e-3, height=2e-3), MATERIAL)
+    first, second = caps("round rods")
+    broad = Profile(stations=(0.0, 0.5, 1.0), factors=(1.0, 1.3, 1.0), varies="width")
+    meshes = {"A": first.footprint.mesh.with_profiles(broad), "B": second.footprint.mesh}
+    boundary = Boundary.of_grids([first.boundary, second.boundary])
+    found = rs.pop_up(Footprint(side_by_side(meshes, 0.1)), boundary, square, ends="pinned")
+    assert found.report.stable
+    for grid, mesh, form in zip(found.alone, meshes.values(), (first, second), strict=True):
+        alone = rs.pop_up(Footprint(mesh), form.boundary, square, ends="pinned")
+        np.testing.assert_allclose(grid.positions, alone.positions, rtol=0, atol=1e-10)
+        again = find_equilibrium(grid.equilibrium.problem, grid.state, grid.forces)
+        assert again.report.iterations <= 2
+        np.testing.assert_allclose(again.state, grid.state, rtol=0, atol=1e-9)
 
 
 def _modes(stages: object) -> int | None:

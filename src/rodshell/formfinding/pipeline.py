@@ -227,7 +227,7 @@ class Stages:
         """ "converged", or which stage stopped, of which patch, and what to do."""
         for name, patch in self.patches.items():
             if patch.status != "converged":
-                return f"{patch.status} (patch {name})"
+                return patch.status if "(patch " in patch.status else f"{patch.status} (patch {name})"
         if self.lying is not None and self.draped.report.reason:
             return self.draped.report.reason
         if self.lying is not None and not self.draped.converged:

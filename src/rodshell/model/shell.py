@@ -357,11 +357,12 @@ class _Builder:
 
     def _spinning(self) -> Ints:
         """Block of the first twist angle of each rod that could spin about itself."""
-        if not (self.isotropic and self.twist):
+        if not self.twist:
             return np.empty(0, dtype=np.intp)
+        round_rods = np.logical_and.reduceat(self.stiffness[:, 0] == self.stiffness[:, 1], self.mesh.rod_start)
         holding = self._of_joints(lambda joint: joint.holds_normals, bool)
         held = np.unique(self.mesh.grid.crossings.rods[holding])
-        loose = np.setdiff1d(np.arange(len(self.rods)), held)
+        loose = np.setdiff1d(np.flatnonzero(round_rods), held)
         return self.first_angle + np.searchsorted(self.mesh.edge_rods, loose)
 
     def _bends(self) -> tuple[Elements, ...]:
