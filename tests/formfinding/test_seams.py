@@ -1,8 +1,10 @@
 """Targets cut by seams: patches that are formed alone, whose rods end at the same points on the seams."""
 
 import re
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,11 +15,13 @@ import rodshell as rs
 from rodshell.checks import self_weight
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
+from rodshell.formfinding import Draped, pipeline
 from rodshell.formfinding.end_matching import LEAVE_OUT, choose_families
 from rodshell.formfinding.seams import End, in_a_row, patches_of, transported_heading
 from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.mesh import side_by_side
 from rodshell.results import read
+from rodshell.solve.equilibrium import Status
 from rodshell.solve.load_path import CLOSE
 from rodshell.targets import Freeform
 from rodshell.targets.patch import Seam
@@ -237,6 +241,25 @@ def test_a_patch_that_stands_is_reported_where_another_does_not() -> None:
     np.testing.assert_allclose(stands.popped["pinned"].positions, alone.positions, rtol=0, atol=1e-12)
     first = stands.footprint.mesh.node_count
     np.testing.assert_array_equal(form.popped["pinned"].positions[-first:], stands.popped["pinned"].positions)
+
+
+def test_a_patch_pops_up_where_another_was_not_draped(monkeypatch: pytest.MonkeyPatch) -> None:
+    drape = pipeline.drape
+
+    def stalled(*args: Any, **options: Any) -> Draped:
+        found = drape(*args, **options)
+        lost = found.target.middle[1] > 0  # of the two patches of a dome cut along x
+        return replace(found, levels=(replace(found.report, status=Status.STALLED),)) if lost else found
+
+    monkeypatch.setattr(pipeline, "drape", stalled)
+    form = rs.find_form(DOME, layout_of(0.06), ROD, seams=[ACROSS], ends="pinned")
+    assert form.popped == {}
+    assert form.status.startswith("drape stopped at the largest number of iterations")
+    assert form.status.endswith("(patch B)")
+    stands, lost = form.archive().results.plain()["patches"]
+    assert stands["status"] == stands["pop_up"]["pinned"]["status"] == "converged"
+    assert stands["agreement"]["pinned"]["rms_relative"] < 0.02
+    assert lost["pop_up"] == lost["agreement"] == {}
 
 
 @pytest.mark.slow

@@ -86,7 +86,7 @@ def test_grids_that_popped_up_alone_are_in_equilibrium_together(kind: str, monke
 
 
 def test_a_grid_of_other_sections_may_need_frames_that_the_others_share() -> None:
-    """Square rods bend without frames, and spin freely; where those of a grid are broader than high, all have frames."""
+    """Square rods bend without frames, and spin freely; where those of one grid are broad, all have them."""
     square = rs.Rod(rs.RectangularSection(width=2e-3, height=2e-3), MATERIAL)
     first, second = caps("round rods")
     broad = Profile(stations=(0.0, 0.5, 1.0), factors=(1.0, 1.3, 1.0), varies="width")
