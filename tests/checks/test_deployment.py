@@ -320,6 +320,6 @@ def test_the_flat_grid_is_laid_under_the_shell_whichever_way_that_is_turned() ->
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     there = mesh.flat @ turn.T + np.array([3.0, -2.0, 0.5])
     ends = there[mesh.ends.ravel()]
-    np.testing.assert_allclose(laid_below(mesh, ends, lambda _: 0.5), there, atol=1e-12)
+    np.testing.assert_allclose(laid_below(mesh, ends, 0.5), there, atol=1e-12)
     ends[::2, 2] += 0.1  # starts higher than ends: the ways in the plane stay the same
-    np.testing.assert_allclose(laid_below(mesh, ends, lambda _: 0.5), there, atol=1e-12)
+    np.testing.assert_allclose(laid_below(mesh, ends, 0.5), there, atol=1e-12)

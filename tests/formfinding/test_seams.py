@@ -243,6 +243,19 @@ def test_a_patch_that_stands_is_reported_where_another_does_not() -> None:
     np.testing.assert_array_equal(form.popped["pinned"].positions[-first:], stands.popped["pinned"].positions)
 
 
+def test_patches_whose_laths_lean_to_either_side_lean_as_each_does_alone() -> None:
+    """Released, these mirrored patches are on saddles, which they leave to sides that neither decides for the other."""
+    lath = rs.Rod(rs.RectangularSection(width=2e-3, height=1e-3), rs.Material(youngs_modulus=1e9, density=1e3))
+    target, seams, spacing = CASES["two bumps, in the valley"]
+    form = rs.find_form(target, layout_of(spacing), lath, seams=seams, joint=rs.Pin(), ends="pinned")
+    assert form.popped["pinned"].report.iterations > sum(
+        patch.popped["pinned"].report.iterations for patch in form.patches
+    )
+    for patch in form.patches:
+        alone = rs.pop_up(patch.footprint, patch.boundary, lath, ends="pinned", joint=rs.Pin())
+        np.testing.assert_allclose(patch.popped["pinned"].positions, alone.positions, rtol=0, atol=1e-10)
+
+
 def test_a_patch_pops_up_where_another_was_not_draped(monkeypatch: pytest.MonkeyPatch) -> None:
     drape = pipeline.drape
 
@@ -529,6 +542,10 @@ def test_the_way_up_of_all_patches_ends_where_they_stand() -> None:
     archive = form.archive()
     history, share = archive.states["history"], archive.states["history_share"]
     assert len(history) == len(share) > 3
+    plain = archive.results.plain()
+    work = sum(found["factorizations"] for found in [*plain["pop_up"].values(), *plain["self_weight"].values()])
+    each = plain["deployment"]["factorizations"] / len(form.patches)  # of one patch takes as long as a part of all
+    assert sum(found["factorizations"] for found in plain["other_shapes"].values()) <= 0.5 * (work + each)
     np.testing.assert_allclose(history[-1], form.popped["pinned"].positions, atol=1e-8)
     assert np.ptp(history[0].reshape(-1, 3)[:, 2]) < 1e-3
     assert archive.states["history_curvature"].shape == (len(share), len(archive.states["rod_nodes"]))

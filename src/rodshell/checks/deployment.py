@@ -231,7 +231,7 @@ class _Path:
         self.shell, self._pattern, self._progress, self._smooth = shell, final.problem.pattern, progress, True
         last, self._positions = final.state, shell.positions(final.state)
         ends = self._positions[shell.mesh.ends.ravel()]
-        self.flat = laid_below(shell.mesh, ends, np.min)
+        self.flat = laid_below(shell.mesh, ends, float(ends[:, 2].min()))
         self._nodes = np.flatnonzero(shell.like < shell.mesh.node_count)  # blocks that are nodes, not angles
         self._flat_nodes = self.flat[shell.like[self._nodes]]
         lying = last.copy()

@@ -6,7 +6,7 @@ hold the direction of the draped rods as well. The end condition decides the sha
 A warm start transfers displacements and forces from an earlier pop-up, as the first guess of the solve.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, get_args
@@ -201,8 +201,9 @@ class _Stages:
         shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint, isotropic=self.isotropic)
         if not shell.angles:
             return shell
-        motions = [PlanarMotion.onto(*ends) for ends in _ends_of_grids(mesh, self.boundary.points)]
-        return shell.turned(np.array([motion.turn for motion in motions]))
+        flat, goals, of_ends = mesh.flat[mesh.ends.ravel()], self.boundary.points, np.repeat(mesh.grid_of_rods, 2)
+        grids = [of_ends == k for k in range(len(mesh.grids))]
+        return shell.turned(np.array([PlanarMotion.onto(flat[here], goals[here]).turn for here in grids]))
 
     @property
     def length(self) -> float:
@@ -460,35 +461,24 @@ def turned(now: Floats, goal: Floats, t: float) -> Floats:
     return unit(np.where(angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * goal) / sine, now))
 
 
-def laid_below(mesh: GridMesh, points: Floats, height: Callable[[Floats], float]) -> Floats:
-    """Each flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
+def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
+    """The flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
 
     Parameters
     ----------
     points : (2m, 3) where both ends of each rod in turn are to go [m].
-    height : of a grid's plane, from the heights (k,) of the points to which its own ends go [m].
+    height : of the grid's plane [m].
 
     Returns
     -------
     (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
     """
-    laid = np.empty_like(mesh.flat)
-    for k, (ends, goals) in enumerate(_ends_of_grids(mesh, points)):
-        nodes = mesh.grid_of_nodes == k
-        laid[nodes] = PlanarMotion.onto(ends, goals).moved(mesh.flat[nodes], float(height(goals[:, 2])))
-    return laid
-
-
-def _ends_of_grids(mesh: GridMesh, points: Floats) -> Iterator[tuple[Floats, Floats]]:
-    """Of each grid its rods' ends (2k, 3) in the flat state, and where they are to go (2k, 3) [m]."""
-    ends, of_ends = mesh.flat[mesh.ends.ravel()], np.repeat(mesh.grid_of_rods, 2)
-    for k in range(len(mesh.grids)):
-        yield ends[of_ends == k], points[of_ends == k]
+    return PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], points).moved(mesh.flat, height)
 
 
 def flat_below(mesh: GridMesh, points: Floats) -> Floats:
-    """(n, 3) each flat grid laid out at the mean height of those points (2m, 3) to which its own ends go [m]."""
-    return laid_below(mesh, points, np.mean)
+    """(n, 3) the flat grid laid out at the mean height of the points (2m, 3) to which its ends go [m]."""
+    return laid_below(mesh, points, float(points.mean(axis=0)[2]))
 
 
 def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary) -> Floats:
