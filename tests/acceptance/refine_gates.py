@@ -142,12 +142,9 @@ def refined_pieces(found: Refined) -> Iterator[tuple[str, Stages]]:
     """The form, or those of its patches that were changed."""
     if not found.changed:
         return
-    if isinstance(found.after, Stages):
-        yield "", found.after
-        return
-    for name, piece in found.after.patches.items():
+    for piece in found.after.parts:
         if any(rod.profile is not None for rod in piece.footprint.rods):
-            yield f", patch {name}", piece
+            yield f", patch {piece.name}" if piece.name else "", piece
 
 
 def deployment(form: Stages) -> Deployment:

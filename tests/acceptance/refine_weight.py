@@ -21,7 +21,6 @@ def rows() -> Iterator[Row]:
         ends: Ends
         for ends in ("pinned", "clamped"):
             stages = rs.find_form(target, LAYOUT, rod, joint=joint, ends=ends).stages
-            assert isinstance(stages, Stages)
             yield from rows_of(f"{name}, {ends}", stages)
 
 

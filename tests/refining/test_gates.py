@@ -35,9 +35,7 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
 def stages() -> Stages:
     """A pinned paraboloid of 9 rods each way."""
     layout = rs.GridLayout.orthogonal(rods=(9, 9), spacing=0.04, edge=0.02)
-    found = rs.find_form(rs.Paraboloid(0.2, 0.12), layout, ROD, ends="pinned").stages
-    assert isinstance(found, Stages)
-    return found
+    return rs.find_form(rs.Paraboloid(0.2, 0.12), layout, ROD, ends="pinned").stages
 
 
 def with_profile(profile: rs.Profile) -> Stages:
