@@ -449,7 +449,8 @@ def test_patches_are_taken_over_too() -> None:
     assert job.run(warm_start=first).reused == ALL
     pinned = job.changed(pop_up__ends="pinned").run(warm_start=first)
     assert pinned.reused == ALL[:3]
-    assert pinned.patches[1].popped["pinned"] is first.patches[1].popped["pinned"]
+    assert pinned.popped["pinned"] is first.popped["pinned"]
+    assert np.array_equal(pinned.patches[1].popped["pinned"].state, first.patches[1].popped["pinned"].state)
     turned = job.changed(layout__rotate="5 deg")
     warm, cold = turned.run(warm_start=first, until="pop-up"), turned.run(until="pop-up")
     assert warm.reused == ALL[:1]

@@ -13,14 +13,11 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.case import Case
 from rodshell.checks import Checks, check
-from rodshell.checks.check import merged_checks
-from rodshell.checks.contact import contact_of_patches
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
 from rodshell.figures.form import FlatState
 from rodshell.figures.records import Ends
-from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
-from rodshell.formfinding.patches import MergedPopUp, PatchedForm
+from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PopUp, Stages, Trimmed
 from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
@@ -59,8 +56,6 @@ if TYPE_CHECKING:
     from rodshell.loads.check import LoadChecks
     from rodshell.loads.combinations import Loads
     from rodshell.refining.acceptance import Refined
-
-Stages = PatchForm | PatchedForm
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,24 +124,24 @@ class Form:
     @property
     def from_table(self) -> bool:
         """Whether it comes from a table of rods, which has no target."""
-        return isinstance(self.stages, PatchForm) and self.stages.from_table
+        return self.stages.from_table
 
     # The stages
 
     @property
-    def patches(self) -> tuple[PatchForm, ...]:
+    def patches(self) -> tuple[Stages, ...]:
         """The stages of each patch; a form in one piece has one."""
-        return tuple(self.stages.patches.values()) if isinstance(self.stages, PatchedForm) else (self.stages,)
+        return self.stages.parts
 
     @property
     def seams(self) -> tuple[Seam, ...]:
         """The lines along which the target was cut: where it is creased along a seam, its crease."""
-        return self.stages.cut_along if isinstance(self.stages, PatchedForm) else ()
+        return self.stages.seams.lines if self.stages.seams else ()
 
     @property
     def meetings(self) -> tuple[Meeting, ...]:
         """Where rods of two patches end at one point of a seam."""
-        return self.stages.meetings if isinstance(self.stages, PatchedForm) else ()
+        return self.stages.seams.meetings if self.stages.seams else ()
 
     @property
     def draped(self) -> Draped:
@@ -156,12 +151,12 @@ class Form:
         ------
         InputError : the form has several patches, or comes from a table of rods; so for `trimmed`.
         """
-        return self._only_patch("draped").draped
+        return self.stages.draped
 
     @property
     def trimmed(self) -> Trimmed:
         """The draped grid cut to its target, of a form in one piece."""
-        return self._only_patch("trimmed").trimmed
+        return self.stages.trimmed
 
     @property
     def footprint(self) -> Footprint:
@@ -174,7 +169,7 @@ class Form:
         return self.stages.boundary
 
     @property
-    def popped(self) -> Mapping[Ends, PopUp | MergedPopUp]:
+    def popped(self) -> Mapping[Ends, PopUp]:
         """The popped-up shell with each kind of ends; of several patches that of all together."""
         return self.stages.popped
 
@@ -202,7 +197,7 @@ class Form:
     def flat_state(self) -> FlatState | None:
         """Whether rods along curves of the target can be laid out in the plane, by what they withstand while they are
         erected; None where the flat grid is a straight lattice."""
-        found = None if isinstance(self.stages, PatchedForm) else self.stages.flat_state
+        found = self.stages.flat_state
         if found is None:
             return None
         limits, material = self.options.limits(self.rod, self.case.strength), self.rod.material
@@ -386,11 +381,6 @@ class Form:
     def _shapes(self) -> dict[str, Floats]:
         return {"flat": self.footprint.mesh.flat} | {ends: shell.positions for ends, shell in self.popped.items()}
 
-    def _only_patch(self, what: str) -> PatchForm:
-        if isinstance(self.stages, PatchedForm):
-            raise InputError(f"this form has {len(self.patches)} patches: take patches[k].{what}")
-        return self.stages
-
     def _weight(self, options: OutputOptions) -> float:
         return options.judged_by(self.rod).shear_weight
 
@@ -399,16 +389,7 @@ class Form:
         flat = self.flat_state
         stages = self.options.stages if flat is None or flat.lies_flat else 0  # else it is assembled in place
         settings: dict[str, Any] = {"stages": stages, "shear_weight": self._weight(self.options)}
-        if not isinstance(self.stages, PatchedForm):
-            return check(self.stages.popped, self.rod, **settings, progress=progress)
-        found = self.stages.patches
-        each = {name: check(patch.popped, self.rod, **settings, progress=progress) for name, patch in found.items()}
-        met = {}
-        for ends in self.stages.popped:
-            shells = [patch.popped[ends] for patch in found.values()]
-            states = [(shell.shell, shell.state) for shell in shells]
-            met[ends] = contact_of_patches(self.footprint.mesh, states, self.rod)
-        return merged_checks(each, met)
+        return check(self.stages.popped, self.rod, **settings, progress=progress)
 
     @property
     def _design(self) -> dict[str, Floats]:
@@ -420,8 +401,8 @@ class Form:
     def _archive(self) -> Archive:
         checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
         results = self.results().changed(flat_state=self.flat_state)
-        if isinstance(self.stages, PatchedForm):
-            results = with_seam_forces(results, self.stages, checks)
+        if self.stages.seams is not None:
+            results = with_seam_forces(results, self.stages.seams, checks)
         mesh, asked = self.footprint.mesh, self.case.strength
         results = checked_results(
             results, mesh, checks, self.fabrication,

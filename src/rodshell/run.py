@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rodshell.case import Case
 from rodshell.case.case import Built
@@ -12,9 +12,9 @@ from rodshell.case.held import built
 from rodshell.case.rod_ends import RodEnds
 from rodshell.checks.sizing import Fit, doubt_of_unit, require_likely_sizes
 from rodshell.errors import OutOfTimeError
-from rodshell.form import Form, Stages
-from rodshell.formfinding import Bound, Fall, PatchForm, find_stages, pop_up_stages
-from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
+from rodshell.form import Form
+from rodshell.formfinding import Bound, Fall, Stages, find_stages, pop_up_stages
+from rodshell.formfinding.patches import best_heading, find_patched_stages
 from rodshell.formfinding.search import Search, search
 from rodshell.loads.fixed import fixed_forces
 from rodshell.progress import Progress
@@ -146,8 +146,7 @@ class Run:
         for popped_before in range(MOST_SIZES):
             if stages.status != "converged":
                 break
-            shells = [shell for piece in _pieces(stages) for shell in piece.popped.values()]
-            fit = estimate.by_pop_ups(shells, rod, shear_weight=weight)
+            fit = estimate.by_pop_ups(list(stages.popped.values()), rod, shear_weight=weight)
             section = fit.section(rod.material, strength=strength, shape=self.asked.rod.shape)
             chosen_so = popped_before > 0 or before is not None
             if section == rod.section or (chosen_so and fit.allows(rod, strength)):
@@ -175,48 +174,42 @@ class Run:
         stages = earlier.unrefined
         return stages.rod if stages.status == "converged" and stages.popped else None
 
-    def _table_stages(self, rod: Rod) -> PatchForm:
+    def _table_stages(self, rod: Rod) -> Stages:
         case, earlier = self.asked.with_rod(rod), self.earlier
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
         stages = earlier.stages if earlier is not None else None
-        if isinstance(stages, PatchForm) and "pop-up" in self._unchanged(case) and stages.finished_pop_ups((PINNED,)):
+        known = stages is not None and "pop-up" in self._unchanged(case)
+        if stages is not None and known and stages.finished_pop_ups((PINNED,)):
             return stages
         joint = case.joint
         return pop_up_stages(ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress)
 
     def _stages(self, case: Case, found: Built, rod: Rod) -> Stages:
         """The shells of a rod on a target, of which those of the earlier form are taken over that are the same."""
-        same = self._unchanged(case.with_rod(rod))
-        made = found._replace(rod=rod)
-        return self._patches(case, made, same) if case.seams.lines else self._one_piece(case, made, same)
-
-    def _one_piece(self, case: Case, found: Built, same: Sequence[str]) -> PatchForm:
+        same, seams = "trim" in self._unchanged(case.with_rod(rod)), [Seam.of(line) for line in case.seams.lines]
+        earlier = self.earlier.unrefined if self.earlier is not None else None
+        options: dict[str, Any] = {
+            "joint": found.joint,
+            "ends": found.ends if self.pops_up else (),
+            "warm_start": earlier if earlier is not None and bool(earlier.seams) == bool(seams) else None,
+            "progress": self.progress,
+        }
+        if seams:
+            layouts = case.seams.patch_layouts()
+            return find_patched_stages(
+                found.target, seams, found.layout, rod, patch_layouts=layouts, same_drape=same, **options
+            )
         method = found.method
         if isinstance(method, Fall) and case.drape.frames is not None and case.drape.held is None:
             method = replace(method, stream=self.frames_in / case.drape.frames)
         if isinstance(method, Fall) and self.announce is not None:
             height = length_text(method.height)
             self.announce(f"the flat grid falls from {height} above the target until it is at rest; then it is trimmed")
-        earlier = self.earlier.unrefined if self.earlier is not None else None
-        streams = isinstance(method, Fall) and method.stream is not None
+        same &= not (isinstance(method, Fall) and method.stream is not None)
         return find_stages(
-            found.target, found.layout, found.rod,
-            method=method, anchor=found.anchor, joint=found.joint,
-            ends=found.ends if self.pops_up else (),
-            warm_start=earlier if isinstance(earlier, PatchForm) else None,
-            same_drape="trim" in same and not streams, progress=self.progress,
-        )  # fmt: skip
-
-    def _patches(self, case: Case, found: Built, same: Sequence[str]) -> PatchedForm:
-        earlier = self.earlier.unrefined if self.earlier is not None else None
-        return find_patched_stages(
-            found.target, [Seam.of(line) for line in case.seams.lines], found.layout, found.rod,
-            patch_layouts=case.seams.patch_layouts(), joint=found.joint,
-            ends=found.ends if self.pops_up else (),
-            warm_start=earlier if isinstance(earlier, PatchedForm) else None,
-            same_drape="trim" in same, progress=self.progress,
-        )  # fmt: skip
+            found.target, found.layout, rod, method=method, anchor=found.anchor, same_drape=same, **options
+        )
 
     def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> "Refined | None":
         """The refinement of these stages, where the case asks for one."""
@@ -274,7 +267,7 @@ class Run:
         if earlier is None:
             return form
         reused = ["target"] if "target" in same else []
-        if _same_drapes(stages, earlier.unrefined):
+        if stages.lies_as(earlier.unrefined):
             reused += [] if form.from_table else ["drape", "trim"]
             taken = _same_pop_ups(stages, earlier.unrefined)
             reused += ["pop-up"] if taken else []
@@ -339,30 +332,7 @@ def inputs_of(case: Case) -> dict[str, bytes]:
     return read_inputs(case.text()) if case.files else {}
 
 
-def _pieces(stages: Stages) -> tuple[PatchForm, ...]:
-    """The form of each patch, or the only one."""
-    return (stages,) if isinstance(stages, PatchForm) else tuple(stages.patches.values())
-
-
-def _same_drapes(now: Stages, before: Stages) -> bool:
-    """Whether a form's drapes are those of an earlier one; a table of rods has none to run again."""
-    if isinstance(now, PatchForm) and isinstance(before, PatchForm) and not now.from_table:
-        return now.draped is before.draped
-    if isinstance(now, PatchedForm) and isinstance(before, PatchedForm):
-        return list(now.patches) == list(before.patches) and all(
-            patch.draped is before.patches[name].draped for name, patch in now.patches.items()
-        )
-    return now is before
-
-
 def _same_pop_ups(now: Stages, before: Stages) -> bool:
     """Whether all pop-ups of a form are those of an earlier one, which has no others."""
-    pieces = [_pieces(form) for form in (now, before)]
-    if now.ends != before.ends or len(pieces[0]) != len(pieces[1]):
-        return False
-    pairs = zip(*pieces, strict=True)
-    return all(
-        list(patch.popped) == list(earlier.popped)
-        and all(shell is earlier.popped[ends] for ends, shell in patch.popped.items())
-        for patch, earlier in pairs
-    )
+    same = now.ends == before.ends and list(now.popped) == list(before.popped)
+    return same and all(shell is before.popped[ends] for ends, shell in now.popped.items())

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import rodshell as rs
-from rodshell.formfinding import PatchForm
+from rodshell.formfinding import Stages
 from rodshell.formfinding.popup import Ends
 from rodshell.refining.refine import Refinement, refine
 from rodshell.refining.stiffness_families import Taper
@@ -53,7 +53,7 @@ CASES = [
 ]  # fmt: skip
 
 
-def stages_of(shell: str, ends: Ends, edge: float) -> PatchForm:
+def stages_of(shell: str, ends: Ends, edge: float) -> Stages:
     """A shell before refinement."""
     if shell == "126 rods":
         layout = rs.GridLayout.orthogonal(spacing=0.01, edge=0.0034)
@@ -66,7 +66,6 @@ def stages_of(shell: str, ends: Ends, edge: float) -> PatchForm:
         form = rs.Job.load(DATA / shell, changes).run(until="pop-up")
     else:
         form = rs.Job.load(shell, {"layout.edge": edge, "pop_up.ends": ends}).run(until="pop-up")
-    assert isinstance(form.stages, PatchForm)
     return form.stages
 
 

@@ -5,7 +5,6 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks import SelfWeight, self_weight
-from rodshell.checks.self_weight import weakest
 from rodshell.model import Shell
 from tests.checks.shells import ROD, dome
 
@@ -78,14 +77,6 @@ def test_heavy_joints_leave_less_to_bear():
     share = ROD.mass_per_length * form.footprint.mesh.edge_lengths.sum()
     share /= share + 1e-4 * len(form.footprint.mesh.grid.crossings)
     assert found(heavy).load_factor == pytest.approx(share * found(form).load_factor, rel=0.2)  # they sit high up
-
-
-def test_what_is_sewn_bears_as_little_as_its_weakest_patch():
-    strong = SelfWeight(load_factor=None, deflection=1e-3, limit="none", factorizations=5)
-    weak = SelfWeight(load_factor=0.7, deflection=None, limit="limit point", factorizations=9)
-    assert weakest([strong, weak]) == weak.changed(factorizations=14)
-    assert weakest([strong, strong]) == strong.changed(factorizations=10)
-    assert weakest([strong, SelfWeight(load_factor=None, deflection=None, limit="no mass")]).limit == "no mass"
 
 
 def test_summary_and_result_say_both_kinds_of_ends():

@@ -1,7 +1,7 @@
-"""All checks of a shell, and the checks of several patches merged into those of one shell."""
+"""All checks of a shell."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 from typing import Any
@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from rodshell.checks.bending import VON_MISES, Bending, bending, bending_of, shell_normals, worst
-from rodshell.checks.contact import contact, contact_of, worst_contact
-from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
-from rodshell.checks.other_shapes import OtherShapes, other_shapes, searched
+from rodshell.checks.contact import contact, contact_of
+from rodshell.checks.deployment import Deployment, deploy_grids, reached_by_turning
+from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import self_weight, weakest
+from rodshell.checks.self_weight import self_weight
 from rodshell.errors import OutOfTimeError
 from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, Stage
 from rodshell.figures.findings import Said, said
@@ -223,8 +223,8 @@ def check(
         deployment=staged(checks.deployment, bent),
         deployment_bending=bent,
         deployment_contact=(
-            contact(mesh, flat[mesh.rod_nodes], rod, directors=directors),
-            *(contact_of(*stage, rod) for stage in shells),
+            contact(mesh, flat[mesh.rod_nodes], rod, directors=directors, each_grid=True),
+            *(contact_of(*stage, rod, each_grid=True) for stage in shells),
         ),
     )
 
@@ -259,11 +259,11 @@ def _long_checks(
             weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
             missing.pop(0)
         if upright is not None:
-            last = popped[upright]
-            deployment = deploy(
-                last.shell, last.equilibrium, stages=stages, ends=upright,
+            deployment = deploy_grids(
+                popped[upright],
+                stages=stages,
                 progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
-            )  # fmt: skip
+            )
             missing[0] = f"whether the {clamped} shell is reached from flat"
             if deployment.reached_from_flat and clamped and done[clamped].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
@@ -299,7 +299,9 @@ def _other_shapes(
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
     work = weighing + sum(shape.report.factorizations for shape in popped.values())
-    left = (work + (deployment.factorizations or 0 if deployment else 0)) // 2
+    grids = max((len(shape.footprint.mesh.grids) for shape in done.values()), default=1)
+    followed = (deployment.factorizations or 0 if deployment else 0) // grids  # of each alone: its share of one of all
+    left = (work + followed) // 2
     stable = {ends: shape for ends, shape in done.items() if shape.report.stable}
     for number, (ends, shape) in enumerate(stable.items()):
         most = 2 * left // 3 if number == 0 else left
@@ -326,125 +328,3 @@ def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
         progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
 
     return report
-
-
-@dataclass(frozen=True)
-class MergedChecks(Checks):
-    """The checks of all patches together; `patches` holds those of each by its name."""
-
-    patches: Mapping[str, Checks] = field(kw_only=True)
-
-    @property
-    def warnings(self) -> tuple[Said, ...]:
-        words = [
-            Said(f"patch {name}: {word}", word.finding)
-            for name, checks in self.patches.items()
-            for word in checks.warnings
-            if word not in (checks.out_of_time, *checks.tight)
-        ]
-        return (*self._late, *words, *self.tight)
-
-
-def merged_checks(patches: Mapping[str, Checks], contacts: Mapping[Ends, Clearance]) -> MergedChecks:
-    """Checks of patches that share no rod: the results that all of them have, one patch after the other.
-
-    The deployment has the stages that every patch was followed through. Each patch carries its own weight by itself,
-    its seams being held as supports are: the smallest factor counts.
-
-    Parameters
-    ----------
-    patches : checks of each patch by its name, in the order of their meshes.
-    contacts : of all final shapes together, by end condition; during the deployment each patch is looked at by itself.
-    """
-    parts = list(patches.values())
-    ends = [end for end in parts[0].bending if all(end in part.bending for part in parts)]
-
-    def stacked(table: str) -> dict[Ends, Any]:
-        return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
-
-    def known(table: str) -> list[Ends]:
-        return [end for end in ends if all(end in getattr(part, table) for part in parts)]
-
-    deployed = all(part.deployment is not None for part in parts)
-    return MergedChecks(
-        bending=stacked("bending"),
-        reactions={end: Reactions.merged([part.reactions[end] for part in parts]) for end in ends},
-        joints=stacked("joints"),
-        self_weight={end: weakest([part.self_weight[end] for part in parts]) for end in known("self_weight")},
-        contact={end: contacts[end] for end in ends},
-        other_shapes={end: _searched([part.other_shapes[end] for part in parts]) for end in known("other_shapes")},
-        stopped=next((part.stopped for part in parts if part.stopped), ""),
-        # the last patch lacks the most
-        missing=tuple(dict.fromkeys(word for part in reversed(parts) for word in part.missing)),
-        patches=patches,
-        **(_merged_deployment(patches) if deployed else {}),
-    )
-
-
-def _merged_deployment(patches: Mapping[str, Checks]) -> dict[str, Any]:
-    """What the checks of the deployment say, by field, at the shares that all patches reached."""
-    parts = list(patches.values())
-    ways = [part.deployment for part in parts if part.deployment is not None]
-    shares = [share for share in ways[0].share.tolist() if all(share in way.share for way in ways)]
-    rows = [[way.share.tolist().index(share) for share in shares] for way in ways]
-    contacts = {
-        name: [part.deployment_contact[row] for row in of_patch]
-        for (name, part), of_patch in zip(patches.items(), rows, strict=True)
-    }
-    bent = tuple(
-        _stacked([part.deployment_bending[of_patch[k]] for part, of_patch in zip(parts, rows, strict=True)])
-        for k in range(len(shares))
-    )
-    return {
-        "deployment": staged(_merged_stages(ways, rows), bent),
-        "deployment_bending": bent,
-        "deployment_contact": tuple(
-            worst_contact({name: stages[k] for name, stages in contacts.items()}) for k in range(len(shares))
-        ),
-    }
-
-
-def _merged_stages(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
-    """The deployments of several patches at the shares that all reached, their `rows`."""
-    lost = [way.lost_at for way in ways if way.lost_at is not None]
-    elsewhere = [way.elsewhere for way in ways if way.elsewhere is not None]
-    snaps = sorted({snap for way in ways for snap in zip(way.snaps, way.snapped_by, strict=True)})
-    turned = [way.clamped.reached_from_flat if way.clamped else None for way in ways]
-    return Deployment(
-        ends=ways[0].ends,
-        share=ways[0].share[rows[0]],
-        positions=np.concatenate([way.positions[row] for way, row in zip(ways, rows, strict=True)], axis=1),
-        snaps=tuple(snap for snap, _ in snaps),
-        snapped_by=tuple(moved for _, moved in snaps),
-        lost_at=max(lost, default=None),
-        gap=max((way.gap for way in ways if way.gap is not None), key=lambda gap: gap.left, default=None),
-        reached_from_flat=_all([way.reached_from_flat for way in ways]),
-        elsewhere=max(elsewhere, key=lambda shape: shape.distance or 0.0, default=None),
-        guided=max((way.guided for way in ways if way.guided is not None), default=None),
-        clamped=ClampedDeployment(reached_from_flat=_all(turned)),
-        factorizations=sum(way.factorizations or 0 for way in ways),
-    )
-
-
-def _all(answers: Sequence[bool | None]) -> bool | None:
-    """Whether all are true; None where that is not known."""
-    return False if False in answers else None if None in answers else True
-
-
-def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:
-    """The searches of several patches as one: each found the other shapes of its own shell."""
-    return searched(
-        sum(part.tried or 0 for part in parts),
-        max(part.largest_kick or 0.0 for part in parts),
-        [shape for part in parts for shape in part.found],
-        sum(part.factorizations or 0 for part in parts),
-        through=any(part.popped_through for part in parts),
-    )
-
-
-def _stacked(parts: Sequence[Any]) -> Any:
-    """Records of arrays, joined array by array; None where one part has none."""
-    columns = [[getattr(part, field.name) for part in parts] for field in fields(parts[0])]
-    return type(parts[0])(
-        *(None if any(array is None for array in column) else np.concatenate(column) for column in columns)
-    )

@@ -14,7 +14,7 @@ touch itself only farther along its line than half around its section. Sections 
 material frames say, and without these upright on the shell.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,49 +42,21 @@ APART = Clearance(clearance=None, pairs=0, rods=None, where=None)
 """No two rods come nearer than a rod's breadth, or the section's outline is not known."""
 
 
-def contact_of(shell: Shell, state: State, rod: Rod) -> Clearance:
+def contact_of(shell: Shell, state: State, rod: Rod, *, each_grid: bool = False) -> Clearance:
     """Contact of a shell of equal rods in a `state` (N, 3).
 
     Parameters
     ----------
     rod : the section of every rod.
+    each_grid : as of `contact`.
     """
     frames = shell.frames
     directors = None if frames is None else edge_directors(shell, frames, state)
-    return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
-
-
-def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], rod: Rod) -> Clearance:
-    """Contact of shells of equal rods, each in its state, among each other too.
-
-    Parameters
-    ----------
-    mesh : all their meshes as one, in the order of the patches.
-    """
-    outline = _Outline.of(rod, mesh)
-    if outline is None:
-        return APART
-    sizes = np.cumsum([0, *(len(shell.mesh.grid.rods) for shell, _ in patches)])
-    beyond = 4 * outline.reach / FLATTEST
-    parts = [shell.mesh.grid.meetings(beyond) for shell, _ in patches]
-    positions = np.concatenate([state[shell.node_blocks] for shell, state in patches])
-    ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
-    together = near_pairs(ends, outline.near)
-    patch = np.repeat(np.arange(len(patches)), 2 * np.diff(sizes))
-    together = together[patch[together[:, 0]] != patch[together[:, 1]]]
-    stations = np.array([(rod.start, rod.end) for rod in mesh.grid.rods]).ravel()
-    crossings = Crossings(
-        np.concatenate([*(crossings.rods + by for crossings, by in zip(parts, sizes, strict=False)), together // 2]),
-        np.concatenate([*(crossings.at for crossings in parts), stations[together]]),
-    )
-    frames = [(shell, shell.frames, state) for shell, state in patches]
-    turned = [edge_directors(shell, frame, state) for shell, frame, state in frames if frame is not None]
-    directors = np.concatenate(turned) if len(turned) == len(patches) else None
-    return contact(mesh, positions, rod, directors=directors, crossings=crossings)
+    return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors, each_grid=each_grid)
 
 
 def contact(
-    mesh: GridMesh, positions: Floats, rod: Rod, *, directors: Floats | None = None, crossings: Crossings | None = None
+    mesh: GridMesh, positions: Floats, rod: Rod, *, directors: Floats | None = None, each_grid: bool = False
 ) -> Clearance:
     """Contact of the rods of `mesh`.
 
@@ -92,13 +64,12 @@ def contact(
     ----------
     positions : (k, 3) of each entry of `rod_nodes` [m].
     directors : (e, 3) first material director of each edge; without, the normal of the shell.
-    crossings : where rods meet by design; without, wherever their lines cross in the flat grid.
+    each_grid : of grids side by side rods of two of them are not looked at, as where each is still on its own way.
     """
     outline = _Outline.of(rod, mesh)
     if outline is None:
         return APART
-    by_design = mesh.grid.meetings(4 * outline.reach / FLATTEST) if crossings is None else crossings
-    edges = _Edges(mesh, positions, outline, directors, by_design)
+    edges = _Edges(mesh, positions, outline, directors, _by_design(mesh, positions, outline), each_grid)
     first, second, p, q, limit = edges.near()
     gap = edges.gaps(first, second, q - p)
     counted = gap <= limit
@@ -110,17 +81,6 @@ def contact(
     x, y, z = (0.5 * (p + q)[worst]).tolist()
     touching = len(np.unique(rods[counted & (gap <= 0)], axis=0))
     return Clearance(clearance=float(gap[worst]), pairs=touching, rods=(a, b), where=(x, y, z))
-
-
-def worst_contact(parts: Mapping[str, Clearance]) -> Clearance:
-    """Of several shells, by their names, each checked by itself: the worst, with the names of rods among all."""
-    known = [(name, shape) for name, shape in parts.items() if shape.clearance is not None]
-    if not known:
-        return APART
-    name, worst = min(known, key=lambda pair: pair[1].clearance or 0.0)
-    assert worst.rods is not None
-    rods = (f"{name}-{worst.rods[0]}", f"{name}-{worst.rods[1]}")
-    return worst.changed(rods=rods, pairs=sum(shape.pairs or 0 for shape in parts.values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,13 +127,30 @@ class _Outline:
         return parts[0] + parts[1] if self.box else np.hypot(*parts)
 
 
+def _by_design(mesh: GridMesh, positions: Floats, outline: _Outline) -> Crossings:
+    """Where rods meet by design: where their lines cross in a flat grid, and where those of two grids end together."""
+    beyond = 4 * outline.reach / FLATTEST
+    grids = [grid.grid.meetings(beyond) for grid in mesh.grids]
+    if len(grids) == 1:
+        return grids[0]
+    firsts = np.cumsum([0, *(len(grid.grid.rods) for grid in mesh.grids)])
+    ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
+    together, of_ends = near_pairs(ends, outline.near), np.repeat(mesh.grid_of_rods, 2)
+    together = together[of_ends[together[:, 0]] != of_ends[together[:, 1]]]
+    return Crossings(
+        np.concatenate([*(found.rods + by for found, by in zip(grids, firsts, strict=False)), together // 2]),
+        np.concatenate([*(found.at for found in grids), mesh.grid.ends.ravel()[together]]),
+    )
+
+
 class _Edges:
     """All edges of a shape as prisms."""
 
     def __init__(
-        self, mesh: GridMesh, positions: Floats, outline: _Outline, directors: Floats | None, crossings: Crossings
-    ) -> None:
-        self.mesh, self.outline = mesh, outline
+        self, mesh: GridMesh, positions: Floats, outline: _Outline, directors: Floats | None, crossings: Crossings,
+        each_grid: bool = False,
+    ) -> None:  # fmt: skip
+        self.mesh, self.outline, self._each_grid = mesh, outline, each_grid
         rods = np.sort(crossings.rods, axis=1)
         swapped = (rods != crossings.rods)[:, :1]
         self.crossings = Crossings(rods, np.where(swapped, crossings.at[:, ::-1], crossings.at))
@@ -223,6 +200,8 @@ class _Edges:
         for pairs, crossings in self._met(*rods):
             meeting[pairs] = True
             cut[pairs] |= self._overlap(first[pairs], second[pairs], crossings)
+        if self._each_grid:
+            cut |= self.mesh.grid_of_rods[rods[0]] != self.mesh.grid_of_rods[rods[1]]
         kept = ~cut
         limit = np.where(meeting, -2 * SLACK * reach, np.where(same_rod, 0.0, self.outline.near))
         return first[kept], second[kept], limit[kept]

@@ -29,6 +29,7 @@ from rodshell.model.shell import last_edges
 from rodshell.rods.elements import Elements
 from rodshell.rods.supports import PINNED
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
+from rodshell.solve.grids import side_by_side
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.path import EASY, SAME, Snap, Trace, follow, relax, trace, unaccounted
@@ -91,7 +92,7 @@ class Deployment(figures.Deployment):
     shells: Found[tuple[tuple[Shell, Floats], ...]] = Field(
         default=(),
         description="at each stage but the flat grid, with its state (N, 3), whose twist angles belong to that shell's "
-        "source frames; none where ways of several shells were joined",
+        "source frames",
     )
     gap: Found[Gap | None] = key("where it was lost")
     elsewhere: OtherShape | None = key("the shape in which it ends instead")
@@ -174,6 +175,45 @@ def deploy(
         guided=guided,
         factorizations=path.factorizations,
     )
+
+
+def deploy_grids(popped: PopUp, *, stages: int, progress: Progress = lambda share: None) -> Deployment:
+    """As `deploy`, of grids that lie side by side each on its own way: a snap of one then costs no steps of the others.
+    The stages are those that all of them reached.
+
+    Parameters
+    ----------
+    popped : with pinned ends.
+    """
+    grids = popped.alone or (popped,)
+    ways = [deploy(grid.shell, grid.equilibrium, stages=stages, progress=progress) for grid in grids]
+    if len(ways) == 1:
+        return ways[0]
+    shares = [share for share in ways[0].share.tolist() if all(share in way.share for way in ways)]
+    rows = np.array([[way.share.tolist().index(share) for share in shares] for way in ways])
+    each = [[way.shells[row - 1] for way, row in zip(ways, of_stage, strict=True)] for of_stage in rows.T[1:].tolist()]
+    lost = [way.lost_at for way in ways if way.lost_at is not None]
+    elsewhere = [way.elsewhere for way in ways if way.elsewhere is not None]
+    snaps = sorted({snap for way in ways for snap in zip(way.snaps, way.snapped_by, strict=True)})
+    return Deployment(
+        ends="pinned",
+        share=np.array(shares),
+        positions=np.concatenate([way.positions[row] for way, row in zip(ways, rows, strict=True)], axis=1),
+        shells=tuple(side_by_side(popped.shell, parts) for parts in each),
+        snaps=tuple(snap for snap, _ in snaps),
+        snapped_by=tuple(moved for _, moved in snaps),
+        lost_at=max(lost, default=None),
+        gap=max((way.gap for way in ways if way.gap is not None), key=lambda gap: gap.left, default=None),
+        reached_from_flat=all_true([way.reached_from_flat for way in ways]),
+        elsewhere=max(elsewhere, key=lambda shape: shape.distance or 0.0, default=None),
+        guided=max((way.guided for way in ways if way.guided is not None), default=None),
+        factorizations=sum(way.factorizations or 0 for way in ways),
+    )
+
+
+def all_true(answers: Sequence[bool | None]) -> bool | None:
+    """Whether all are true; None where that is not known."""
+    return False if False in answers else None if None in answers else True
 
 
 @dataclass(frozen=True)
@@ -340,8 +380,10 @@ def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
 
     Returns
     -------
-    None where that could not be followed. The path continues after a snap.
+    None where that could not be followed. The path continues after a snap. Of grids side by side whether all do.
     """
+    if pinned.alone:
+        return all_true([reached_by_turning(*grid) for grid in zip(pinned.alone, clamped.alone, strict=True)])
     shell, mesh = clamped.shell, clamped.footprint.mesh
     now, outward = end_directions(mesh, pinned.positions), clamped.boundary.tangents
     start = clamped.state.copy()

@@ -6,7 +6,7 @@ stiffness, one by one and mixed. From each start the energy is lowered to the ne
 is a shape of the shell; that nothing is found proves nothing, so the search says how far it looked.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -43,28 +43,6 @@ class OtherShapes(figures.OtherShapes):
     found: Rows[OtherShape] = rows("shapes that were found")
 
 
-def searched(starts: int, kick: float, found: Iterable[OtherShape], work: int, *, through: bool) -> OtherShapes:
-    """What a search found, and how far it looked.
-
-    Parameters
-    ----------
-    kick : the largest, over half the shell's width.
-    work : factorisations.
-    through : whether popping through was among the starts.
-    """
-    ways = ["popped through"] if through else []
-    if kick:
-        by = f"{100 * kick:.0f} % of half its width"
-        ways.append(f"kicked by up to {by} along its {MODES} softest modes or mixtures of them")
-    words = "not looked for: the search may take half of the work that the form took, which is too little here"
-    if starts:
-        number = f"{starts} start{'s' if starts > 1 else ''}"
-        words = f"looked for from {number} ({' and '.join(ways)}); others are not excluded"
-    return OtherShapes(
-        tried=starts, searched=words, popped_through=through, largest_kick=kick, found=tuple(found), factorizations=work
-    )
-
-
 def other_shapes(
     shell: Shell, found: Equilibrium, *, most_factorizations: int, deployment: Deployment | None = None,
     progress: Callable[[int], None] = lambda start: None,
@@ -88,8 +66,22 @@ def other_shapes(
         progress(len(kicks) + 1)
         search.go(start, kick, most)
         kicks.append(kick)
-    largest = max(kicks, default=0.0)
-    return searched(len(kicks), largest, search.shapes, search.factorizations, through=0.0 in kicks)
+    return OtherShapes(
+        tried=len(kicks), searched=_looked(kicks), popped_through=0.0 in kicks, largest_kick=max(kicks, default=0.0),
+        found=tuple(search.shapes), factorizations=search.factorizations,
+    )  # fmt: skip
+
+
+def _looked(kicks: Sequence[float]) -> str:
+    """How far a search looked whose starts had these kicks over half the shell's width; 0 is popping through."""
+    if not kicks:
+        return "not looked for: the search may take half of the work that the form took, which is too little here"
+    ways = ["popped through"] if 0.0 in kicks else []
+    if largest := max(kicks):
+        by = f"{100 * largest:.0f} % of half its width"
+        ways.append(f"kicked by up to {by} along its {MODES} softest modes or mixtures of them")
+    number = f"{len(kicks)} start{'s' if len(kicks) > 1 else ''}"
+    return f"looked for from {number} ({' and '.join(ways)}); others are not excluded"
 
 
 class _Search:

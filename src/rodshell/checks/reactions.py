@@ -9,7 +9,6 @@ about the joint is that of the joint's energy: of the forces on the nodes next t
 twist angles. Both are resultants, whatever the joint is made of.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,12 +49,6 @@ class Reactions(figures.Reactions):
             forces=forces,
             moments=moments,
         )
-
-    @classmethod
-    def merged(cls, parts: Sequence["Reactions"]) -> "Reactions":
-        """Of several shells, one after the other."""
-        columns = zip(*((part.points, part.forces, part.moments) for part in parts), strict=True)
-        return cls.at(*map(np.concatenate, columns))
 
 
 def _largest(parts: Floats) -> float:

@@ -6,7 +6,7 @@ not enough: the unloaded shell is bent, and sinks before it buckles. Loads that 
 are in `rodshell.loads`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -59,12 +59,3 @@ def self_weight(
     return SelfWeight(
         load_factor=end.factor, deflection=deflection, limit=shown_limit(end.limit), factorizations=end.factorizations
     )
-
-
-def weakest(parts: Sequence[SelfWeight]) -> SelfWeight:
-    """Of patches that stand by themselves: the smallest factor; the largest deflection if all carry their weight."""
-    least = min(parts, key=lambda part: part.at_least)
-    sunk = [part.deflection for part in parts]
-    deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)
-    work = sum(part.factorizations or 0 for part in parts)
-    return least.changed(deflection=deflection, factorizations=work)

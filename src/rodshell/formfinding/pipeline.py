@@ -4,7 +4,7 @@ The last stage is the agreement: how far the popped-up shell is from the target,
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import degrees, pi, sqrt
 
 import numpy as np
@@ -16,6 +16,7 @@ from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
 from rodshell.formfinding.methods import Bound, Draped, FlatState, Method
 from rodshell.formfinding.popup import PopUp, pop_up
+from rodshell.formfinding.seams import Seams
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
     NEAREST_JOINT,
@@ -31,6 +32,7 @@ from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, GridMesh, Layout, mesh_grid
 from rodshell.layout.flatgrid import TOGETHER
 from rodshell.layout.lattices import EDGES_A_SPAN
+from rodshell.layout.mesh import side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import BOTH, PINNED, Asked, Support, supports_of
@@ -42,6 +44,7 @@ from rodshell.validation import instance
 STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
 ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other axis
 LONG_TAIL = 3.0  # spacings past a rod's last joint
+GAP = 2.0  # spacings between the flat grids of neighbouring patches
 ON_THE_END, MOST_OFF = 2e-4, 1e-3  # of the size, and m: a support that is further from the target's end gives a warning
 
 
@@ -62,6 +65,15 @@ class Agreement:
     rms: float
     where: tuple[float, float, float]
     size: float
+
+    @staticmethod
+    def of_all(parts: "Sequence[Agreement]") -> "Agreement":
+        """Of several patches; each counts by its nodes."""
+        worst = max(parts, key=lambda part: part.max)
+        count = np.array([len(part.gaps) for part in parts])
+        square = np.array([part.rms for part in parts]) ** 2
+        rms = float(np.sqrt(np.average(square, weights=count)))
+        return replace(worst, gaps=np.concatenate([part.gaps for part in parts]), rms=rms)
 
     @property
     def max_relative(self) -> float:
@@ -121,18 +133,20 @@ def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type:
 
 
 @dataclass(frozen=True)
-class PatchForm:
-    """Every stage of one shell: a form in one piece, one patch of a form, or a table of rods.
+class Stages:
+    """Every stage of one shell: of one grid, of several that are joined at seams, or of a table of rods.
 
     Parameters
     ----------
-    name : of the patch; "" where it is the only one.
+    name : of a patch of a form; else "".
     rod, joint, ends : as they were given; `ends` are the requested end conditions.
-    footprint : the flat grid, ready to be cut.
-    boundary : where its rod ends go.
-    popped, agreement : by end condition; missing where an earlier stage did not converge.
+    footprint : the flat grids, ready to be cut; of several patches in a row.
+    boundary : where the rod ends go.
     dropped : rods that are not built, with the reason.
-    lying : the draped grid, cut to its target; None for a table of rods.
+    lying : the draped grid, cut to its target; None for a table of rods, and for several patches.
+    popped, agreement : by end condition; missing where an earlier stage did not converge.
+    patches : the stages of each patch by its name, its shells being parts of the whole; none of a single grid.
+    seams : how the patches are joined; None for a single grid.
     """
 
     name: str
@@ -141,15 +155,22 @@ class PatchForm:
     ends: tuple[Ends, ...]
     footprint: Footprint
     boundary: Boundary
-    popped: dict[Ends, PopUp]
-    agreement: dict[Ends, Agreement]
     dropped: tuple[tuple[str, str], ...]
-    lying: Trimmed | None
+    lying: Trimmed | None = None
+    popped: dict[Ends, PopUp] = field(default_factory=dict)
+    agreement: dict[Ends, Agreement] = field(default_factory=dict)
+    patches: dict[str, "Stages"] = field(default_factory=dict)
+    seams: Seams | None = None
+
+    @property
+    def parts(self) -> "tuple[Stages, ...]":
+        """The stages of each grid: of all patches, or of the only one."""
+        return tuple(self.patches.values()) or (self,)
 
     @property
     def from_table(self) -> bool:
         """Whether the form is that of a table of rods, which has no target."""
-        return self.lying is None
+        return self.lying is None and self.seams is None
 
     @property
     def trimmed(self) -> Trimmed:
@@ -157,11 +178,18 @@ class PatchForm:
 
         Raises
         ------
-        InputError : this is a table of rods.
+        InputError : this is a table of rods, or there are several patches.
         """
+        if self.patches:
+            raise InputError(f"this form has {len(self.patches)} patches: take patches[k].draped or .trimmed")
         if self.lying is None:
             raise InputError("a table of rods has no target, and so it was never draped on one")
         return self.lying
+
+    @property
+    def on_target(self) -> Floats:
+        """(n, 3) nodes of all grids as they were draped and trimmed [m]; a table of rods raises as `trimmed` does."""
+        return np.concatenate([part.trimmed.positions for part in self.parts])
 
     @property
     def draped(self) -> Draped:
@@ -170,13 +198,13 @@ class PatchForm:
 
     @property
     def target(self) -> Target:
-        """The target, which for a patch ends at its seams; raises as `trimmed` does."""
-        return self.draped.target
+        """The target, which for a patch ends at its seams; a table of rods raises as `trimmed` does."""
+        return self.seams.target if self.seams else self.draped.target
 
     @property
     def layout(self) -> Layout:
-        """The layout of the flat grid; raises as `trimmed` does."""
-        return self.draped.layout
+        """The layout of the flat grid; a table of rods raises as `trimmed` does."""
+        return self.seams.layout if self.seams else self.draped.layout
 
     @property
     def drape_out_of_time(self) -> bool:
@@ -188,6 +216,14 @@ class PatchForm:
         """Where the rods lie in the plane, where they follow curves of the target."""
         return None if self.lying is None else self.draped.flat_state
 
+    def lies_as(self, other: "Stages") -> bool:
+        """Whether all grids are the same and lie on the same targets; a table of rods lies on none."""
+        if self.from_table or other.from_table:
+            return self is other
+        if list(self.patches) != list(other.patches):
+            return False
+        return all(part.draped is there.draped for part, there in zip(self.parts, other.parts, strict=True))
+
     def finished_pop_ups(self, supports: Sequence[Support]) -> dict[Ends, PopUp]:
         """The pop-ups on these supports that were not stopped by a time limit."""
         return {
@@ -198,7 +234,10 @@ class PatchForm:
 
     @property
     def status(self) -> str:
-        """ "converged", or which stage stopped and what to do."""
+        """ "converged", or which stage stopped, of which patch, and what to do."""
+        for name, patch in self.patches.items():
+            if patch.status != "converged":
+                return patch.status if "(patch " in patch.status else f"{patch.status} (patch {name})"
         if self.lying is not None and self.draped.report.reason:
             return self.draped.report.reason
         if self.lying is not None and not self.draped.converged:
@@ -223,12 +262,25 @@ class PatchForm:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
+        if self.seams is not None:
+            return self._warnings_of_patches(self.seams)
         if self.lying is None:
             return _rolled(self.popped)
         tails = (*_off_the_end(self.lying), *_long_tails(self.lying)) if self.draped.converged else ()
         flat = flat_warnings(self.lying.positions, self.rod)
         pieces = _in_pieces(self.lying)
         return (*flat, *self.draped.warnings, *pieces, *_stretched(self.draped), *tails, *_rolled(self.popped))
+
+    def _warnings_of_patches(self, seams: Seams) -> tuple[str, ...]:
+        whole = set(seams.target.warnings)  # said once; and a patch may be flat where the shell is not
+        whole.update(*(flat_warnings(patch.trimmed.positions, self.rod) for patch in self.parts))
+        each = [
+            f"patch {name}: {word}"
+            for name, patch in self.patches.items()
+            for word in patch.warnings
+            if word not in whole
+        ]
+        return (*flat_warnings(self.on_target, self.rod), *seams.target.warnings, *each, *seams.warnings)
 
 
 def find_stages(
@@ -241,11 +293,11 @@ def find_stages(
     joint: Joint | None = None,
     ends: Asked = BOTH,
     name: str = "",
-    warm_start: PatchForm | None = None,
+    warm_start: Stages | None = None,
     same_drape: bool = False,
     cut: Callable[[Draped], Trimmed] = trim,
     progress: Progress = silent,
-) -> PatchForm:
+) -> Stages:
     """Drape, trim, map back, pop up and compare; see `rodshell.find_form`.
 
     Parameters
@@ -259,9 +311,7 @@ def find_stages(
     require_joint(joint)
     joint = joint or Ball()
     if warm_start is not None and same_drape and not warm_start.drape_out_of_time:
-        draped, trimmed, footprint = warm_start.draped, warm_start.trimmed, warm_start.footprint
-        popped = warm_start.finished_pop_ups(supports)
-        compared = {end: gap for end, gap in warm_start.agreement.items() if end in popped}
+        trimmed, footprint = warm_start.trimmed, warm_start.footprint
     else:
         draped = drape(
             layout, rod, target,
@@ -269,32 +319,91 @@ def find_stages(
             warm_start=warm_start.draped if warm_start else None, progress=progress,
         )  # fmt: skip
         trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
-        footprint, popped, compared = map_back(trimmed), dict[Ends, PopUp](), dict[Ends, Agreement]()
-    earlier = warm_start.popped if warm_start else {}
-    for support in supports if draped.converged else ():
+        footprint = map_back(trimmed)
+    names = tuple(support.name for support in supports)
+    lying = Stages(name, rod, joint, names, footprint, trimmed.boundary, trimmed.dropped, trimmed)
+    return with_pop_ups(lying, supports, warm_start, progress)
+
+
+def with_pop_ups(stages: Stages, supports: Sequence[Support], earlier: Stages | None, progress: Progress) -> Stages:
+    """Draped grids popped up as one shell on each of their supports, and compared.
+
+    Where the drape of a patch did not converge the others are popped up alone.
+
+    Parameters
+    ----------
+    earlier : whose finished pop-ups are taken over where the grids lie as before, and are first guesses elsewhere.
+    """
+    if not all(part.draped.converged for part in stages.parts):
+        each = {name: with_pop_ups(patch, supports, None, progress) for name, patch in stages.patches.items()}
+        return replace(stages, patches=each)
+    known = earlier.finished_pop_ups(supports) if earlier is not None and stages.lies_as(earlier) else {}
+    before, popped = {} if earlier is None else earlier.popped, dict(known)
+    for support in supports:
         end = support.name
         if end in popped:
             continue
         popped[end] = pop_up(
-            footprint, trimmed.boundary, rod,
-            ends=support, warm_start=earlier.get(end), joint=joint, like=next(iter(popped.values()), None),
+            stages.footprint, stages.boundary, stages.rod,
+            ends=support, warm_start=before.get(end), joint=stages.joint, like=next(iter(popped.values()), None),
             progress=progress,
         )  # fmt: skip
         if popped[end].report.status is Status.OUT_OF_TIME:
             break
-    ends = tuple(support.name for support in supports)
-    popped = {end: popped[end] for end in ends if end in popped}
-    compared = {
-        end: compared[end] if end in compared else agreement(shell, target)
-        for end, shell in popped.items()
-        if shell.report.converged
-    }
-    return PatchForm(name, rod, joint, ends, footprint, trimmed.boundary, popped, compared, trimmed.dropped, trimmed)
+    return _compared(replace(stages, popped={end: popped[end] for end in stages.ends if end in popped}), earlier)
+
+
+def _compared(stages: Stages, earlier: Stages | None = None) -> Stages:
+    """Stages with the shells of their patches, and with the gaps of all that converged; those of earlier shells are
+    taken over."""
+    shells, patches, gaps = stages.popped, dict[str, Stages](), dict[Ends, Agreement]()
+    for k, (name, patch) in enumerate(stages.patches.items()):
+        of_patch = {end: _of_patch(shell, k, patch) for end, shell in shells.items()}
+        patches[name] = _compared(replace(patch, popped=of_patch))
+    for end in [end for end, shell in shells.items() if shell.report.converged]:
+        if patches:
+            gaps[end] = Agreement.of_all([patch.agreement[end] for patch in patches.values()])
+        elif earlier is not None and earlier.popped.get(end) is shells[end]:
+            gaps[end] = earlier.agreement[end]
+        else:
+            gaps[end] = agreement(shells[end], stages.target)
+    return replace(stages, patches=patches, agreement=gaps)
+
+
+def _of_patch(popped: PopUp, k: int, patch: Stages) -> PopUp:
+    """The shell of the k-th patch, of all that were popped up together, on the patch's own mesh."""
+    shell = replace(popped.alone[k].shell, mesh=patch.footprint.mesh)
+    return replace(popped.alone[k], footprint=patch.footprint, boundary=patch.boundary, shell=shell)
+
+
+def joined_again(patches: dict[str, Stages], seams: Seams, ends: Ends, *, progress: Progress = silent) -> Stages:
+    """Patches that were popped up with one end condition, each alone, as one form: its shell begins where they are."""
+    joined = side_by_side_stages(patches, seams)
+    there = np.concatenate([patch.popped[ends].positions for patch in patches.values()])
+    start = replace(joined.boundary, draped=there)
+    popped = pop_up(joined.footprint, start, joined.rod, ends=ends, joint=joined.joint, progress=progress)
+    return _compared(replace(joined, popped={ends: replace(popped, boundary=joined.boundary)}))
+
+
+def side_by_side_stages(patches: dict[str, Stages], seams: Seams) -> Stages:
+    """Patches as one form, before they are popped up."""
+    first = next(iter(patches.values()))
+    meshes = {name: patch.footprint.mesh for name, patch in patches.items()}
+    gap = GAP * max(max(net.layout.spacing) for net in seams.nets.values())
+    dropped = tuple(
+        (f"{name}-{rod}", why)
+        for name, patch in patches.items()
+        for rod, why in (*seams.nets[name].dropped, *patch.dropped)
+    )
+    return Stages(
+        "", first.rod, first.joint, first.ends, Footprint(side_by_side(meshes, gap)),
+        Boundary.of_grids([patch.boundary for patch in patches.values()]), dropped, patches=patches, seams=seams,
+    )  # fmt: skip
 
 
 def popped_again(
-    form: PatchForm, footprint: Footprint, boundary: Boundary, ends: Ends, *, progress: Progress = silent
-) -> PatchForm:
+    form: Stages, footprint: Footprint, boundary: Boundary, ends: Ends, *, progress: Progress = silent
+) -> Stages:
     """The form of another flat grid on the same target: popped up and compared.
 
     Parameters
@@ -311,7 +420,7 @@ def popped_again(
     )
 
 
-def meshed_again(form: PatchForm, ends: Ends) -> PatchForm:
+def meshed_again(form: Stages, ends: Ends) -> Stages:
     """The same rods on a new mesh with the same longest edge, popped up from the shape that they had.
 
     Parameters
@@ -340,7 +449,7 @@ def pop_up_stages(
     joint: Joint | None = None,
     edge: float | None = None,
     progress: Progress = silent,
-) -> PatchForm:
+) -> Stages:
     """Pop up rods given by their flat lines and the final positions of their ends.
 
     Parameters
@@ -375,7 +484,7 @@ def pop_up_stages(
     boundary = Boundary(points, np.zeros_like(points))
     popped = pop_up(footprint, boundary, rod, ends=PINNED, start="flat", joint=joint, progress=progress)
     dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
-    return PatchForm("", rod, joint, (popped.ends,), footprint, boundary, {popped.ends: popped}, {}, dropped, None)
+    return Stages("", rod, joint, (popped.ends,), footprint, boundary, dropped, popped={popped.ends: popped})
 
 
 def _stretched(draped: Draped) -> tuple[str, ...]:

@@ -25,11 +25,13 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
 from rodshell.layout.transfer import transferred_edges, transferred_nodes
 from rodshell.model import Shell
+from rodshell.model.rod_sections import RodSections
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import CLAMPED, PINNED, Support, support_of
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
+from rodshell.solve.grids import alone, together
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
 from rodshell.solve.problem import Pattern, Problem, Supports, mean_radius
 from rodshell.units import length_text
@@ -59,6 +61,7 @@ class PopUp:
     footprint, boundary : as they were given, in layers where joints are eccentric.
     shell : the mechanical model, its source frames being at the equilibrium.
     equilibrium : with the ends held where they are; its report counts the work of all solves on the way.
+    alone : of grids side by side the shell of each; of one grid none.
     """
 
     support: Support
@@ -67,6 +70,7 @@ class PopUp:
     boundary: Boundary
     shell: Shell
     equilibrium: Equilibrium
+    alone: tuple["PopUp", ...] = ()
 
     def __repr__(self) -> str:
         rods, state = len(self.footprint.rods), self.report.status.value
@@ -125,6 +129,9 @@ def pop_up(
 ) -> PopUp:
     """Move the rod ends of `footprint` to `boundary` and find the equilibrium of the free grid.
 
+    Grids that lie side by side are one shell. From flat, and where all together are not stable, each is popped up
+    alone, so that what becomes of one does not depend on the others.
+
     Parameters
     ----------
     ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp); or a
@@ -177,18 +184,7 @@ def pop_up(
         )
     known = like.equilibrium.problem.pattern if like is not None else None
     stages = _Stages(footprint, boundary, rod, joint, progress, known, most_factorizations)
-    if start == "draped":
-        shell, found = (stages.again(warm_start, support) if warm_start else None) or stages.release(support)
-    else:
-        shell, found = stages.rise()
-        if support.holds_directions and found.report.converged:
-            shell, found = stages.turn_clamps(shell, found, support)
-    shell = shell.with_elements(found.elements)
-    if start == "flat":  # the ends have arrived
-        found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
-    if found.report.converged:
-        shell, found = let_go(shell, found, support, boundary.points, stages.counting)
-    return PopUp(support, start, footprint, boundary, shell, found)
+    return stages.popped(support, start, warm_start)
 
 
 @dataclass(frozen=True)
@@ -202,16 +198,20 @@ class _Stages:
     progress: Progress
     pattern: Pattern | None = None
     most_factorizations: int | None = None
+    isotropic: bool | None = None
 
     def counting(self, what: str, most: int) -> Callable[[int, float], None]:
         return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
 
     def shell(self, support: Support) -> Shell:
         mesh = self.footprint.mesh
-        shell = Shell.of(mesh, self.rod, clamped=support.holds_directions, joint=self.joint)
+        clamped = support.holds_directions
+        shell = Shell.of(mesh, self.rod, clamped=clamped, joint=self.joint, isotropic=self.isotropic)
         if not shell.angles:
             return shell
-        return shell.turned(PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], self.boundary.points).turn)
+        flat, goals, of_ends = mesh.flat[mesh.ends.ravel()], self.boundary.points, np.repeat(mesh.grid_of_rods, 2)
+        grids = [of_ends == k for k in range(len(mesh.grids))]
+        return shell.turned(np.array([PlanarMotion.onto(flat[here], goals[here]).turn for here in grids]))
 
     @property
     def length(self) -> float:
@@ -226,7 +226,8 @@ class _Stages:
         states far from the target. None where rods can roll at their joints: laths on edge have as many modes, and
         lie down.
         """
-        return None if self.rolls else int(MODES_PER_JOINT * len(self.footprint.mesh.grid.crossings))
+        fewest = min(len(mesh.grid.crossings) for mesh in self.footprint.mesh.grids)
+        return None if self.rolls else int(MODES_PER_JOINT * fewest)
 
     @property
     def most_rolling(self) -> int | None:
@@ -240,6 +241,57 @@ class _Stages:
         """Whether rods can roll at their joints."""
         joints = self.joint if isinstance(self.joint, Sequence) else (self.joint,)
         return not all(joint.holds_normals for joint in joints)
+
+    def popped(self, support: Support, start: Start, warm_start: PopUp | None) -> PopUp:
+        """Of several grids as one shell, or each alone: from flat, and where all together are not stable."""
+        grids = self._of_grids()
+        if start == "flat" and grids:
+            return self._one_by_one(grids, support, start)
+        if start == "draped":
+            shell, found = (self.again(warm_start, support) if warm_start else None) or self.release(support)
+            if grids and not found.report.stable and found.report.status is not Status.OUT_OF_TIME:
+                return self._one_by_one(grids, support, start, found.report)
+        else:
+            shell, found = self.rise()
+            if support.holds_directions and found.report.converged:
+                shell, found = self.turn_clamps(shell, found, support)
+        shell = shell.with_elements(found.elements)
+        if start == "flat":  # the ends have arrived
+            found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
+        if found.report.converged:
+            shell, found = let_go(shell, found, support, self.boundary.points, self.counting)
+        each = list[PopUp]()
+        for k, grid in enumerate(grids):
+            part = grid.shell(support)
+            state = alone(shell, found, k, part, grid.problem(part))
+            each.append(PopUp(support, start, grid.footprint, grid.boundary, *state))
+        return PopUp(support, start, self.footprint, self.boundary, shell, found, tuple(each))
+
+    def _one_by_one(
+        self, grids: Sequence["_Stages"], support: Support, start: Start, first: SolveReport | None = None
+    ) -> PopUp:
+        """Each grid popped up alone, after a `first` solve of all that was not stable."""
+        each, shell = tuple(grid.popped(support, start, None) for grid in grids), self.shell(support)
+        parts = [(grid.shell, grid.equilibrium) for grid in each]
+        found = together(shell, self.problem(shell), parts, *(() if first is None else (first,)))
+        shell = shell.with_elements(found.elements)
+        return PopUp(support, start, self.footprint, self.boundary, shell, found, each)
+
+    def _of_grids(self) -> list["_Stages"]:
+        """Those of each grid, where several lie side by side."""
+        mesh, every = self.footprint.mesh, self.joint
+        if not mesh.side_by_side:
+            return []
+        sections = RodSections.of(mesh, [self.rod] * len(mesh.grid.rods)).nodes
+        isotropic = bool((sections[:, 0] == sections[:, 1]).all())  # else each grid needs frames, as the whole does
+        stops = np.cumsum([0, *(len(grid.grid.crossings) for grid in mesh.side_by_side)])
+        return [
+            replace(
+                self, footprint=Footprint(grid), boundary=self.boundary.of_grid(mesh, k), pattern=None,
+                isotropic=isotropic, joint=every[stops[k] : stops[k + 1]] if isinstance(every, Sequence) else every,
+            )
+            for k, grid in enumerate(mesh.side_by_side)
+        ]  # fmt: skip
 
     def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
         """The shell with its ends (and ghost nodes) held at the boundary, or at `goals`."""
@@ -265,6 +317,7 @@ class _Stages:
         shell = self.shell(support)
         state = self.upright(shell, self.boundary.draped, self.boundary.tangents, self.boundary.normals)
         forces = np.zeros(len(self.footprint.mesh.edges))
+        several = len(self.footprint.mesh.grids) > 1  # then each leaves its own saddle, to its own side
         at_once = find_stable(
             self.problem(shell),
             state,
@@ -272,9 +325,11 @@ class _Stages:
             limit_steps=True,
             most_modes=self.most_modes,
             most_iterations=MOST_AT_ONCE,
+            slide=not several,
             progress=self.counting(f"{support}, iteration", MOST_AT_ONCE),
         )
-        if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
+        given_up = at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME)
+        if at_once.report.stable or given_up or several:
             return shell, at_once
         relaxed = relax(
             self.problem(shell),

@@ -1,6 +1,7 @@
 """Trim what extends past the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -46,6 +47,19 @@ class Boundary:
 
     def __repr__(self) -> str:
         return f"<Boundary: ends of {len(self.points) // 2} rods>"
+
+    @staticmethod
+    def of_grids(parts: Sequence["Boundary"]) -> "Boundary":
+        """Of grids that lie side by side."""
+        rows = {field.name: [getattr(part, field.name) for part in parts] for field in fields(Boundary)}
+        known = {name: of for name, of in rows.items() if all(row is not None for row in of)}
+        return Boundary(**{name: np.concatenate(of) for name, of in known.items()})
+
+    def of_grid(self, mesh: GridMesh, k: int) -> "Boundary":
+        """Of the k-th of the grids of a `mesh` that lie side by side."""
+        ends, nodes = np.repeat(mesh.grid_of_rods == k, 2), mesh.grid_of_nodes == k
+        draped, normals = (None if rows is None else rows[nodes] for rows in (self.draped, self.normals))
+        return Boundary(self.points[ends], self.tangents[ends], draped, normals)
 
 
 @dataclass(frozen=True, eq=False)

@@ -194,14 +194,14 @@ class OffsetTie:
         return with_source(self, state)
 
 
-def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: float, size: int) -> list[OffsetTie]:
+def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: Floats, size: int) -> list[OffsetTie]:
     """Ties of the eccentric crossings.
 
     Parameters
     ----------
     rod_nodes : of the mesh, whose rods lie in layers.
     eccentricity : (c,) of each crossing of the grid [m]; those with 0 have no such tie.
-    stiffness : C [N/m].
+    stiffness : (c,) C [N/m].
     size : number of blocks of the state.
     """
     eccentric = np.flatnonzero(eccentricity)
@@ -214,8 +214,8 @@ def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: float, siz
     for members, blocks, legs, middles, weights in stencils(rod_nodes, pairs):
         tangents = edge_tangents(flat, blocks, legs)
         directors = adapted(np.broadcast_to(UP, tangents.shape), tangents)
-        same = np.full(len(blocks), stiffness)
-        sets.append(OffsetTie(blocks, legs, middles, weights, same, offsets[members], tangents, directors))
+        of_set = stiffness[eccentric][members]
+        sets.append(OffsetTie(blocks, legs, middles, weights, of_set, offsets[members], tangents, directors))
     return sets
 
 

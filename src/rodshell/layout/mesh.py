@@ -40,6 +40,7 @@ class GridMesh:
     stations : (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
     joint_nodes : (c,) node of each of the grid's crossings, on its first rod.
     second_nodes : (c,) the same on its second rod, where rods are in layers and share no nodes; None: the same node.
+    side_by_side : the grids that it consists of, in the order of their rods, nodes and crossings; empty: of one.
     """
 
     grid: FlatGrid
@@ -49,6 +50,22 @@ class GridMesh:
     stations: Floats
     joint_nodes: Ints
     second_nodes: Ints | None = None
+    side_by_side: tuple["GridMesh", ...] = ()
+
+    @property
+    def grids(self) -> tuple["GridMesh", ...]:
+        """The meshes of all grids that lie side by side, of which it is the only one or consists."""
+        return self.side_by_side or (self,)
+
+    @cached_property
+    def grid_of_rods(self) -> Ints:
+        """(m,) grid that each rod belongs to."""
+        return np.repeat(np.arange(len(self.grids)), [len(mesh.grid.rods) for mesh in self.grids])
+
+    @cached_property
+    def grid_of_nodes(self) -> Ints:
+        """(n,) grid that each node belongs to."""
+        return np.repeat(np.arange(len(self.grids)), [mesh.node_count for mesh in self.grids])
 
     @cached_property
     def apart(self) -> "GridMesh":
@@ -538,36 +555,26 @@ def edge_counts(lengths: Floats, edge: float) -> Ints:
     return np.maximum(1, np.ceil(lengths / edge - 1e-6)).astype(np.intp)
 
 
-@dataclass(frozen=True, eq=False)
-class SideBySide:
-    """Grids in a row along x, each moved but not rotated.
-
-    Parameters
-    ----------
-    mesh : all grids: rods, nodes and joints, one grid after the other; rod U01 of grid A is A-U01.
-    shifts : for each grid the displacement (2,) [m].
-    """
-
-    mesh: GridMesh
-    shifts: dict[str, Floats]
-
-
-def side_by_side(meshes: Mapping[str, GridMesh], gap: float) -> SideBySide:
-    """Lay grids out in a row, each centred on the x axis, and the row on the origin.
+def side_by_side(meshes: Mapping[str, GridMesh], gap: float) -> GridMesh:
+    """Grids in a row, each moved but not rotated and centred on the x axis, and the row on the origin.
 
     Parameters
     ----------
     gap : between two grids [m].
+
+    Returns
+    -------
+    Rods, nodes and joints of one grid after the other; rod U01 of grid A is A-U01.
     """
     low = {name: mesh.flat[:, :2].min(axis=0) for name, mesh in meshes.items()}
     high = {name: mesh.flat[:, :2].max(axis=0) for name, mesh in meshes.items()}
     width = sum(float(high[name][0] - low[name][0]) + gap for name in meshes) - gap
-    left, shifts = -0.5 * width, dict[str, Floats]()
-    for name in meshes:
-        shifts[name] = np.array([left - low[name][0], -0.5 * (low[name][1] + high[name][1])])
+    left, moved = -0.5 * width, list[GridMesh]()
+    for name, mesh in meshes.items():
+        shift = np.array([left - low[name][0], -0.5 * (low[name][1] + high[name][1])])
+        moved.append(_moved(name, mesh, shift))
         left += float(high[name][0] - low[name][0]) + gap
-    moved = [_moved(name, mesh, shifts[name]) for name, mesh in meshes.items()]
-    return SideBySide(_merged(moved), shifts)
+    return _merged(moved)
 
 
 def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
@@ -618,4 +625,5 @@ def _merged(meshes: list[GridMesh]) -> GridMesh:
         np.concatenate([mesh.joint_pairs[:, 1] + by for mesh, by in zip(meshes, nodes, strict=False)])
         if any(mesh.layered for mesh in meshes)
         else None,
+        tuple(meshes),
     )

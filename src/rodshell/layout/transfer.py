@@ -55,8 +55,14 @@ def corresponding_rods(mesh: GridMesh, to: GridMesh) -> list[tuple[int, int]]:
 
     Rods correspond by family and by their position in the lattice, points on them by their share of the rod's length.
     """
+    if len(mesh.grids) == len(to.grids) > 1:
+        pairs, shifts = list[tuple[int, int]](), (0, 0)
+        for old, new in zip(mesh.grids, to.grids, strict=True):
+            pairs += [(k + shifts[0], j + shifts[1]) for k, j in corresponding_rods(old, new)]
+            shifts = shifts[0] + len(new.grid.rods), shifts[1] + len(old.grid.rods)
+        return pairs
     before, now = _lattice_coordinates(mesh), _lattice_coordinates(to)
-    pairs = list[tuple[int, int]]()
+    pairs = []
     for k, rod in enumerate(to.grid.rods):
         apart = np.abs(before - now[k])
         same = [j for j, old in enumerate(mesh.grid.rods) if old.family == rod.family and apart[j, 0] < SAME_LINE]

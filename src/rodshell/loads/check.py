@@ -24,8 +24,7 @@ from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.loads import Governs, Utilisations
 from rodshell.figures.records import Ends, Found
-from rodshell.formfinding import PatchForm, PopUp, pop_up
-from rodshell.formfinding.patches import PatchedForm
+from rodshell.formfinding import PopUp, Stages
 from rodshell.layout import GridMesh
 from rodshell.loads.bracing import stressed
 from rodshell.loads.combinations import Loads
@@ -50,7 +49,6 @@ BRACED: dict[type, Callable[..., Structure]] = {Cables: stressed, Laths: laid}
 
 PERMANENT: Duration = "permanent"
 ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
-SAME_SHAPE = 1e-4  # of the size: patches together are where each is alone
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
@@ -130,7 +128,7 @@ class LoadChecks:
 
 
 def check_shells(
-    stages: PatchForm | PatchedForm, loads: Loads, *,
+    stages: Stages, loads: Loads, *,
     limits: Limits = Limits(), progress: Progress = silent,
 ) -> LoadChecks:  # fmt: skip
     """Check every shell of a form that converged under each combination.
@@ -145,12 +143,12 @@ def check_shells(
     ------
     InputError : a load does not fit the form; a strength is given, and the stress of its rods is not known.
     """
-    if isinstance(stages, PatchForm) and stages.from_table:
+    if stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
     if loads.locked_joints is not None:
         loads.locked_joints.require_pins(stages.joint)
     areas = tributary_of(stages)
-    done = {ends: popped for ends, popped in _popped_up(stages).items() if popped.report.converged}
+    done = {ends: popped for ends, popped in stages.popped.items() if popped.report.converged}
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
     stopped, braced, vibrations = "", np.empty((0, 2), dtype=np.intp), dict[Ends, Floats]()
@@ -204,30 +202,7 @@ def _said(progress: Progress, where: str, what: str) -> None:
     progress("loads", f"{where}, {what}", 0.0)
 
 
-def _popped_up(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
-    """The popped-up shells; those of patches as one model of all, found again from the draped state.
-
-    Raises
-    ------
-    ConvergenceError : the model of all patches has another shape than each of them alone.
-    """
-    if isinstance(stages, PatchForm):
-        return dict(stages.popped)
-    found = dict[Ends, PopUp]()
-    for ends, alone in stages.popped.items():
-        if not alone.report.converged:
-            continue
-        found[ends] = pop_up(stages.footprint, stages.boundary, stages.rod, ends=ends, joint=stages.joint)
-        off = float(np.abs(found[ends].positions - alone.positions).max())
-        if not found[ends].report.converged or off > SAME_SHAPE * stages.target.size:
-            raise ConvergenceError(
-                f"with {ends} ends the patches take another shape together than each alone, and cannot be checked "
-                "under loads: check each patch as a case of its own"
-            )
-    return found
-
-
-def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm | PatchedForm) -> Structure:
+def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: Stages) -> Structure:
     """The erected shell with its bracing locked, and then its joints.
 
     Raises
@@ -266,7 +241,7 @@ def mechanism(structure: Structure) -> str | None:
     )
 
 
-def tributary_of(stages: PatchForm | PatchedForm) -> Tributary:
+def tributary_of(stages: Stages) -> Tributary:
     """The areas of the target that each node of a form takes.
 
     Parameters
@@ -274,11 +249,10 @@ def tributary_of(stages: PatchForm | PatchedForm) -> Tributary:
     stages : of a form that has a target.
     """
     layout, anchor = stages.layout, stages.target.summit
-    if isinstance(stages, PatchForm):
-        positions, anchor = stages.trimmed.positions, stages.draped.anchor or anchor
-    else:
-        positions = np.concatenate([patch.trimmed.positions for patch in stages.patches.values()])
-    return tributary_areas(stages.target, positions, anchor=anchor, rotate=layout.rotate, spacing=layout.least_spacing)
+    if stages.seams is None:
+        anchor = stages.draped.anchor or anchor
+    spacing = layout.least_spacing
+    return tributary_areas(stages.target, stages.on_target, anchor=anchor, rotate=layout.rotate, spacing=spacing)
 
 
 def _load(structure: Structure, nodes: LoadedNodes, loads: Loads, factors: Mapping[str, float]) -> Load:

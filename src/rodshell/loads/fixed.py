@@ -5,8 +5,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.figures.records import Ends
-from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.pipeline import PatchForm
+from rodshell.formfinding.pipeline import Stages
 from rodshell.loads.check import tributary_of
 from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, SelfWeight
@@ -14,7 +13,7 @@ from rodshell.loads.tributary import LoadedNodes
 from rodshell.units import shown
 
 
-def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, combination: str) -> tuple[float, Floats]:
+def fixed_forces(stages: Stages, ends: Ends, loads: Loads, combination: str) -> tuple[float, Floats]:
     """What a shell carries under one combination.
 
     Parameters
@@ -32,7 +31,7 @@ def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, comb
         no mass.
     """
     wish = f"refine.under = {shown(combination)}"
-    if isinstance(stages, PatchedForm):
+    if stages.patches:
         raise InputError(f'{wish}: a form in patches is refined without loads, or under = "weight"')
     if loads.bracing is not None:
         raise InputError(f"{wish}: a shell is refined without its bracing, which is fitted to it later: leave one out")

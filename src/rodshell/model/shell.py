@@ -74,7 +74,7 @@ class Shell:
     joint_mass : (c,) mass of each crossing's joint [kg].
     springs : energies of the supports, which act on the rods' ends.
     slides : orthonormal directions along which rod ends may move, by the number of the end; others are held.
-    turn : (2, 2) how the flat grid, from which frames are transported, is turned in its plane, of rows x, y.
+    turns : (g, 2, 2) how each flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
 
     mesh: GridMesh
@@ -93,7 +93,7 @@ class Shell:
     joint_mass: Floats
     springs: tuple[Elements, ...] = ()
     slides: Mapping[int, Sequence[Direction]] = field(default_factory=dict)
-    turn: Floats = field(default_factory=lambda: np.eye(2))
+    turns: Floats = field(default_factory=lambda: np.eye(2)[None])
 
     def __repr__(self) -> str:
         ends = CLAMPED if len(self.ghosts) else PINNED
@@ -109,6 +109,7 @@ class Shell:
         joint: Joint | Sequence[Joint] | None = None,
         coupling: Coupling | None = None,
         twist: bool | None = None,
+        isotropic: bool | None = None,
     ) -> "Shell":
         """Assemble a mesh.
 
@@ -123,6 +124,7 @@ class Shell:
         joint : the same for all, or one for each crossing of the grid; None: ball joints.
         coupling : None: shared DOFs. Eccentric joints are tied by springs with any coupling.
         twist : give the rods twist angles; None: if any energy depends on them.
+        isotropic : False: give all rods frames, as one of them needs in a larger shell; None: if these rods need them.
 
         Raises
         ------
@@ -134,7 +136,7 @@ class Shell:
         if coupling is not None:
             instance("coupling", coupling, Coupling, COUPLING)
         clamped, twist = flag("clamped", clamped), None if twist is None else flag("twist", twist)
-        return _Builder(mesh, rod, joint, coupling or SharedDofs(), clamped, twist).shell()
+        return _Builder(mesh, rod, joint, coupling or SharedDofs(), clamped, twist, isotropic).shell()
 
     @property
     def elements(self) -> tuple[Elements, ...]:
@@ -245,16 +247,25 @@ class Shell:
         first, last = len(self.within), len(self.within) + len(self.between)
         return replace(self, within=elements[:first], between=elements[first:last], springs=elements[last:])
 
-    def turned(self, turn: Floats) -> "Shell":
-        """The same shell of a flat grid that is turned in its plane, so that no edge of a shell that lies the other way
-        round has to be turned right round from there.
+    @cached_property
+    def grid_of(self) -> Ints:
+        """(N,) which of the grids that lie side by side each block belongs to."""
+        of_rods = self.mesh.grid_of_rods
+        of_ends, of_edges = np.repeat(of_rods, 2), of_rods[self.mesh.edge_rods]
+        of_angles = np.append(of_edges, of_ends)[: self.angles]
+        return np.concatenate([self.mesh.grid_of_nodes, of_ends[: len(self.ghosts)], of_angles])[self.like]
+
+    def turned(self, turns: Floats) -> "Shell":
+        """The same shell of flat grids that are turned in their plane, so that no edge of a shell that lies the other
+        way round has to be turned right round from there.
 
         Parameters
         ----------
-        turn : (2, 2), of rows x, y.
+        turns : (g, 2, 2) of each grid, of rows x, y.
         """
-        frames = self.with_elements(tuple(turned(element, turn) for element in self.elements))
-        return replace(frames, turn=self.turn @ turn)
+        of_grids = [turns[self.grid_of[element.blocks[:, 0]]] for element in self.elements]
+        frames = self.with_elements(tuple(map(turned, self.elements, of_grids)))
+        return replace(frames, turns=self.turns @ turns)
 
     def with_frames_of(self, elements: tuple[Elements, ...]) -> "Shell":
         """The same shell with the source frames of another one, so that twist angles mean the same in both.
@@ -276,7 +287,7 @@ class Shell:
         """Set the twist angles so that the first directors are as near to the normals as they can be."""
         flat = self.mesh.flat[self.mesh.edges]
         before, now = (unit(np.diff(ends, axis=1)[:, 0]) for ends in (flat, state[self.stretch.blocks]))
-        before[:, :2] @= self.turn
+        before[:, :2] = (before[:, None, :2] @ self.turns[self.grid_of[self.stretch.blocks[:, 0]]])[:, 0]
         moved = parallel_transport(adapted(np.broadcast_to(UP, before.shape), before), before, now)
         wanted = adapted(unit(normals[self.mesh.edges].sum(axis=1)), now)
         self.turn_edges(state, signed_angle(moved, wanted, now))
@@ -305,6 +316,7 @@ class _Builder:
         coupling: Coupling,
         clamped: bool,
         twist: bool | None,
+        isotropic: bool | None = None,
     ) -> None:
         for item in rod if isinstance(rod, Sequence) else (rod,):
             instance("rod", item, Rod)
@@ -320,7 +332,7 @@ class _Builder:
         self.mesh, self.coupling = mesh, coupling
         self.sections = RodSections.of(mesh, self.rods)
         self.stiffness = self.sections.nodes
-        self.isotropic = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
+        self.isotropic = isotropic is not False and bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
         needed = not self.isotropic or any(item.turns_frames for item in self.joints)
         self.twist = needed if twist is None else twist
         if needed and not self.twist:
@@ -357,11 +369,12 @@ class _Builder:
 
     def _spinning(self) -> Ints:
         """Block of the first twist angle of each rod that could spin about itself."""
-        if not (self.isotropic and self.twist):
+        if not self.twist:
             return np.empty(0, dtype=np.intp)
+        round_rods = np.logical_and.reduceat(self.stiffness[:, 0] == self.stiffness[:, 1], self.mesh.rod_start)
         holding = self._of_joints(lambda joint: joint.holds_normals, bool)
         held = np.unique(self.mesh.grid.crossings.rods[holding])
-        loose = np.setdiff1d(np.arange(len(self.rods)), held)
+        loose = np.setdiff1d(np.flatnonzero(round_rods), held)
         return self.first_angle + np.searchsorted(self.mesh.edge_rods, loose)
 
     def _bends(self) -> tuple[Elements, ...]:
@@ -458,16 +471,18 @@ class _Builder:
         ties = [_ties(pairs, self._penalties()[0])] if centric.any() else []
         return [*ties, *offset_ties(self.rod_nodes, eccentricity, self._offset_stiffness(), self.size)]
 
-    def _offset_stiffness(self) -> float:
-        """Stiffness of eccentric ties [N/m].
+    def _offset_stiffness(self) -> Floats:
+        """(c,) stiffness of eccentric ties [N/m].
 
         Ties a hundred thousand times stiffer, as of a penalty, would have a geometric stiffness that outweighs bending
         already at the micrometres by which rods miss their distance in an initial guess.
         """
+        mesh, rods = self.mesh, self.mesh.grid.crossings.rods
         if not isinstance(self.coupling, SharedDofs):
-            return self._penalties()[0]
-        edge = np.median(self.mesh.edge_lengths)
-        return OFFSET_STIFFNESS * min(rod.stretch_stiffness for rod in self.rods) / edge
+            return np.full(len(rods), self._penalties()[0])
+        edges = np.array([np.median(grid.edge_lengths) for grid in mesh.grids])
+        least = min(rod.stretch_stiffness for rod in self.rods)
+        return OFFSET_STIFFNESS * least / edges[mesh.grid_of_rods[rods[:, 0]]]
 
     def _penalties(self) -> tuple[float, float]:
         """C1 [N/m] and C2 [N m/rad]; by default those of the softest rod."""

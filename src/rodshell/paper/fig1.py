@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.formfinding import PatchForm, find_stages
+from rodshell.formfinding import Stages, find_stages
 from rodshell.output.svg import tag
 from rodshell.paper.figure import (
     CASES,
@@ -49,7 +49,7 @@ class PopUpCase:
     """One shell, and the time from target to popped up, pinned and clamped [s]."""
 
     case: Case
-    form: PatchForm
+    form: Stages
     seconds: float
 
     @property

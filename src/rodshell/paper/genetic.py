@@ -15,7 +15,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
+from rodshell.formfinding import Agreement, Stages, agreement, find_stages
 from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
 from rodshell.paper.genetic_records import WINDOW, History, stored
 from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
@@ -232,7 +232,7 @@ def convergence_svg(comparisons: Sequence[Comparison]) -> str:
     return charts_svg([chart], "\N{WHITE DIAMOND} the direct method, one run")
 
 
-def _direct(case: Case) -> PatchForm:
+def _direct(case: Case) -> Stages:
     return find_stages(case.target, case.layout, ROD, ends=PINNED)
 
 

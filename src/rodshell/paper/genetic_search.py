@@ -17,7 +17,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.formfinding import PatchForm, agreement, pop_up
+from rodshell.formfinding import Stages, agreement, pop_up
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
@@ -70,7 +70,7 @@ class Design:
     upper: Floats
 
     @staticmethod
-    def of(direct: PatchForm) -> "Design":
+    def of(direct: Stages) -> "Design":
         """The design with the target, the grid and the boundary of a `direct` result."""
         target, lines, points = direct.target, direct.footprint.rods, direct.trimmed.boundary.points
         orbit = _orbits(target, lines, points)

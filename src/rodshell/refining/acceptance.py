@@ -14,8 +14,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.figures.records import Ends
-from rodshell.formfinding.patches import PatchedForm, merged_agreement
-from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
+from rodshell.formfinding.pipeline import Agreement, Stages, joined_again, meshed_again
 from rodshell.progress import Progress, silent
 from rodshell.refining.gates import GATES, LARGEST_ERROR, SPAN_ERROR, Gates, gates, span_lengths, worst_with_errors
 from rodshell.refining.gauss_newton import Step
@@ -23,7 +22,6 @@ from rodshell.refining.refine import LEAST_EIGENVALUE, Candidate, Refinement, be
 from rodshell.refining.variables import Family
 from rodshell.units import length_text, percent_text
 
-Stages = PatchForm | PatchedForm
 FIRMER = (0.75, 1.0)  # shares of the lowest eigenvalue that are asked for where a shell does not withstand errors
 EARLIER = 3  # designs that are tried where the best is refused
 HALVINGS = 3  # between a design that passes and a better one that does not
@@ -118,13 +116,13 @@ def refined(
     """
     asked = _Asked(under_weight, dead_loads, span_error)
     end = stages.ends[0] if ends is None else ends
-    if isinstance(stages, PatchForm):
+    if stages.seams is None:
         return _of_piece(stages, vary, end, asked, start, progress)
     if start is not None:
         raise InputError("refine.start: each patch of a form has a design of its own: leave it out")
     if dead_loads is not None:
         raise InputError("a form in patches is refined unloaded or under its own weight alone: set refine.under so")
-    parts, patches = dict[str, Refined](), dict[str, PatchForm]()
+    parts, patches = dict[str, Refined](), dict[str, Stages]()
     for name, patch in stages.patches.items():
 
         def of_patch(stage: str, detail: str, residual: float, name: str = name) -> None:
@@ -132,14 +130,13 @@ def refined(
 
         parts[name] = _of_piece(patch, vary, end, asked, None, of_patch)
         form = parts[name].after
-        assert isinstance(form, PatchForm)
         patches[name] = form if parts[name].changed else _alone(patch, end)
     every = list(parts.values())
     changed = any(part.changed for part in every)
-    loaded = tuple(merged_agreement(gaps) for gaps in zip(*(part.loaded for part in every), strict=True))
+    loaded = tuple(Agreement.of_all(gaps) for gaps in zip(*(part.loaded for part in every), strict=True))
     return Refined(
         tuple(family.name for family in vary), end,
-        stages, replace(stages, patches=patches, ends=(end,)) if changed else stages,
+        stages, joined_again(patches, stages.seams, end) if changed else stages,
         {name: all(part.gates[name] for part in every) for name in GATES},
         "; ".join(f"patch {name}, {part.refused}" for name, part in parts.items() if part.refused),
         sum(part.factorizations for part in every), sum(part.gate_factorizations for part in every),
@@ -148,7 +145,7 @@ def refined(
 
 
 def _of_piece(
-    stages: PatchForm, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
+    stages: Stages, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
     progress: Progress,
 ) -> Refined:  # fmt: skip
     """Of a form in one piece: where the best design is refused, what refused it is respected in another search."""
@@ -182,7 +179,7 @@ def _of_piece(
     return replace(best, before=stages, stopped=last.stopped)
 
 
-def _check_error(form: PatchForm, span_error: float | None) -> None:
+def _check_error(form: Stages, span_error: float | None) -> None:
     """That an error is one of a span, and not as large as most spans are long."""
     usual = np.median(span_lengths(form.footprint.mesh))
     if span_error is not None and not 0.0 <= span_error <= LARGEST_ERROR * usual:
@@ -192,7 +189,7 @@ def _check_error(form: PatchForm, span_error: float | None) -> None:
         )
 
 
-def _explained(refused: str, stages: PatchForm, asked: _Asked) -> tuple[str, int]:
+def _explained(refused: str, stages: Stages, asked: _Asked) -> tuple[str, int]:
     """A refusal, of the gate of tolerance with what errors do to the form as it is; and the factorisations of that."""
     if not refused.startswith("tolerance") or not stages.popped[stages.ends[0]].report.stable:
         return refused, 0
@@ -206,7 +203,7 @@ def _explained(refused: str, stages: PatchForm, asked: _Asked) -> tuple[str, int
 
 
 def _searched(
-    stages: PatchForm, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
+    stages: Stages, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
     least_eigenvalue: float, progress: Progress,
 ) -> Refined:  # fmt: skip
     """One search, and the best of its designs that passes the gates."""
@@ -253,7 +250,7 @@ def _where(best: list[Step]) -> str:
 
 def _accepted(
     found: Refinement, span_error: float | None, progress: Progress
-) -> tuple[PatchForm | None, Candidate | None, Gates, str, int]:
+) -> tuple[Stages | None, Candidate | None, Gates, str, int]:
     """The best design that passes all gates, and its form, or None; its gates, or those of the best one found; why that
     one was refused; and the factorisations that all took.
 
@@ -317,14 +314,14 @@ def _some(designs: Sequence[Candidate]) -> list[Candidate]:
 
 def _judged(
     found: Refinement, design: Candidate, span_error: float | None, all_of_them: bool, progress: Progress
-) -> tuple[PatchForm, Gates, int]:
+) -> tuple[Stages, Gates, int]:
     """A design popped up, its gates, and the factorisations of both; tried at all gates, or until one refuses it."""
     form, spent = popped_up(found.before, design, found.ends)
     judged = gates(form, all_of_them=all_of_them, span_error=span_error, progress=progress)
     return form, judged, spent + judged.factorizations
 
 
-def _alone(stages: PatchForm, ends: Ends) -> PatchForm:
+def _alone(stages: Stages, ends: Ends) -> Stages:
     """The same with one end condition."""
     kept = {end: gap for end, gap in stages.agreement.items() if end == ends}
     return replace(stages, ends=(ends,), popped={ends: stages.popped[ends]}, agreement=kept)

@@ -17,7 +17,7 @@ from scipy.sparse import coo_array, csc_array, eye_array
 from scipy.sparse.linalg import spsolve
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding.pipeline import PatchForm, agreement, meshed_again
+from rodshell.formfinding.pipeline import Stages, agreement, meshed_again
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.layout import GridMesh
 from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES, EdgeProperties
@@ -67,7 +67,7 @@ class Gates:
 
 
 def gates(
-    form: PatchForm, *, all_of_them: bool = True, span_error: float | None = None, progress: Progress = silent
+    form: Stages, *, all_of_them: bool = True, span_error: float | None = None, progress: Progress = silent
 ) -> Gates:
     """Try a design at every gate.
 
@@ -97,7 +97,7 @@ def gates(
     return Gates(passed, first, factorizations)
 
 
-def _stable(form: PatchForm, progress: Progress) -> tuple[str, int]:
+def _stable(form: Stages, progress: Progress) -> tuple[str, int]:
     report = _popped(form).report
     if not report.converged:
         return f"the pop-up {report.sentence}", 0
@@ -105,7 +105,7 @@ def _stable(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return (f"the shell is not stable, with {count} negative mode{'s' if count > 1 else ''}" if count else ""), 0
 
 
-def _flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
+def _flat(form: Stages, progress: Progress) -> tuple[str, int]:
     worst = misfit(form.footprint.mesh) / form.target.size
     if worst <= MISFIT:
         return "", 0
@@ -115,7 +115,7 @@ def _flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
     ), 0
 
 
-def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
+def _remeshed(form: Stages, progress: Progress) -> tuple[str, int]:
     (ends,) = form.popped
     again = meshed_again(form, ends)
     made = _popped(again).report.factorizations
@@ -127,7 +127,7 @@ def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return f"meshed again, its gap is {percent_text(after)} rms and not {percent_text(before)}", made
 
 
-def _tolerance(form: PatchForm, span_error: float | None, progress: Progress) -> tuple[str, int]:
+def _tolerance(form: Stages, span_error: float | None, progress: Progress) -> tuple[str, int]:
     error = SPAN_ERROR * form.target.size if span_error is None else span_error
     built = f"built with errors of up to {length_text(error)} in every span"
     most = WORSE * _rms(form) + WORSE_BY
@@ -139,7 +139,7 @@ def _tolerance(form: PatchForm, span_error: float | None, progress: Progress) ->
     return f"{built}, its gap is up to {percent_text(worst)} rms, more than {percent_text(most)}", made
 
 
-def worst_with_errors(form: PatchForm, span_error: float, progress: Progress = silent) -> tuple[float | None, int]:
+def worst_with_errors(form: Stages, span_error: float, progress: Progress = silent) -> tuple[float | None, int]:
     """The largest rms gap of the shell built with errors, over the target's size, and the factorisations that it took.
 
     Parameters
@@ -162,7 +162,7 @@ def worst_with_errors(form: PatchForm, span_error: float, progress: Progress = s
     return worst, made
 
 
-def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
+def _from_flat(form: Stages, progress: Progress) -> tuple[str, int]:
     (shell,) = form.popped.values()
     found = pop_up(
         form.footprint, form.boundary, form.rod, ends=shell.support, start="flat", joint=form.joint,
@@ -185,7 +185,7 @@ def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
 _TRIALS = {"stable": _stable, "flat": _flat, "remeshed": _remeshed, "from_flat": _from_flat}
 
 
-def with_errors(form: PatchForm, samples: int = SAMPLES, *, span_error: float | None = None) -> Iterator[PopUp]:
+def with_errors(form: Stages, samples: int = SAMPLES, *, span_error: float | None = None) -> Iterator[PopUp]:
     """The shell built with errors: each span is too long or too short, each rod too stiff or too soft, by chance.
 
     It is solved from the state that is foreseen to first order. Where that does not lead to a stable equilibrium, the
@@ -227,7 +227,7 @@ def with_errors(form: PatchForm, samples: int = SAMPLES, *, span_error: float | 
         yield replace(popped, shell=other.with_elements(here.elements), equilibrium=replace(here, report=report))
 
 
-def _errors(form: PatchForm, span_error: float | None, seed: int) -> Floats:
+def _errors(form: Stages, span_error: float | None, seed: int) -> Floats:
     """(e, 5) relative errors of the edges' properties: of the lengths of spans, and of the EI and GJ of rods."""
     mesh, random = form.footprint.mesh, np.random.default_rng(seed)
     span = spans(mesh)
@@ -298,12 +298,12 @@ def _joint_stations(mesh: GridMesh) -> Floats:
     return np.asarray(mesh.stations[mesh.at_crossings])
 
 
-def _popped(form: PatchForm) -> PopUp:
+def _popped(form: Stages) -> PopUp:
     """Of a form with one end condition."""
     (popped,) = form.popped.values()
     return popped
 
 
-def _rms(form: PatchForm) -> float:
+def _rms(form: Stages) -> float:
     (gap,) = form.agreement.values()
     return gap.rms_relative

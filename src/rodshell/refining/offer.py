@@ -13,8 +13,7 @@ import numpy as np
 
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.figures.records import Ends
-from rodshell.formfinding.patches import PatchedForm, merged_agreement
-from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
+from rodshell.formfinding.pipeline import Agreement, Stages, agreement
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import Footprint
 from rodshell.layout.profile import DOUBLE, Profile
@@ -75,7 +74,7 @@ class Offer:
         return words
 
 
-def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Offer | None:
+def offer(stages: Stages, *, progress: Progress = silent) -> Offer | None:
     """What double laths would gain, for pinned ends if the form has them.
 
     Parameters
@@ -89,17 +88,15 @@ def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Of
     """
     if stages.status != "converged" or not stages.agreement:
         return None
-    patches = [stages] if isinstance(stages, PatchForm) else list(stages.patches.values())
     ends: Ends = next(iter(stages.agreement))
-    shells = [patch.popped[ends] for patch in patches]
-    if not all(shell.report.stable and not shell.shell.yields for shell in shells):
+    if not stages.popped[ends].report.stable or stages.popped[ends].shell.yields:
         return None
 
     def telling(number: int) -> None:
         progress("offer", f"double laths, design {number}", 0.0)
 
     try:
-        found = [_designs(patch, ends, telling) for patch in patches]
+        found = [_designs(patch, ends, telling) for patch in stages.parts]
     except InputError:
         return None
     if not all(designs for designs, _ in found):
@@ -109,7 +106,7 @@ def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Of
     return Offer(
         ends,
         stages.agreement[ends].rms_relative,
-        merged_agreement([design.gap for design in best]).rms_relative,
+        Agreement.of_all([design.gap for design in best]).rms_relative,
         (min(shares), max(shares)),
         {other: gap.rms_relative for other, gap in stages.agreement.items() if other != ends},
         sum(factorizations for _, factorizations in found),
@@ -124,7 +121,7 @@ class _Design:
     gap: Agreement
 
 
-def _designs(patch: PatchForm, ends: Ends, telling: Callable[[int], None]) -> tuple[list[_Design], int]:
+def _designs(patch: Stages, ends: Ends, telling: Callable[[int], None]) -> tuple[list[_Design], int]:
     """The designs of the search up to the first that is not stable, or to the end of the time, and the factorisations
     that all took; no designs for rods whose sections change already."""
     found, like, factorizations = list[_Design](), patch.popped[ends], 0
@@ -156,7 +153,7 @@ def _next_share(found: Sequence[_Design], before: Agreement) -> float | None:
     return None if gains or len(found) > 3 else NEAR_ALL
 
 
-def _popped_up(patch: PatchForm, share: float, like: PopUp) -> PopUp:
+def _popped_up(patch: Stages, share: float, like: PopUp) -> PopUp:
     """The shell with double laths over a share of every rod, from the equilibrium of one with others."""
     mesh = like.shell.mesh.with_profiles(Profile.double(share))
     shell = Shell.of(mesh, patch.rod, clamped=like.support.holds_directions, joint=patch.joint)

@@ -14,7 +14,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.figures.records import Ends
 from rodshell.formfinding.methods import STANDARD_GRAVITY
-from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
+from rodshell.formfinding.pipeline import Agreement, Stages, agreement
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import Footprint
 from rodshell.model import Shell
@@ -74,8 +74,8 @@ class Refinement:
 
     vary: tuple[str, ...]
     ends: Ends
-    before: PatchForm
-    after: PatchForm
+    before: Stages
+    after: Stages
     designs: tuple[Candidate, ...]
     converged: bool
     factorizations: int
@@ -101,7 +101,7 @@ class Refinement:
 
 
 def refine(
-    stages: PatchForm,
+    stages: Stages,
     vary: str | Family | Sequence[str | Family] = ("taper",),
     *,
     ends: Ends | None = None,
@@ -264,7 +264,7 @@ def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family
     return families
 
 
-def structure_of(stages: PatchForm, ends: Ends) -> Structure:
+def structure_of(stages: Stages, ends: Ends) -> Structure:
     """The shell that is refined.
 
     Raises
@@ -325,7 +325,7 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
     return Point(structure, values, change, edges.at(here.elements), here), made
 
 
-def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchForm, int]:
+def popped_up(stages: Stages, design: Candidate, ends: Ends) -> tuple[Stages, int]:
     """The stages of a grid built to a design, and the factorisations that its pop-up took.
 
     Parameters
@@ -357,7 +357,7 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
     return result, found.report.factorizations + made
 
 
-def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
+def loaded_gap(stages: Stages, design: Candidate, ends: Ends) -> Agreement:
     """Distance to the target of a shell under the loads that it was refined for.
 
     Parameters

@@ -41,11 +41,10 @@ from rodshell.figures.form import (
     Target,
 )
 from rodshell.figures.records import Ends, plain
-from rodshell.formfinding import Footprint, PatchForm, Trimmed
+from rodshell.formfinding import Footprint, Stages, Trimmed
 from rodshell.formfinding.bound_drape import shape_of_net
 from rodshell.formfinding.finite_sections import is_flat
-from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.seams import End
+from rodshell.formfinding.seams import End, Seams
 from rodshell.formfinding.trim import ends_past_net
 from rodshell.joints import joint_parameters
 from rodshell.kernels import description
@@ -66,7 +65,7 @@ if TYPE_CHECKING:
 States = dict[str, NDArray[Any]]
 
 
-def results_of(stages: PatchForm | PatchedForm) -> Results:
+def results_of(stages: Stages) -> Results:
     """The results of a form, before it is checked; those of patches are of one shell, with `patches` and `seams`.
 
     Parameters
@@ -79,35 +78,29 @@ def results_of(stages: PatchForm | PatchedForm) -> Results:
         **_grid(stages.footprint, stages.boundary.points, stages.dropped, stages.rod),
         "pop_up": _pop_ups(stages),
     }
-    if isinstance(stages, PatchForm) and stages.from_table:
+    if stages.from_table:
         return Results(**_head("rods", stages.status, stages.warnings), **known)
     known |= {
         "layout": Layout.model_validate(stages.layout.parameters()),
         "end_tangents": stages.boundary.tangents.tolist(),
         "agreement": _agreements(stages),
     }
-    if isinstance(stages, PatchedForm):
-        nets = [laid.net for laid in stages.patch_nets.values()]
+    known |= {
+        "target": _target(stages.target, flat=is_flat(stages.on_target, stages.rod)),
+        "drape": _drape_of_all([_drape(part.trimmed) for part in stages.parts]),
+    }
+    if nets := [part.draped.net for part in stages.parts if part.draped.net is not None]:
         tightest = min(nets, key=lambda net: net.min_angle)
-        known |= {
-            "target": _target(stages.target, flat=is_flat(stages.draped, stages.rod)),
-            "patches": tuple(_patch(stages, name) for name in stages.patches),
-            "seams": tuple(_seam(stages, k) for k in range(len(stages.seams))),
-            "net": _net(tightest).changed(error_estimate=max(net.error_estimate for net in nets)),
-            "drape": _drape_of_all([_drape(found.trimmed) for found in stages.patches.values()]),
-        }
+        known["net"] = _net(tightest).changed(error_estimate=max(net.error_estimate for net in nets))
+    if stages.seams is None:
+        known["crossings_without_joint"] = _without_joint(stages.footprint.mesh.grid)
     else:
-        known |= {
-            "target": _target(stages.target, flat=is_flat(stages.trimmed.positions, stages.rod)),
-            "crossings_without_joint": _without_joint(stages.footprint.mesh.grid),
-            "drape": _drape(stages.trimmed),
-        }
-        if stages.draped.net is not None:
-            known["net"] = _net(stages.draped.net)
+        known["patches"] = tuple(_patch(stages, stages.seams, k) for k in range(len(stages.patches)))
+        known["seams"] = tuple(_seam(stages.seams, k) for k in range(len(stages.seams.lines)))
     return Results(**_head(stages.target.name, stages.status, stages.warnings), **known)
 
 
-def states_of(stages: PatchForm | PatchedForm) -> States:
+def states_of(stages: Stages) -> States:
     """The states of a form, before it is checked.
 
     Parameters
@@ -116,13 +109,10 @@ def states_of(stages: PatchForm | PatchedForm) -> States:
     """
     mesh = stages.footprint.mesh
     states: States = {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
-    if isinstance(stages, PatchedForm):
-        draped: Floats | None = stages.draped
-        gaps = [found.target.gap(found.trimmed.positions).distance for found in stages.patches.values()]
-        states["gap_draped"] = np.concatenate(gaps)
-    elif (draped := stages.boundary.draped) is not None and not stages.from_table:
-        states["gap_draped"] = stages.target.gap(draped).distance - mesh.heights
-    if "gap_draped" in states and draped is not None:
+    if (draped := stages.boundary.draped) is not None and not stages.from_table:
+        on_target = [(part.target, part.boundary.draped) for part in stages.parts]
+        gaps = [target.gap(there).distance for target, there in on_target if there is not None]
+        states["gap_draped"] = np.concatenate(gaps) - mesh.heights
         points, faces = surface_mesh(stages.target, draped)  # of the target under the shell, for pictures
         states |= {
             "draped": draped,
@@ -136,21 +126,21 @@ def states_of(stages: PatchForm | PatchedForm) -> States:
     return states
 
 
-def with_seam_forces(results: Results, form: PatchedForm, checks: Checks) -> Results:
+def with_seam_forces(results: Results, seams: Seams, checks: Checks) -> Results:
     """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces.
 
     Parameters
     ----------
     checks : with the reactions of all patches, rod by rod.
     """
-    row = {rod.name: k for k, rod in enumerate(form.footprint.rods)}
-    seams = []
+    row = {rod.id: k for k, rod in enumerate(results.rods)}
+    forced = list[Seam]()
     for k, seam in enumerate(results.seams):
-        ends = [[_end_index(row, end) for end in meeting.ends] for meeting in form.meetings if meeting.seam == k]
+        ends = [[_end_index(row, end) for end in meeting.ends] for meeting in seams.meetings if meeting.seam == k]
         index = np.array(ends, dtype=np.intp).reshape(-1, 2)
         forces = {support: _seam_forces(held.forces[index].sum(axis=1)) for support, held in checks.reactions.items()}
-        seams.append(seam.changed(forces=forces))
-    return results.changed(seams=tuple(seams))
+        forced.append(seam.changed(forces=forces))
+    return results.changed(seams=tuple(forced))
 
 
 def with_refinement(results: Results, found: "Refined") -> Results:
@@ -247,6 +237,8 @@ def _drape(trimmed: Trimmed) -> Drape:
 
 def _drape_of_all(parts: list[Drape]) -> Drape:
     """Figures of the drapes of all patches: sums, and the worst of each kind."""
+    if len(parts) == 1:
+        return parts[0]
     tightest = min(parts, key=lambda part: part.min_angle_deg or 0.0)
     figures: dict[str, Any] = {
         "levels": tuple(level for part in parts for level in part.levels),
@@ -305,7 +297,7 @@ def _stiffness(profile: Profile, length: float, kind: RodModel) -> Stiffness:
     )
 
 
-def _pop_ups(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
+def _pop_ups(stages: Stages) -> dict[Ends, PopUp]:
     """Figures of the pop-up with each kind of ends."""
     return {
         ends: PopUp.taken_from(
@@ -318,12 +310,14 @@ def _pop_ups(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
     }
 
 
-def _agreements(stages: PatchForm | PatchedForm) -> dict[Ends, Agreement]:
+def _agreements(stages: Stages) -> dict[Ends, Agreement]:
     return {ends: Agreement.taken_from(gap) for ends, gap in stages.agreement.items()}
 
 
-def _patch(form: PatchedForm, name: str) -> Patch:
-    laid, found = form.patch_nets[name], form.patches[name]
+def _patch(stages: Stages, seams: Seams, k: int) -> Patch:
+    """The k-th patch."""
+    name, found = list(stages.patches.items())[k]
+    laid, moved = seams.nets[name], stages.footprint.mesh.grids[k].flat[0] - found.footprint.mesh.flat[0]
     return Patch(
         id=name,
         status=found.status,
@@ -332,8 +326,8 @@ def _patch(form: PatchedForm, name: str) -> Patch:
         anchor=laid.anchor,
         rotate=laid.layout.rotate,
         spacing=laid.layout.spacing,
-        flat_shift=form.flat.shifts[name].tolist(),
-        ends_moved=form.moved[name],
+        flat_shift=moved[:2].tolist(),
+        ends_moved=seams.moved[name],
         net=_net(laid.net),
         agreement=_agreements(found),
         drape=_drape(found.trimmed),
@@ -341,13 +335,13 @@ def _patch(form: PatchedForm, name: str) -> Patch:
     )
 
 
-def _seam(form: PatchedForm, index: int) -> Seam:
+def _seam(seams: Seams, index: int) -> Seam:
     meetings = [
         Meeting(point=plain(meeting.point), ends=(str(meeting.ends[0]), str(meeting.ends[1])))
-        for meeting in form.meetings
+        for meeting in seams.meetings
         if meeting.seam == index
     ]
-    return Seam(points=form.cut_along[index].points.tolist(), meetings=tuple(meetings))
+    return Seam(points=seams.lines[index].points.tolist(), meetings=tuple(meetings))
 
 
 def _seam_forces(forces: Floats) -> SeamForces:

@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Protocol, Self, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints, State
+from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.kernels import njit
 from rodshell.threads import in_threads
 from rodshell.validation import brief
@@ -125,19 +125,25 @@ def twist_angles(sets: Sequence[Elements], count: int) -> NDArray[np.bool_]:
     return result
 
 
-def with_frames(element: Elements, like: Elements) -> Elements:
+def with_frames(element: Elements, like: Elements, rows: Bools | None = None, at: Bools | None = None) -> Elements:
     """An energy with the source frames of another one.
 
     Parameters
     ----------
-    like : an energy of the same kind, on the same blocks.
+    like : an energy of the same kind; without `rows` and `at` on the same blocks.
+    rows : (l,) which elements of `like` are those of the energy; None: all.
+    at : (m,) to which elements of the energy the frames go, the others keeping theirs; None: to all.
     """
     assert is_dataclass(element)
-    sources: dict[str, Any] = {
-        field.name: getattr(like, field.name) for field in fields(element) if field.name.startswith("source_")
-    }
+    sources: dict[str, Any] = {}
+    for name in (field.name for field in fields(element) if field.name.startswith("source_")):
+        frames = getattr(like, name)
+        sources[name] = frames if rows is None else frames[rows]
+        if at is not None:
+            sources[name] = getattr(element, name).copy()
+            sources[name][at] = frames
     if hasattr(element, "bends"):
-        sources["bends"] = with_frames(element.bends, like.bends)
+        sources["bends"] = with_frames(element.bends, like.bends, rows, at)
     return replace(element, **sources)
 
 
@@ -146,7 +152,7 @@ def turned(element: Elements, turn: Floats) -> Elements:
 
     Parameters
     ----------
-    turn : (2, 2), of rows x, y.
+    turn : (2, 2), of rows x, y; or (m, 2, 2), of each element.
     """
     assert is_dataclass(element)
     sources: dict[str, Any] = {}

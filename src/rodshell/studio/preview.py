@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding.patches import PatchedForm
 from rodshell.layout import GridMesh
 from rodshell.output.colour_scale import Colour, gap_scale
 from rodshell.output.grid import CAPTIONS, Shape, supported
@@ -106,8 +105,7 @@ def figures(form: "Form") -> Figures:
     """Figures of a form in words, by their names."""
     rods, rounding = form.footprint.rods, rounding_of(form)
     stages = form.stages
-    patches = stages.patches.values() if isinstance(stages, PatchedForm) else [stages]
-    angles = [patch.draped.figures.min_angle for patch in patches]
+    angles = [part.draped.figures.min_angle for part in stages.parts]
     return lengths([rod.length for rod in rods], rounding) + [
         *(("smallest angle between rods", wording.degrees(degrees(min(angles)))) for _ in angles[:1]),
         *(gap(ends, found.max, found.max_relative, rounding) for ends, found in form.agreement.items()),
