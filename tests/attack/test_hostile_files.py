@@ -26,7 +26,7 @@ from rodshell.targets import apart
 from rodshell.targets.curve_files import read_curves
 from rodshell.targets.field_fitting import cubic_spacing
 from rodshell.targets.mesh_files import read_mesh
-from rodshell.targets.nurbs_files import Nurbs
+from rodshell.targets.nurbs import Nurbs
 from rodshell.targets.samples import mesh_samples
 from rodshell.targets.trianglemesh import sound_mesh
 from tests.acceptance.targets_broken import WRITERS, dome

@@ -15,7 +15,7 @@ from rodshell.results import read
 from rodshell.targets.creased import Creased, cut_at
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.patch import Seam
-from tests.targets.meshes import CREASED, creased
+from tests.targets.meshes import CREASED, creased, creased_quads
 from tests.targets.test_creases import SEAMS, off_crease
 
 Floats = NDArray[np.float64]
@@ -79,10 +79,11 @@ def test_mirrored_patches_get_mirrored_headings() -> None:
 
 
 @pytest.mark.slow
-def test_a_groined_shell_forms_in_four_patches_from_the_command_line(tmp_path, capsys) -> None:
-    """Its seams are those that the refusal without seams names."""
-    x, faces = creased("groin")
-    rows = [f"v {a:.6f} {b:.6f} {c:.6f}" for a, b, c in x] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+@pytest.mark.parametrize("mesh", [creased, creased_quads])
+def test_a_groined_shell_forms_in_four_patches_from_the_command_line(mesh, tmp_path, capsys) -> None:
+    """Its seams are those that the refusal without seams names; of triangles cut along the groin, and of quads."""
+    x, faces = mesh("groin")
+    rows = [f"v {a:.6f} {b:.6f} {c:.6f}" for a, b, c in x] + ["f " + " ".join(map(str, face + 1)) for face in faces]
     (tmp_path / "groin.obj").write_text("\n".join(rows))
     options = [
         "--unit",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rodshell.targets.nurbs_files import Nurbs, splines
+from rodshell.targets.nurbs import Nurbs, splines
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 5])

@@ -10,6 +10,7 @@ from rodshell.targets.mesh_files import read_mesh
 from rodshell.targets.polygons import Polygons
 from rodshell.targets.trianglemesh import sound_mesh
 from tests.acceptance.targets_broken import WRITERS, dome
+from tests.targets.meshes import creased_quads
 
 Face = list[list[float]]
 
@@ -69,6 +70,50 @@ def test_triangles_cover_a_face_once_whatever_its_shape_and_first_corner(name: s
 def test_of_all_diagonals_those_are_taken_that_leave_no_slivers(face: Face, least: float) -> None:
     for turn in range(len(face)):
         assert smallest_angle(split(face[turn:] + face[:turn])) > least
+
+
+def groin(count: int, edit: str) -> tuple[np.ndarray, list[list[int]]]:
+    """The groin of two barrels over a lattice, with its faces changed in one way."""
+    x, quads = creased_quads("groin", count)
+    faces = [list(map(int, face)) for face in quads]
+    if edit == "turned":
+        faces = [face[k % 4 :] + face[: k % 4] for k, face in enumerate(faces)]
+    if edit == "facing both sides":
+        faces = [face[:: 1 - 2 * (k % 2)] for k, face in enumerate(faces)]
+    if edit == "not joined":
+        x, faces = x[np.concatenate(faces)], np.arange(4 * len(faces)).reshape(-1, 4).tolist()
+    if edit == "joined to hexagons":  # cells (i, j) and (i, j + 1) in plan
+        pairs = zip(faces[::2], faces[1::2], strict=True)
+        faces = [[a[0], a[1], a[2], b[2], b[3], a[3]] for a, b in pairs]
+    return x, faces
+
+
+def crossed(x: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Middles (n, 3) of the edges that run from one side of a groin to another."""
+    ends = x[np.vstack([triangles[:, [k, k - 2]] for k in range(3)])]
+    side = np.sign(np.round(ends[..., 0] ** 2 - ends[..., 1] ** 2, 6))
+    return ends[side[:, 0] * side[:, 1] < 0].mean(axis=1)
+
+
+@pytest.mark.parametrize("count", [10, 20, 60])
+@pytest.mark.parametrize("edit", ["", "turned", "facing both sides", "not joined", "joined to hexagons"])
+def test_diagonals_run_along_a_groin_and_not_across(edit: str, count: int) -> None:
+    """But near the crown, where both barrels are level and the crease fades: at most three cells from it."""
+    x, faces = groin(count, edit)
+    triangles = Polygons(x, np.concatenate(faces), np.array(list(map(len, faces)))).triangles("it")
+    assert len(triangles) == 2 * count**2
+    assert np.abs(crossed(x, triangles)[:, :2]).max(initial=0) < 3 * 10 / count
+    plan = 0.5 * np.abs(np.cross(x[triangles[:, 1]] - x[triangles[:, 0]], x[triangles[:, 2]] - x[triangles[:, 0]]))
+    assert plan[:, 2].sum() == pytest.approx(100.0)  # each place is covered once
+
+
+def test_a_fine_mesh_of_a_smooth_surface_keeps_the_better_shaped_diagonals() -> None:
+    x, faces = creased_quads("groin", 100)
+    x[:, 2] = 3.2 + 0.9 * np.cos(x[:, 0] / 4.5) * np.cos(x[:, 1] / 4) + 0.15 * np.sin(x[:, 0] / 3)
+    found = Polygons(x, faces.ravel(), np.full(len(faces), 4)).triangles("it")
+    alone = [Polygons(x, face, np.array([4])).triangles("it") for face in faces[::97]]
+    for k, triangles in zip(range(0, len(faces), 97), alone, strict=True):
+        np.testing.assert_array_equal(found[2 * k : 2 * k + 2], triangles)
 
 
 def test_a_face_of_too_many_corners_is_refused() -> None:

@@ -27,7 +27,8 @@ from rodshell.targets.mesh_files import (
     require_few_heights,
     require_size,
 )
-from rodshell.targets.nurbs_files import RHINO_FILES, STEP_FILES, grid_triangles, read_3dm, read_step
+from rodshell.targets.nurbs import grid_triangles
+from rodshell.targets.nurbs_files import RHINO_FILES, STEP_FILES, read_3dm, read_step
 from rodshell.units import length_text, shown
 from rodshell.untrusted import read_text
 from rodshell.validation import brief, choice, file_path, instance, keep, number, numbers, positive
@@ -344,7 +345,7 @@ def surface_from(
     ----------
     unit : length of the file's unit [m]; None where the file states its unit.
     name : object name, if the file has several (3dm: object or layer name, or number; STEP: name of a face, shell or
-        solid, or the number of a face).
+        solid, or the number of a face). The untrimmed faces of a 3dm polysurface are joined.
     base : z of a plane below which there is no shell [m], after placement; None for a surface that ends at its edge.
     boundary : path of an OBJ, DXF or 3dm file with closed curves on the surface, in the same unit, unless a 3dm file
         states its own, and placed with it: the longest bounds the shell, the others are openings.
@@ -366,7 +367,7 @@ def surface_from(
     if path.suffix.lower() in MESH_FILES:
         kind, (vertices, faces, notes) = "mesh", read_mesh(path, unit, name)
     elif path.suffix.lower() in RHINO_FILES:
-        kind, (vertices, faces, trims, stated) = "nurbs", read_3dm(path, name)
+        kind, (vertices, faces, trims, stated, notes) = "nurbs", read_3dm(path, name)
         unit = stated if unit is None else unit
         vertices = in_metres(vertices, faces, unit, path)
         curves = [trim * (unit or 1.0) for trim in trims]

@@ -14,15 +14,15 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
 
     Parameters
     ----------
-    request : `path`; `along_edges`, the pieces of each edge or curve; and `name` of an object or a layer, or None, or
-        `most`, curves.
+    request : `path`; `along_edges`, the pieces of each edge or curve; `most_joined`, faces of a polysurface; and
+        `name` of an object or a layer, or None, or `most`, curves.
 
     Returns
     -------
     `unit`, by its name, `names` (JSON: object, layer and number of faces of each surface) and `others` (JSON: numbers
-    of meshes, SubDs and curves); nothing for another kind of file. If one surface with one face matches, also `degrees`
-    (2,), `knots_u` and `knots_v` without the first and the last, `controls` (m, n, 4) and `trims`
-    (k, along_edges + 1, 3), the curves that bound it.
+    of meshes, SubDs and curves); nothing for another kind of file. If one surface matches, and has one face or only
+    untrimmed ones, also their number `surfaces`, of each `degrees0` (2,), `knots_u0` and `knots_v0` without the first
+    and the last and `controls0` (m, n, 4), and `trims` (k, along_edges + 1, 3), the curves that bound a single one.
 
     Of curves `unit` and their `count`; if it is not above `most`, `points` and `ends` as `dxf_curves` returns them.
     """
@@ -45,11 +45,22 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
     if not wanted and number.isdecimal() and 0 < int(number) <= len(surfaces):
         *_, faces, shape = surfaces[int(number) - 1]
         wanted = [(shape, faces)]
-    if len(wanted) == 1 and wanted[0][1] == 1:
-        shape = wanted[0][0]
-        whole = shape if isinstance(shape, rhino3dm.Surface) else shape.Faces[0].UnderlyingSurface()
-        trims = [] if whole is shape or shape.IsSurface else trims_of(shape, request["along_edges"])
-        found |= _nurbs_of(whole) | {"trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
+    if len(wanted) == 1:
+        shape, count = wanted[0]
+        faces = [shape] if isinstance(shape, rhino3dm.Surface) else [shape.Faces[k] for k in range(count)]
+        whole = [face if face is shape else face.UnderlyingSurface() for face in faces]
+        trims: list[Any] = []
+        if count == 1:
+            trims = [] if whole[0] is shape or shape.IsSurface else trims_of(shape, request["along_edges"])
+        elif count > request["most_joined"] or not all(face.DuplicateFace(False).IsSurface for face in faces):
+            return found
+        for k, surface in enumerate(whole):
+            values = _nurbs_of(surface)
+            if count > 1 and faces[k].OrientationIsReversed:
+                knots = values["knots_u"]
+                values |= {"knots_u": knots[0] + knots[-1] - knots[::-1], "controls": values["controls"][::-1]}
+            found |= {f"{key}{k}": value for key, value in values.items()}
+        found |= {"surfaces": count, "trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
     return found
 
 
