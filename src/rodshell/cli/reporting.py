@@ -35,7 +35,7 @@ UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one
 SILENCE = 10.0  # s: the longest without a word, away from a terminal
 TICK = 0.5  # s, on a terminal
 BAR = 24  # characters
-FOUND, BAD_INPUT, NOT_CONVERGED, _UNBUILDABLE = 0, 2, 3, 4
+FOUND, BAD_INPUT, NOT_CONVERGED, UNBUILDABLE = 0, 2, 3, 4
 
 
 class Progress:
@@ -276,7 +276,7 @@ def deliver(
     verdict = result.result().get("verdict")
     if verdict and verdict["level"] == "unbuildable":
         say(f"NOT BUILDABLE: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
-        return _UNBUILDABLE
+        return UNBUILDABLE
     return FOUND
 
 
