@@ -13,9 +13,10 @@ from rodshell.formfinding.popup import pop_up
 from rodshell.formfinding.trim import Footprint
 from rodshell.refining import refine as refine_module
 from rodshell.refining.gauss_newton import Step
-from rodshell.refining.objectives import Gap, Small
+from rodshell.refining.objectives import Gap
 from rodshell.refining.refine import Refinement, between, refine
 from rodshell.refining.stiffness_families import Taper
+from rodshell.refining.structure import Point
 from rodshell.solve.equilibrium import find_equilibrium
 
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
@@ -89,8 +90,16 @@ def test_the_search_ends_where_no_neighbour_is_better() -> None:
 
 
 def test_objectives_compose_and_regularisation_keeps_variables_small() -> None:
-    stages = form().stages
-    soft = refine(stages, "taper", objectives=[Gap(), Small(np.ones(5), weight=0.003)])  # type: ignore[arg-type]
+    class Small:
+        """Variables stay near the values that they have without effect."""
+
+        def residuals(self, here: Point) -> np.ndarray:
+            return np.asarray(0.003 * here.values / np.sqrt(len(here.values)))
+
+        def slopes(self, here: Point) -> np.ndarray:
+            return 0.003 * np.eye(len(here.values)) / np.sqrt(len(here.values))
+
+    soft = refine(form().stages, "taper", objectives=[Gap(), Small()])  # type: ignore[arg-type]
     assert np.abs(soft.designs[-1].point.values).max() < 0.8 * np.abs(tapered().designs[-1].point.values).max()
     assert tapered().gap_after.rms < soft.gap_after.rms < tapered().gap_before.rms
 

@@ -35,7 +35,7 @@ UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one
 SILENCE = 10.0  # s: the longest without a word, away from a terminal
 TICK = 0.5  # s, on a terminal
 BAR = 24  # characters
-FOUND, BAD_INPUT, NOT_CONVERGED, _UNBUILDABLE = 0, 2, 3, 4
+FOUND, BAD_INPUT, NOT_CONVERGED, UNBUILDABLE = 0, 2, 3, 4
 
 
 class Progress:
@@ -275,7 +275,7 @@ def deliver(
         say(f"{said}; partial results are in {folder}")
         return NOT_CONVERGED
     verdict = result.result().get("verdict")
-    codes = {"unbuildable": _UNBUILDABLE} | ({"unknown": NOT_CONVERGED} if result.result().get("pop_up") else {})
+    codes = {"unbuildable": UNBUILDABLE} | ({"unknown": NOT_CONVERGED} if result.result().get("pop_up") else {})
     if verdict and (level := verdict["level"]) in codes:
         named = LEVELS[level].upper()
         say(f"{named}: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")

@@ -32,7 +32,6 @@ STANDARD_GRAVITY = 9.81  # m/s2, as in the paper
 STOPPED: tuple[Stopped, ...] = get_args(Stopped)
 
 MethodName = Literal["bound", "gravity", "paper"]
-METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from rodshell.rods.elements import is_bends
 from rodshell.targets import Hemisphere
 
 EDGE, NODES = 5e-3, 5
-RADIUS, DEPTH, HANGING = 0.2, 0.02, 0.04  # [m] of the section in contact; deep, to be seen
+RADIUS, DEPTH = 0.2, 0.02  # [m] of the section in contact; deep, to be seen
 COLUMNS = ("figure", "what", "unknowns", "bend stencils", "ties of nodes", "of angles")
 Drawn = dict[int, Floats]  # of blocks, in a panel
 

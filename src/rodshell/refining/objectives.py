@@ -153,26 +153,6 @@ class LowestEigenvalue:
         return (1.0 + self.margin) * self.least
 
 
-@dataclass(frozen=True, eq=False)
-class Small:
-    """Variables stay near their values without effect.
-
-    Parameters
-    ----------
-    scale : (n,) change of each that counts as one.
-    weight : of a change of one in every variable, over a gap of the target's size [-].
-    """
-
-    scale: Floats
-    weight: float = 1e-6
-
-    def residuals(self, here: Point) -> Floats:
-        return np.asarray(self.weight * here.values / self.scale / np.sqrt(len(self.scale)))
-
-    def slopes(self, here: Point) -> Floats:
-        return np.asarray(np.diag(self.weight / self.scale / np.sqrt(len(self.scale))))
-
-
 def residuals(objectives: Sequence[Objective], here: Point) -> Floats:
     """(q,) residuals of all objectives.
 

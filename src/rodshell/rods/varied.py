@@ -20,7 +20,7 @@ from rodshell.errors import InputError
 from rodshell.rods.section import Ellipse, GivenSection, RectangularSection, Rod
 
 TERMS = np.arange(1, 16, 2)  # of the series of a rectangle's torsion constant, which fall as n^-5: 1e-6 of the sum
-_OUT_OF_GRID, _WITHIN_GRID = ("width", "a"), ("height", "b")
+_OUT_OF_GRID = ("width", "a")
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from rodshell.geometry.curves import closed_loops
 from rodshell.targets.apart import read_apart
 from rodshell.targets.joined_faces import joined
 from rodshell.targets.mesh_files import Notes, file_bytes
-from rodshell.targets.nurbs import FINEST, GRID, Nurbs, grid_triangles
+from rodshell.targets.nurbs import FINEST, GRID, PER_SPAN, Nurbs, grid_triangles
 from rodshell.units import shown
 
 _ALONG_EDGES = 400  # straight pieces of each trimming edge
@@ -151,7 +151,7 @@ def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[F
         raise InputError(f"{path} is truncated: its last line, {_LAST_LINE.decode()}, is missing; export it again")
     if far := _ABSURD.search(data):
         raise InputError(f"{path} is damaged: it has a coordinate {far[0].decode()}; export it again")
-    samples = {"grid": GRID, "per_span": _PER_SPAN, "finest": FINEST, "along_edges": _ALONG_EDGES}
+    samples = {"grid": GRID, "per_span": PER_SPAN, "finest": FINEST, "along_edges": _ALONG_EDGES}
     parts = read_apart(READERS / "opencascade.py", path, data, "STEP", name=name, **samples)
     if "points" not in parts:
         raise _no_single_face(path, json.loads(str(parts["names"])), name)
