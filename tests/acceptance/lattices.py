@@ -11,7 +11,7 @@ import rodshell as rs
 from rodshell.arrays import Floats
 from rodshell.errors import NetLimitError
 from rodshell.formfinding.laid import flat_state, lay
-from rodshell.formfinding.pipeline import PatchForm, find_stages
+from rodshell.formfinding.pipeline import Stages, find_stages
 from rodshell.geometry.frames import cross, unit
 from rodshell.layout import GridMesh
 from rodshell.nets.surface_curves import SurfaceCurves, geodesic, trace
@@ -102,7 +102,7 @@ def straight_rows() -> Iterator[Row]:
 
 
 @cache
-def shell(name: str, target: rs.Target, grid: rs.Geodesic | rs.Asymptotic, ratio: float) -> PatchForm:
+def shell(name: str, target: rs.Target, grid: rs.Geodesic | rs.Asymptotic, ratio: float) -> Stages:
     anchor = None if isinstance(target, rs.Cap | rs.Ellipsoid) else (0.0, 0.0)
     rod = lath(ratio)
     if isinstance(grid, rs.Asymptotic):  # upright

@@ -166,3 +166,31 @@ def test_three_families_lie_on_the_target_and_stand() -> None:
     assert {rod.name[0] for rod in form.footprint.rods} == set("UVW")
     assert form.popped["pinned"].report.stable
     assert form.checks.contact["pinned"].pairs == 0
+
+
+def ring(inner: float, outer: float) -> rs.Freeform:
+    """A mesh of a spherical dome with a round opening."""
+    radius, angle = np.meshgrid(np.linspace(inner, outer, 40), np.linspace(0.0, 2.0 * np.pi, 160, endpoint=False))
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    rows, columns = np.meshgrid(np.arange(160), np.arange(39), indexing="ij")
+    a, b = 40 * rows + columns, 40 * ((rows + 1) % 160) + columns
+    faces = np.concatenate([np.stack([a, a + 1, b + 1], axis=-1), np.stack([a, b + 1, b], axis=-1)])
+    return rs.Freeform.of(
+        np.column_stack([each.ravel() for each in (x, y, np.sqrt(36.0 - x * x - y * y))]), faces.reshape(-1, 3)
+    )
+
+
+def test_curves_pass_over_an_opening_and_rods_end_at_it() -> None:
+    target = ring(0.8, 3.0)
+    form = rs.find_form(target, rs.Geodesic(spacing=0.4), lath(0.02), joint=rs.Pin(), ends="pinned", anchor=(1.5, 0.0))
+    rods = form.footprint.rods
+    assert {rod.name[:3] for rod in rods if rod.name.endswith("a")} == {
+        rod.name[:3] for rod in rods if rod.name.endswith("b")
+    }
+    ends = form.boundary.points
+    assert np.abs(target.margin(ends)).max() < 1e-5 * target.size
+    radius = np.hypot(ends[:, 0], ends[:, 1])
+    assert np.minimum(np.abs(radius - 0.8), np.abs(radius - 3.0)).max() < 2e-3
+    assert np.count_nonzero(radius < 1.0) >= 8
+    inside = form.popped["pinned"].positions[:, :2]
+    assert np.linalg.norm(inside, axis=1).min() > 0.75

@@ -196,7 +196,7 @@ def deploy_grids(popped: PopUp, *, stages: int, progress: Progress = lambda shar
     elsewhere = [way.elsewhere for way in ways if way.elsewhere is not None]
     snaps = sorted({snap for way in ways for snap in zip(way.snaps, way.snapped_by, strict=True)})
     return Deployment(
-        ends="pinned",
+        ends=popped.ends,
         share=np.array(shares),
         positions=np.concatenate([way.positions[row] for way, row in zip(ways, rows, strict=True)], axis=1),
         shells=tuple(side_by_side(popped.shell, parts) for parts in each),

@@ -12,12 +12,13 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import rod_breadth
-from rodshell.formfinding.methods import Bound, Draped, DrapeFigures, FlatState
+from rodshell.formfinding.methods import Bound, Draped, DrapeFigures, FlatState, smallest_joint_angle
 from rodshell.geometry.frames import unit
 from rodshell.joints import Joint
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
-from rodshell.layout.flatgrid import Crossings
+from rodshell.layout.gridlayout import piece_names
 from rodshell.layout.lattices import Asymptotic, Geodesic
+from rodshell.layout.mesh import cut_mesh
 from rodshell.model.assembly import Freedom
 from rodshell.nets.surface_lattice import SurfaceNet, surface_net
 from rodshell.progress import Progress, silent
@@ -65,7 +66,7 @@ def lay(
     mesh, positions = _meshed(net)
     flat = flat_state(mesh, positions, rod, progress=progress)
     mesh = replace(mesh, flat=np.column_stack([flat.positions, np.zeros(mesh.node_count)]))
-    angle, place = net.smallest_angle
+    angle, place = smallest_joint_angle(mesh, positions, np.ones(mesh.node_count, dtype=bool))
     value, gradient = target.level(positions)
     figures = DrapeFigures(
         max_gap=float(np.abs(value / np.linalg.norm(gradient, axis=1)).max()),
@@ -92,19 +93,27 @@ def _built(rods: tuple[FlatRod, ...], lattice: Geodesic | Asymptotic) -> tuple[F
 
 
 def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
-    """The mesh of the rods of a net, side by side in the flat state, and its nodes (n, 3) on the target [m]."""
-    curves, lattice = net.curves, net.lattice
-    ends = curves.ends - curves.ends[:, :1]
-    rods, number = list[FlatRod](), dict[int, int]()
-    for (_, length), family in zip(ends.tolist(), net.family.tolist(), strict=True):
-        number[family] = number.get(family, 0) + 1
-        name, row = f"{LETTERS[family]}{number[family]:02d}", lattice.least_spacing * len(rods)
-        rods.append(FlatRod(name, "free", 0.0, 0.0, length, (0.0, row), (1.0, 0.0)))
-    joined, passed = (Crossings(c.rods, c.at - curves.ends[c.rods, 0]) for c in (net.crossings, net.beyond))
-    mesh = mesh_grid(FlatGrid(tuple(rods), joined, passed), lattice.longest_edge)
-    positions = np.empty((mesh.node_count, 3))
-    positions[mesh.rod_nodes] = curves.at(mesh.rod_of, curves.ends[mesh.rod_of, 0] + mesh.stations)[0]
-    return mesh, positions
+    """The mesh of the rods of a net, side by side in the flat state, and its nodes (n, 3) on the target [m].
+
+    Curves are meshed past the ends of the target, and across its openings, and cut there.
+    """
+    curves, lattice, reach = net.curves, net.lattice, net.curves.reach
+    (of, ends), count = curves.pieces, dict[int, int]()
+    lines, rods = list[FlatRod](), list[FlatRod]()
+    for k, (family, (start, stop)) in enumerate(zip(net.family.tolist(), reach.tolist(), strict=True)):
+        count[family] = count.get(family, 0) + 1
+        name = f"{LETTERS[family]}{count[family]:02d}"
+        lines.append(FlatRod(name, "free", 0.0, start, stop, (0.0, lattice.least_spacing * k), (1.0, 0.0)))
+        pieces = ends[of == k].tolist()
+        named = zip(piece_names(name, len(pieces)), pieces, strict=True)
+        rods += [lines[k].cut(*piece)._replace(name=label) for label, piece in named]
+    marks = [ends[of == k].ravel().tolist() for k in range(len(lines))]
+    grid = FlatGrid(tuple(lines), net.crossings, net.crossings.select(np.zeros(len(net.crossings), dtype=bool)))
+    whole = mesh_grid(grid, lattice.longest_edge, marks=marks)
+    mesh, nodes = cut_mesh(whole, rods)
+    positions = np.empty((whole.node_count, 3))
+    positions[whole.rod_nodes] = curves.at(whole.rod_of, whole.stations)[0]
+    return mesh, positions[nodes]
 
 
 def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progress = silent) -> FlatState:

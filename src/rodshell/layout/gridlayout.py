@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields, replace
 from math import degrees, pi
 from numbers import Real
+from string import ascii_lowercase
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -260,6 +261,16 @@ def rod_names(family: Family, count: int) -> list[str]:
     """
     letter, digits = family.upper(), max(2, len(str(count)))
     return [letter + str(k + 1).zfill(digits) for k in range(count)]
+
+
+def piece_names(rod: str, count: int) -> list[str]:
+    """Names of the pieces of a rod: U07, or U07a, U07b, ... if there are several.
+
+    Parameters
+    ----------
+    rod : name of the whole rod.
+    """
+    return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
 
 
 Layout = GridLayout | Geodesic | Asymptotic

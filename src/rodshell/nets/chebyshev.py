@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import cos, degrees, pi, sin
-from string import ascii_lowercase
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from rodshell.geometry.curves import nearest_four
 from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.flatgrid import Family
-from rodshell.layout.gridlayout import rod_names
+from rodshell.layout.gridlayout import piece_names, rod_names
 from rodshell.nets.compass import ON_SURFACE, Axes, axes
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
@@ -383,25 +382,15 @@ def _name_rods(
                 dropped.append((name, "it never touches the target"))
                 continue
             parts = pieces.pop(offset)
-            names = _piece_names(name, len(parts))
+            names = piece_names(name, len(parts))
             for label, (start, end) in zip(names, parts, strict=True):
                 rods.append(make(label, offset, start, end, virtual=label in layout.left_out))
             if len(parts) > 1:
                 broken[name] = tuple(names)
         for offset, parts in pieces.items():
-            labels = _piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
+            labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
             rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
     return tuple(rods), dropped, broken
-
-
-def _piece_names(rod: str, count: int) -> list[str]:
-    """Names of the pieces of a rod: U07, or U07a, U07b, ... if there are several.
-
-    Parameters
-    ----------
-    rod : name of the whole rod.
-    """
-    return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
 
 
 def _require_names(layout: GridLayout, names: list[str]) -> None:

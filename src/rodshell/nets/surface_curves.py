@@ -24,6 +24,8 @@ STEP = 0.02  # of the size, between knots
 ACCURACY = 1e-11  # of one step, relative to the size
 LONGEST = 20.0  # sizes that a curve may go without reaching the end
 NEWTON_STEPS = 30
+BISECTIONS = 50
+FINER = 4  # places of a step at which openings are looked for
 MET = 1e-4  # steps between curves at a crossing: between their knots both leave the surface by less
 
 Law = Callable[[Target, Floats, Floats], tuple[Floats, Floats]]
@@ -72,7 +74,6 @@ class SurfaceCurves:
     begin : (m + 1,) where the knots of each curve begin.
     before : (m,) knots of each curve before its seed.
     points, tangents : (k, 3) of the knots, the tangents of length 1.
-    ends : (m, 2) s at which the target begins and ends on each curve [m].
     """
 
     target: Target
@@ -81,10 +82,9 @@ class SurfaceCurves:
     before: Ints
     points: Floats
     tangents: Floats
-    ends: Floats
 
     def __len__(self) -> int:
-        return len(self.ends)
+        return len(self.before)
 
     def __repr__(self) -> str:
         return f"SurfaceCurves({len(self)} on {self.target})"
@@ -124,8 +124,40 @@ class SurfaceCurves:
             result[k] -= inward * (6 * t[k] + 8 * t[near] + t[far]) / h
         return result
 
+    @property
+    def reach(self) -> Floats:
+        """(m, 2) arc lengths of the first and the last knot of each curve, which lie past the target's end [m]."""
+        first = -self.before
+        return self.step * np.column_stack([first, first + np.diff(self.begin) - 1])
+
+    @cached_property
+    def pieces(self) -> tuple[Ints, Floats]:
+        """Of each piece of a curve between ends of the target and of its openings, in their order: the curve (r,), and
+        the arc lengths (r, 2) at which it begins and ends [m]."""
+        reach = self.reach
+        counts = FINER * (np.diff(self.begin) - 1) + 1
+        curve = np.repeat(np.arange(len(self)), counts)
+        place = np.arange(len(curve)) - (np.cumsum(counts) - counts)[curve]
+        s = reach[curve, 0] + self.step / FINER * place
+        inside = self.target.margin(self.at(curve, s)[0]) > 0.0
+        change = np.flatnonzero((inside[1:] != inside[:-1]) & (curve[1:] == curve[:-1]))
+        of, leaves = curve[change], inside[change]
+        near, far = np.where(leaves, s[change], s[change + 1]), np.where(leaves, s[change + 1], s[change])
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (near + far)
+            within = self.target.margin(self.at(of, middle)[0]) > 0.0
+            near, far = np.where(within, middle, near), np.where(within, far, middle)
+        return of[::2], near.reshape(-1, 2)
+
+    @cached_property
+    def ends(self) -> Floats:
+        """(m, 2) arc lengths at which the target begins and ends on each curve [m]."""
+        of, ends = self.pieces
+        each = np.arange(len(self))
+        return np.column_stack([ends[np.searchsorted(of, each), 0], ends[np.searchsorted(of, each, "right") - 1, 1]])
+
     def crossings(self, family: Ints) -> Crossings:
-        """Where curves of different families cross, between their ends and up to a step beyond.
+        """Where curves of different families cross, up to their last knots.
 
         Parameters
         ----------
@@ -147,8 +179,7 @@ class SurfaceCurves:
             change = np.column_stack([by_a - mixed * by_b, mixed * by_a - by_b]) / sine[:, None]
             at = at + np.clip(change, -self.step, self.step)
         (p, _), (q, _) = self.at(a, at[:, 0]), self.at(b, at[:, 1])
-        low = -self.step * self.before
-        high = low + self.step * (np.diff(self.begin) - 1)
+        low, high = self.reach.T
         met = np.linalg.norm(p - q, axis=1) < MET * self.step
         for side, each in enumerate((a, b)):
             met &= (at[:, side] >= low[each]) & (at[:, side] <= high[each])
@@ -198,7 +229,7 @@ def trace(target: Target, law: Law, seeds: Floats, tangents: Floats) -> SurfaceC
         margin = target.margin(x)
         if not np.isfinite(x).all() or not np.isfinite(margin).all():
             raise NetLimitError("a curve cannot be continued to the end of the target")
-        left = margin > 0.0
+        left = target.covers(x)  # also across an opening
         going, x, t = going[left], x[left], t[left]
         if len(going) == 0:
             return _joined(target, step, count, knots)
@@ -223,15 +254,4 @@ def _joined(target: Target, step: float, count: int, knots: list[tuple[Ints, Flo
     order = np.lexsort((place, curve))
     begin = np.searchsorted(curve[order], np.arange(count + 1))
     before = -place[order][begin[:-1]]
-    ends = np.zeros((count, 2))
-    curves = SurfaceCurves(target, step, begin, before, points[order], tangents[order], ends)
-    last = np.diff(begin) - 1 - before
-    each = np.arange(count)
-    for side, (inside, outside) in enumerate([(1 - before, -before), (last - 1, last)]):
-        near, far = step * inside, step * outside.astype(float)
-        for _ in range(50):
-            middle = 0.5 * (near + far)
-            within = target.margin(curves.at(each, middle)[0]) > 0.0
-            near, far = np.where(within, middle, near), np.where(within, far, middle)
-        ends[:, side] = near
-    return curves
+    return SurfaceCurves(target, step, begin, before, points[order], tangents[order])

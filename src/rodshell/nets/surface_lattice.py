@@ -20,17 +20,15 @@ class SurfaceNet:
 
     Parameters
     ----------
-    curves : of the rods, from end to end of the target.
+    curves : of the rods, from past an end of the target to past another.
     family : (m,) of each rod, from 0.
     crossings : of the rods, with the arc lengths of `curves`.
-    beyond : where they would cross if they were longer.
     """
 
     lattice: SurfaceLattice
     curves: SurfaceCurves
     family: Ints
     crossings: Crossings
-    beyond: Crossings
 
     def __repr__(self) -> str:
         return f"SurfaceNet({len(self.curves)} rods, {len(self.crossings)} crossings on {self.curves.target})"
@@ -41,19 +39,9 @@ class SurfaceNet:
         curves = self.curves
         curve = np.repeat(np.arange(len(curves)), np.diff(curves.begin))
         s = curves.step * (np.arange(len(curve)) - (curves.begin[:-1] + curves.before)[curve])
-        built = (curves.ends[curve, 0] <= s) & (s <= curves.ends[curve, 1])
+        built = (curves.ends[curve, 0] <= s) & (s <= curves.ends[curve, 1])  # and across openings
         bends, normal = curves.bends[built], _normal(curves.target, curves.points[built])
         return dot(bends, normal), dot(bends, cross(normal, curves.tangents[built]))
-
-    @property
-    def smallest_angle(self) -> tuple[float, tuple[float, float, float]]:
-        """Between rods at a joint [rad], and x, y, z of that joint [m]."""
-        rods, at = self.crossings.rods, self.crossings.at
-        (points, first), (_, second) = (self.curves.at(rods[:, side], at[:, side]) for side in range(2))
-        cosines = np.abs(dot(first, second))
-        k = int(np.argmax(cosines))
-        x, y, z = points[k].tolist()
-        return float(np.arccos(min(cosines[k], 1.0))), (x, y, z)
 
 
 def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float, float] | None = None) -> SurfaceNet:
@@ -87,10 +75,7 @@ def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float,
         family += [k] * len(s)
     curves = trace(target, law, np.concatenate(points), np.concatenate(tangents))
     families = np.array(family)
-    crossings = curves.crossings(families)
-    first, last = curves.ends[crossings.rods].transpose(2, 0, 1)
-    inside = ((first <= crossings.at) & (crossings.at <= last)).all(axis=1)
-    return SurfaceNet(lattice, curves, families, crossings.select(inside), crossings.select(~inside))
+    return SurfaceNet(lattice, curves, families, curves.crossings(families))
 
 
 def _normal(target: Target, x: Floats) -> Floats:
