@@ -250,20 +250,17 @@ class _Stages:
         shell = shell.with_elements(found.elements)
         if start == "flat":  # the ends have arrived
             found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
-        each = list[PopUp]()
-        for k, grid in enumerate(grids):
-            part = grid.shell(ends)
-            state = alone(shell, found, k, part, grid.problem(part))
-            each.append(PopUp(ends, start, grid.footprint, grid.boundary, *state))
+        parts = [alone(shell, found, k, grid.shell(ends), grid.boundary.points) for k, grid in enumerate(grids)]
+        each = [
+            PopUp(ends, start, grid.footprint, grid.boundary, *part) for grid, part in zip(grids, parts, strict=True)
+        ]
         return PopUp(ends, start, self.footprint, self.boundary, shell, found, tuple(each))
 
-    def _one_by_one(
-        self, grids: Sequence["_Stages"], ends: Ends, start: Start, first: SolveReport | None = None
-    ) -> PopUp:
-        """Each grid popped up alone, after a `first` solve of all that was not stable."""
+    def _one_by_one(self, grids: Sequence["_Stages"], ends: Ends, start: Start, *earlier: SolveReport) -> PopUp:
+        """Each grid popped up alone, after `earlier` solves of all that were not stable."""
         each, shell = tuple(grid.popped(ends, start, None) for grid in grids), self.shell(ends)
         parts = [(grid.shell, grid.equilibrium) for grid in each]
-        found = together(shell, self.problem(shell), parts, *(() if first is None else (first,)))
+        found = together(shell, self.problem(shell), parts, *earlier)
         shell = shell.with_elements(found.elements)
         return PopUp(ends, start, self.footprint, self.boundary, shell, found, each)
 

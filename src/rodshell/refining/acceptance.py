@@ -13,7 +13,8 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
-from rodshell.formfinding.pipeline import Agreement, Stages, joined_again, meshed_again
+from rodshell.formfinding.patches import joined_again
+from rodshell.formfinding.pipeline import Agreement, Stages, meshed_again
 from rodshell.formfinding.popup import Ends
 from rodshell.progress import Progress, silent
 from rodshell.refining.gates import GATES, LARGEST_ERROR, SPAN_ERROR, Gates, gates, span_lengths, worst_with_errors
