@@ -201,9 +201,7 @@ class _Stages:
         shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint, isotropic=self.isotropic)
         if not shell.angles:
             return shell
-        flat, goals, of_ends = mesh.flat[mesh.ends.ravel()], self.boundary.points, np.repeat(mesh.grid_of_rods, 2)
-        grids = [of_ends == k for k in range(len(mesh.grids))]
-        return shell.turned(np.array([PlanarMotion.onto(flat[here], goals[here]).turn for here in grids]))
+        return shell.turned(np.array([motion.turn for motion in _motions(mesh, self.boundary.points)]))
 
     @property
     def length(self) -> float:
@@ -459,18 +457,28 @@ def turned(now: Floats, goal: Floats, t: float) -> Floats:
 
 
 def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
-    """The flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
+    """Each flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
 
     Parameters
     ----------
     points : (2m, 3) where both ends of each rod in turn are to go [m].
-    height : of the grid's plane [m].
+    height : of the plane [m].
 
     Returns
     -------
     (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
     """
-    return PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], points).moved(mesh.flat, height)
+    laid = np.empty_like(mesh.flat)
+    for k, motion in enumerate(_motions(mesh, points)):
+        nodes = mesh.grid_of_nodes == k
+        laid[nodes] = motion.moved(mesh.flat[nodes], height)
+    return laid
+
+
+def _motions(mesh: GridMesh, points: Floats) -> list[PlanarMotion]:
+    """Of each flat grid, so that its rods' ends have the shortest paths to the points (2m, 3) [m]."""
+    flat, of_ends = mesh.flat[mesh.ends.ravel()], np.repeat(mesh.grid_of_rods, 2)
+    return [PlanarMotion.onto(flat[of_ends == k], points[of_ends == k]) for k in range(len(mesh.grids))]
 
 
 def flat_below(mesh: GridMesh, points: Floats) -> Floats:

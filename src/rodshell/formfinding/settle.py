@@ -67,7 +67,7 @@ def settle(
         problem, popped.state, popped.forces, limit_steps=True,
         progress=lambda k, step: progress("settle", f"iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
-    return replace(popped, shell=shell.with_elements(found.elements), equilibrium=found)
+    return replace(popped, shell=shell.with_elements(found.elements), equilibrium=found, alone=())
 
 
 def _is_energy(given: object) -> TypeGuard[Elements]:
