@@ -249,10 +249,9 @@ class _Stages:
         if start == "flat":  # the ends have arrived
             found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
         parts = [alone(shell, found, k, grid.shell(ends), grid.boundary.points) for k, grid in enumerate(grids)]
-        each = [
-            PopUp(ends, start, grid.footprint, grid.boundary, *part) for grid, part in zip(grids, parts, strict=True)
-        ]
-        return PopUp(ends, start, self.footprint, self.boundary, shell, found, tuple(each))
+        pairs = zip(grids, parts, strict=True)
+        each = tuple(PopUp(ends, start, grid.footprint, grid.boundary, *part) for grid, part in pairs)
+        return PopUp(ends, start, self.footprint, self.boundary, shell, found, each)
 
     def _one_by_one(self, grids: Sequence["_Stages"], ends: Ends, start: Start, *earlier: SolveReport) -> PopUp:
         """Each grid popped up alone, after `earlier` solves of all that were not stable."""

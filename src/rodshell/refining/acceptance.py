@@ -130,8 +130,7 @@ def refined(
             progress(stage, f"patch {name}, {detail}", residual)
 
         parts[name] = _of_piece(patch, vary, end, asked, None, of_patch)
-        form = parts[name].after
-        patches[name] = form if parts[name].changed else _alone(patch, end)
+        patches[name] = parts[name].after if parts[name].changed else _alone(patch, end)
     every = list(parts.values())
     changed = any(part.changed for part in every)
     loaded = tuple(Agreement.of_all(gaps) for gaps in zip(*(part.loaded for part in every), strict=True))
