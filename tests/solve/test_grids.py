@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.checks.deployment import deploy_grids
+from rodshell.formfinding.popup import laid_below
 from rodshell.formfinding.trim import Boundary, Footprint
 from rodshell.layout.mesh import side_by_side
 from rodshell.layout.profile import Profile
@@ -86,6 +88,25 @@ def test_grids_that_popped_up_alone_are_in_equilibrium_together(kind: str, monke
     assert again.report.iterations <= 2
     np.testing.assert_allclose(again.state, found.state, rtol=0, atol=1e-9)
     assert again.gradient == pytest.approx(found.equilibrium.gradient, abs=1e-9 * np.abs(found.forces).max())
+
+
+def test_each_flat_grid_is_laid_below_its_ends() -> None:
+    found, height = together("round rods"), -0.01
+    laid = laid_below(found.footprint.mesh, found.boundary.points, height)
+    parts = [laid_below(form.footprint.mesh, form.boundary.points, height) for form in caps("round rods")]
+    np.testing.assert_allclose(laid, np.concatenate(parts), rtol=0, atol=1e-12)
+
+
+def test_grids_that_an_energy_ties_are_no_longer_in_equilibrium_alone() -> None:
+    found = together("round rods")
+    tops = [int(np.argmax(form.popped["pinned"].positions[:, 2])) for form in caps("round rods")]
+    tie = np.array([[tops[0], found.alone[0].footprint.mesh.node_count + tops[1]]])
+    tied = rs.settle(found, rs.LocalEnergy(tie, lambda x: 0.5 * ((x[:, 1] - x[:, 0]) ** 2).sum(axis=1)))
+    assert tied.report.stable
+    assert np.abs(tied.positions - found.positions).max() > 1e-4
+    assert tied.alone == ()
+    way = deploy_grids(tied, stages=1)
+    np.testing.assert_allclose(way.positions[-1], tied.positions, rtol=0, atol=1e-9)
 
 
 def test_a_grid_of_other_sections_may_need_frames_that_the_others_share() -> None:

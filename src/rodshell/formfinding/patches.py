@@ -10,14 +10,17 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.methods import Draped
-from rodshell.formfinding.pipeline import Stages, find_stages, side_by_side_stages, with_pop_ups
+from rodshell.formfinding.pipeline import Stages, compared, find_stages, with_pop_ups
+from rodshell.formfinding.popup import pop_up
 from rodshell.formfinding.seams import FEWEST, Seams, lay_patches, patches_of, transported_heading
 from rodshell.formfinding.search import HEADINGS
-from rodshell.formfinding.trim import Trimmed, trim
+from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridLayout, Layout
 from rodshell.layout.gridlayout import require_chebyshev
+from rodshell.layout.mesh import side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import BOTH, SUPPORTS, Asked, supports_of
@@ -26,6 +29,8 @@ from rodshell.targets.patch import Patch, Seam
 from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import shown
 from rodshell.validation import either
+
+GAP = 2.0  # spacings between the flat grids of neighbouring patches
 
 
 def find_patched_stages(
@@ -162,3 +167,28 @@ def _moved(form: Stages) -> float:
     return float(
         np.linalg.norm(draped.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0)
     )
+
+
+def joined_again(patches: dict[str, Stages], seams: Seams, ends: Ends) -> Stages:
+    """Patches that were popped up with one end condition, each alone, as one form: its shell begins where they are."""
+    joined = side_by_side_stages(patches, seams)
+    there = np.concatenate([patch.popped[ends].positions for patch in patches.values()])
+    start = replace(joined.boundary, draped=there)
+    popped = pop_up(joined.footprint, start, joined.rod, ends=ends, joint=joined.joint)
+    return compared(replace(joined, popped={ends: replace(popped, boundary=joined.boundary)}))
+
+
+def side_by_side_stages(patches: dict[str, Stages], seams: Seams) -> Stages:
+    """Patches as one form, before they are popped up."""
+    first = next(iter(patches.values()))
+    meshes = {name: patch.footprint.mesh for name, patch in patches.items()}
+    gap = GAP * max(max(net.layout.spacing) for net in seams.nets.values())
+    dropped = tuple(
+        (f"{name}-{rod}", why)
+        for name, patch in patches.items()
+        for rod, why in (*seams.nets[name].dropped, *patch.dropped)
+    )
+    return Stages(
+        "", first.rod, first.joint, first.ends, Footprint(side_by_side(meshes, gap)),
+        Boundary.of_grids([patch.boundary for patch in patches.values()]), dropped, patches=patches, seams=seams,
+    )  # fmt: skip

@@ -5,7 +5,7 @@ The last stage is the agreement: how far the popped-up shell is from the target,
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import degrees, pi, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.figures.records import Ends
 from rodshell.formfinding.drape import drape
-from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
+from rodshell.formfinding.finite_sections import flat_warnings
+from rodshell.formfinding.form_warnings import grid_warnings, pop_up_warnings
 from rodshell.formfinding.methods import Bound, Draped, FlatState, Method
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.formfinding.seams import Seams
@@ -32,7 +33,6 @@ from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, GridMesh, Layout, mesh_grid
 from rodshell.layout.flatgrid import TOGETHER
 from rodshell.layout.lattices import EDGES_A_SPAN
-from rodshell.layout.mesh import side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import BOTH, PINNED, Asked, Support, supports_of
@@ -40,12 +40,6 @@ from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.units import length_text, percent_text
 from rodshell.validation import instance
-
-STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
-ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other axis
-LONG_TAIL = 3.0  # spacings past a rod's last joint
-GAP = 2.0  # spacings between the flat grids of neighbouring patches
-ON_THE_END, MOST_OFF = 2e-4, 1e-3  # of the size, and m: a support that is further from the target's end gives a warning
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,12 +258,8 @@ class Stages:
         """Sentences that a user should read before anything else."""
         if self.seams is not None:
             return self._warnings_of_patches(self.seams)
-        if self.lying is None:
-            return _rolled(self.popped)
-        tails = (*_off_the_end(self.lying), *_long_tails(self.lying)) if self.draped.converged else ()
-        flat = flat_warnings(self.lying.positions, self.rod)
-        pieces = _in_pieces(self.lying)
-        return (*flat, *self.draped.warnings, *pieces, *_stretched(self.draped), *tails, *_rolled(self.popped))
+        of_grid = () if self.lying is None else grid_warnings(self.lying, self.rod)
+        return (*of_grid, *pop_up_warnings(self.popped))
 
     def _warnings_of_patches(self, seams: Seams) -> tuple[str, ...]:
         whole = set(seams.target.warnings)  # said once; and a patch may be flat where the shell is not
@@ -350,16 +340,16 @@ def with_pop_ups(stages: Stages, supports: Sequence[Support], earlier: Stages | 
         )  # fmt: skip
         if popped[end].report.status is Status.OUT_OF_TIME:
             break
-    return _compared(replace(stages, popped={end: popped[end] for end in stages.ends if end in popped}), earlier)
+    return compared(replace(stages, popped={end: popped[end] for end in stages.ends if end in popped}), earlier)
 
 
-def _compared(stages: Stages, earlier: Stages | None = None) -> Stages:
+def compared(stages: Stages, earlier: Stages | None = None) -> Stages:
     """Stages with the shells of their patches, and with the gaps of all that converged; those of earlier shells are
     taken over."""
     shells, patches, gaps = stages.popped, dict[str, Stages](), dict[Ends, Agreement]()
     for k, (name, patch) in enumerate(stages.patches.items()):
         of_patch = {end: _of_patch(shell, k, patch) for end, shell in shells.items()}
-        patches[name] = _compared(replace(patch, popped=of_patch))
+        patches[name] = compared(replace(patch, popped=of_patch))
     for end in [end for end, shell in shells.items() if shell.report.converged]:
         if patches:
             gaps[end] = Agreement.of_all([patch.agreement[end] for patch in patches.values()])
@@ -374,31 +364,6 @@ def _of_patch(popped: PopUp, k: int, patch: Stages) -> PopUp:
     """The shell of the k-th patch, of all that were popped up together, on the patch's own mesh."""
     shell = replace(popped.alone[k].shell, mesh=patch.footprint.mesh)
     return replace(popped.alone[k], footprint=patch.footprint, boundary=patch.boundary, shell=shell)
-
-
-def joined_again(patches: dict[str, Stages], seams: Seams, ends: Ends, *, progress: Progress = silent) -> Stages:
-    """Patches that were popped up with one end condition, each alone, as one form: its shell begins where they are."""
-    joined = side_by_side_stages(patches, seams)
-    there = np.concatenate([patch.popped[ends].positions for patch in patches.values()])
-    start = replace(joined.boundary, draped=there)
-    popped = pop_up(joined.footprint, start, joined.rod, ends=ends, joint=joined.joint, progress=progress)
-    return _compared(replace(joined, popped={ends: replace(popped, boundary=joined.boundary)}))
-
-
-def side_by_side_stages(patches: dict[str, Stages], seams: Seams) -> Stages:
-    """Patches as one form, before they are popped up."""
-    first = next(iter(patches.values()))
-    meshes = {name: patch.footprint.mesh for name, patch in patches.items()}
-    gap = GAP * max(max(net.layout.spacing) for net in seams.nets.values())
-    dropped = tuple(
-        (f"{name}-{rod}", why)
-        for name, patch in patches.items()
-        for rod, why in (*seams.nets[name].dropped, *patch.dropped)
-    )
-    return Stages(
-        "", first.rod, first.joint, first.ends, Footprint(side_by_side(meshes, gap)),
-        Boundary.of_grids([patch.boundary for patch in patches.values()]), dropped, patches=patches, seams=seams,
-    )  # fmt: skip
 
 
 def popped_again(
@@ -485,82 +450,3 @@ def pop_up_stages(
     popped = pop_up(footprint, boundary, rod, ends=PINNED, start="flat", joint=joint, progress=progress)
     dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
     return Stages("", rod, joint, (popped.ends,), footprint, boundary, dropped, popped={popped.ends: popped})
-
-
-def _stretched(draped: Draped) -> tuple[str, ...]:
-    """A warning where rods stretch under their weight; in weight over stiffness the section's area cancels out."""
-    strain = draped.report.max_strain
-    if isinstance(draped.method, Bound) or not draped.converged or strain <= STRETCHED:
-        return ()
-    return (
-        f"on the target the rods stretch by {100 * strain:.2g} % under their own weight, so that they are cut too "
-        'short: use a stiffer or lighter material (rod.material; a thicker section does not help), or method "bound"',
-    )
-
-
-def _off_the_end(trimmed: Trimmed) -> tuple[str, ...]:
-    """A warning where supports of the net's rods lie off the target's end: edges are straight, rods are bent."""
-    draped, points = trimmed.draped, trimmed.boundary.points
-    if draped.eccentricity or not isinstance(draped.method, Bound):
-        return ()
-    off = np.abs(draped.target.margin(points))
-    allowed, worst = min(ON_THE_END * draped.target.size, MOST_OFF), int(np.argmax(off > (1 - 1e-6) * off.max()))
-    if off[worst] <= allowed:
-        return ()
-    edge = length_text(0.9 * draped.layout.longest_edge * sqrt(allowed / off[worst]))  # the error is of second order
-    rod, (x, y, z) = trimmed.mesh.grid.rods[worst // 2].name, points[worst]
-    return (
-        f"{np.count_nonzero(off > allowed)} supports are off the end of the target, by up to {length_text(off[worst])} "
-        f"(of rod {rod} at ({x:.4g}, {y:.4g}, {z:.4g}) m), since the mesh's edges are long for its curvature: use a "
-        f"layout.edge of {edge}",
-    )
-
-
-def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
-    """A warning where rods run far past their last joint, since crossings there lie too near to an end."""
-    grid = trimmed.mesh.grid
-    ends = np.array([(rod.start, rod.end) for rod in grid.rods])
-    first, last = ends[:, 1].copy(), ends[:, 0].copy()
-    np.minimum.at(first, grid.crossings.rods, grid.crossings.at)
-    np.maximum.at(last, grid.crossings.rods, grid.crossings.at)
-    tails = np.maximum(first - ends[:, 0], ends[:, 1] - last)
-    spacing = trimmed.draped.layout.most_spacing
-    long, worst = int(np.count_nonzero(tails > LONG_TAIL * spacing)), int(np.argmax(tails))
-    if not long:
-        return ()
-    left = len(grid.meetings()) - len(grid.crossings)
-    others = f" ({long} rods do so by more than {LONG_TAIL:g} spacings)" if long > 1 else ""
-    near = f"no joint is made within {NEAREST_JOINT:g} spacings of a rod's end, here at {left} crossings"
-    why = f": {near}" if left else ""
-    return (
-        f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; another offset or "
-        "anchor of the layout may help, or leave such rods out",
-    )
-
-
-def _in_pieces(trimmed: Trimmed) -> tuple[str, ...]:
-    """A warning where rods that are built do not run from rim to rim."""
-    built, net = {rod.name for rod in trimmed.mesh.grid.rods}, trimmed.draped.net
-    names = [] if net is None else [name for name, pieces in net.pieces.items() if not built.isdisjoint(pieces)]
-    if not names:
-        return ()
-    are = "rods are" if len(names) > 1 else "rod is"
-    return (
-        f"{len(names)} {are} on the target in several pieces, each with its own ends: {', '.join(names)}; where they "
-        "end at an opening, it needs a ring that carries their reactions; where they only cross the edge twice, "
-        "another offset of the layout may help",
-    )
-
-
-def _rolled(popped: dict[Ends, PopUp]) -> tuple[str, ...]:
-    """A warning where laths on edge lie down, as joints do not hold them, and then bend about their weak axes."""
-    for ends, shell in popped.items():
-        angles = section_rotation(shell.shell, shell.state) if shell.report.converged else None
-        if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
-            return (
-                f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "
-                f"{degrees(angles.max()):.0f} ({ends} ends), and bend about their weak axes, since nothing holds them: "
-                'bolted laths keep their orientation, with larger stresses; set joint.kind = "pin", or swap the '
-                "width and the height of the section",
-            )
-    return ()

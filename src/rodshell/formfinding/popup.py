@@ -209,9 +209,7 @@ class _Stages:
         shell = Shell.of(mesh, self.rod, clamped=clamped, joint=self.joint, isotropic=self.isotropic)
         if not shell.angles:
             return shell
-        flat, goals, of_ends = mesh.flat[mesh.ends.ravel()], self.boundary.points, np.repeat(mesh.grid_of_rods, 2)
-        grids = [of_ends == k for k in range(len(mesh.grids))]
-        return shell.turned(np.array([PlanarMotion.onto(flat[here], goals[here]).turn for here in grids]))
+        return shell.turned(np.array([motion.turn for motion in _motions(mesh, self.boundary.points)]))
 
     @property
     def length(self) -> float:
@@ -260,20 +258,16 @@ class _Stages:
             found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
         if found.report.converged:
             shell, found = let_go(shell, found, support, self.boundary.points, self.counting)
-        each = list[PopUp]()
-        for k, grid in enumerate(grids):
-            part = grid.shell(support)
-            state = alone(shell, found, k, part, grid.problem(part))
-            each.append(PopUp(support, start, grid.footprint, grid.boundary, *state))
-        return PopUp(support, start, self.footprint, self.boundary, shell, found, tuple(each))
+        parts = [alone(shell, found, k, grid.shell(support), grid.boundary.points) for k, grid in enumerate(grids)]
+        pairs = zip(grids, parts, strict=True)
+        each = tuple(PopUp(support, start, grid.footprint, grid.boundary, *part) for grid, part in pairs)
+        return PopUp(support, start, self.footprint, self.boundary, shell, found, each)
 
-    def _one_by_one(
-        self, grids: Sequence["_Stages"], support: Support, start: Start, first: SolveReport | None = None
-    ) -> PopUp:
-        """Each grid popped up alone, after a `first` solve of all that was not stable."""
+    def _one_by_one(self, grids: Sequence["_Stages"], support: Support, start: Start, *earlier: SolveReport) -> PopUp:
+        """Each grid popped up alone, after `earlier` solves of all that were not stable."""
         each, shell = tuple(grid.popped(support, start, None) for grid in grids), self.shell(support)
         parts = [(grid.shell, grid.equilibrium) for grid in each]
-        found = together(shell, self.problem(shell), parts, *(() if first is None else (first,)))
+        found = together(shell, self.problem(shell), parts, *earlier)
         shell = shell.with_elements(found.elements)
         return PopUp(support, start, self.footprint, self.boundary, shell, found, each)
 
@@ -466,18 +460,28 @@ def turned(now: Floats, goal: Floats, t: float) -> Floats:
 
 
 def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
-    """The flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
+    """Each flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
 
     Parameters
     ----------
     points : (2m, 3) where both ends of each rod in turn are to go [m].
-    height : of the grid's plane [m].
+    height : of the plane [m].
 
     Returns
     -------
     (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
     """
-    return PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], points).moved(mesh.flat, height)
+    laid = np.empty_like(mesh.flat)
+    for k, motion in enumerate(_motions(mesh, points)):
+        nodes = mesh.grid_of_nodes == k
+        laid[nodes] = motion.moved(mesh.flat[nodes], height)
+    return laid
+
+
+def _motions(mesh: GridMesh, points: Floats) -> list[PlanarMotion]:
+    """Of each flat grid, so that its rods' ends have the shortest paths to the points (2m, 3) [m]."""
+    flat, of_ends = mesh.flat[mesh.ends.ravel()], np.repeat(mesh.grid_of_rods, 2)
+    return [PlanarMotion.onto(flat[of_ends == k], points[of_ends == k]) for k in range(len(mesh.grids))]
 
 
 def flat_below(mesh: GridMesh, points: Floats) -> Floats:

@@ -47,4 +47,4 @@ def settle(
         popped.equilibrium,
         lambda k, step: progress("settle", f"iteration {k} of at most {MOST_ITERATIONS}", step),
     )
-    return replace(popped, shell=shell, equilibrium=found)
+    return replace(popped, shell=shell, equilibrium=found, alone=())

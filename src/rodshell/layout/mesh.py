@@ -582,13 +582,8 @@ def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
     along = np.array([_along(rod, shift) for rod in mesh.grid.rods])
     rods = tuple(_moved_rod(name, rod, shift) for rod in mesh.grid.rods)
     crossings = Crossings(mesh.grid.crossings.rods, mesh.grid.crossings.at + along[mesh.grid.crossings.rods])
-    lengths = np.diff(np.append(mesh.rod_start, len(mesh.rod_nodes)))
-    return replace(
-        mesh,
-        grid=FlatGrid(rods, crossings, mesh.grid.passed),
-        flat=mesh.flat + np.append(shift, 0.0),
-        stations=mesh.stations + np.repeat(along, lengths),
-    )
+    flat, stations = mesh.flat + np.append(shift, 0.0), mesh.stations + along[mesh.rod_of]
+    return replace(mesh, grid=FlatGrid(rods, crossings, mesh.grid.passed), flat=flat, stations=stations)
 
 
 def _along(rod: FlatRod, shift: Floats) -> float:

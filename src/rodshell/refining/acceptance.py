@@ -14,7 +14,8 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.figures.records import Ends
-from rodshell.formfinding.pipeline import Agreement, Stages, joined_again, meshed_again
+from rodshell.formfinding.patches import joined_again
+from rodshell.formfinding.pipeline import Agreement, Stages, meshed_again
 from rodshell.progress import Progress, silent
 from rodshell.refining.gates import GATES, LARGEST_ERROR, SPAN_ERROR, Gates, gates, span_lengths, worst_with_errors
 from rodshell.refining.gauss_newton import Step
@@ -129,8 +130,7 @@ def refined(
             progress(stage, f"patch {name}, {detail}", residual)
 
         parts[name] = _of_piece(patch, vary, end, asked, None, of_patch)
-        form = parts[name].after
-        patches[name] = form if parts[name].changed else _alone(patch, end)
+        patches[name] = parts[name].after if parts[name].changed else _alone(patch, end)
     every = list(parts.values())
     changed = any(part.changed for part in every)
     loaded = tuple(Agreement.of_all(gaps) for gaps in zip(*(part.loaded for part in every), strict=True))

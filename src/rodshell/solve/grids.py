@@ -53,21 +53,23 @@ def side_by_side(shell: Shell, parts: Sequence[tuple[Shell, Floats]]) -> tuple[S
     return shell.with_elements(tuple(elements)), state
 
 
-def alone(whole: Shell, found: Equilibrium, k: int, shell: Shell, problem: Problem) -> tuple[Shell, Equilibrium]:
+def alone(whole: Shell, found: Equilibrium, k: int, shell: Shell, points: Floats) -> tuple[Shell, Equilibrium]:
     """The shell of one grid, in the equilibrium that was found for all.
 
     Parameters
     ----------
     whole, found : of all grids.
     k : which of them.
-    shell, problem : of this grid, in its flat state.
+    shell : of this grid, in its flat state.
+    points : (2m, 3) the ends of its rods [m].
     """
     here, sets = whole.grid_of == k, found.elements
     elements = tuple(
         with_frames(element, sets[row], _rows_of(sets[row], whole, k))
         for element, row in zip(shell.elements, _sets_of(whole, k), strict=True)
     )
-    problem, state, gradient = replace(problem, elements=elements), found.state[here], found.gradient[here]
+    shell, state, gradient = shell.with_elements(elements), found.state[here], found.gradient[here]
+    problem = Problem.of_shell(shell, points)
     residual = problem.constraint.freedom(state).reduce(gradient)
     report = replace(
         found.report,
@@ -77,7 +79,7 @@ def alone(whole: Shell, found: Equilibrium, k: int, shell: Shell, problem: Probl
     )
     mode = None if found.mode is None else found.mode[here]
     forces = found.forces[_of_edges(whole) == k]
-    return shell.with_elements(elements), Equilibrium(problem, state, forces, gradient, report, mode)
+    return shell, Equilibrium(problem, state, forces, gradient, report, mode)
 
 
 def _of_edges(shell: Shell) -> Ints:
