@@ -204,7 +204,7 @@ class Form:
         strength = limits.erection or self.options.judged_by(self.rod).strength
         limit = strength / material.youngs_modulus if strength and material else THIN
         return FlatState(
-            lies_flat=found.report.stable and found.strain <= limit, in_plane_strain=found.strain, limit=limit,
+            lies_flat=found.report.stable and (found.strain or 0.0) <= limit, in_plane_strain=found.strain, limit=limit,
             negative_modes=found.report.negative_modes,
         )  # fmt: skip
 

@@ -174,13 +174,13 @@ class FlatState:
 
     Parameters
     ----------
-    positions : (n, 2) of the mesh's nodes [m].
-    strain : the largest of a rod's fibres that bend in the plane [-].
+    positions : (n, 2) of the mesh's nodes [m]; where no such state was found, their plan.
+    strain : the largest of a rod's fibres that bend in the plane [-], or None.
     report : of the solve; without negative modes that state is stable.
     """
 
     positions: Floats
-    strain: float
+    strain: float | None
     report: SolveReport
 
 

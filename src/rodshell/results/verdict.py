@@ -425,9 +425,9 @@ def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
 def _flat(results: Results) -> Iterator[Said]:
     """Whether rods along curves of the target can be laid out flat, which decides how the shell is erected."""
     if flat := results.flat_state:
-        strain, limit = flat.in_plane_strain or 0.0, flat.limit or 0.0
-        sentence = "lies_flat" if flat.lies_flat else "in_place" if strain > limit else "in_place: unstable"
-        yield said(sentence, None, strain, limit, bent=percent(strain), withstood=percent(limit))
+        strain, limit = flat.in_plane_strain, flat.limit or 0.0
+        sentence = "lies_flat" if flat.lies_flat else "in_place" if (strain or 0.0) > limit else "in_place: unstable"
+        yield said(sentence, None, strain, limit, bent=percent(strain or 0.0), withstood=percent(limit))
 
 
 def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
