@@ -29,6 +29,7 @@ MOST = 10**12  # of a count
 LARGEST = 1e18  # of the numbers in an array, whatever their unit: see `units.RANGES`
 _Choice = TypeVar("_Choice", bound=str)
 _Scalar = TypeVar("_Scalar", bound="np.generic")
+NAME = "[a-z0-9]{1,40}"  # of a support: it stands in names of states and files
 
 
 def instance(name: str, value: object, kind: type | UnionType, wanted: str = "") -> None:

@@ -303,7 +303,7 @@ def crease_rows(names: Sequence[str] = tuple(CREASED)) -> Iterator[Row]:
         off = np.hypot(off_crease(name, points), points[:, 2] - CREASED[name](*points[:, :2].T))
         note = f"{len(points)} meetings, {len(form.patches)} patches"
         yield Row(f"{name}, creased", "rod ends off the crease", float(off.max()) / size, ALLOWED, "of the size", note)
-        apart = np.abs(form.draped[:, 2] - CREASED[name](*form.draped[:, :2].T))
+        apart = np.abs(form.on_target[:, 2] - CREASED[name](*form.on_target[:, :2].T))
         yield Row(f"{name}, creased", "patches off their surfaces", float(apart.max()) / size, 5e-4, "of the size")
 
 

@@ -62,7 +62,15 @@ JOBS: dict[str, tuple[str, ...]] = {
 STAGES = ("--checks.stages", "2")
 SYMMETRIC = JOBS.keys() - {"freeform", "oculus"}  # whose shells have mirror images
 
-CHANGED_ON_PURPOSE: dict[str, str] = {}
+_NEW, _AS_ONE = "a new key", "all patches are one shell, carry their weight on one path, and are searched together"
+CHANGED_ON_PURPOSE: dict[str, str] = {
+    "*.flat_state": _NEW,
+    "*.layout.kind": _NEW,
+    "patches": "all patches are popped up as one shell",
+    "patches.other_shapes.*": _AS_ONE,
+    "patches.self_weight.*": _AS_ONE,
+    "patches.verdict.findings*.figure": _AS_ONE,
+}
 """What differs from the archives on purpose, and why.
 
 Keys are "JOB.path.of.a.field", in which * stands for anything, such as "*.joint_loads.*.moment" (arrays are

@@ -9,7 +9,7 @@ import rodshell as rs
 from rodshell.checks import check, contact_of
 from rodshell.checks.contact import (
     APART,
-    _crossing_lines,
+    FLATTEST,
     _Edges,
     _Outline,
     contact,
@@ -231,7 +231,7 @@ def test_the_work_grows_with_the_rods_not_with_their_square() -> None:
         rods += [FlatRod.v(f"V{k}", x, 0.0, 0.1 * size) for k, x in enumerate(offsets)]
         mesh = mesh_grid(FlatGrid.of(rods), 0.02)
         outline = _Outline(0.024, 0.024, False)
-        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], outline, None, _crossing_lines(rods, outline))
+        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], outline, None, mesh.grid.meetings(4 * outline.reach / FLATTEST))
         counts.append(len(edges.candidates()[0]) / len(mesh.edges))
     assert counts[2] < 1.2 * counts[1] < 1.5 * counts[0]
 
@@ -338,7 +338,7 @@ def test_fine_meshes_of_thick_rods_find_what_coarse_ones_do() -> None:
         places = np.column_stack([0.4 * np.sin(t), 0 * t, 0.4 * np.cos(t)])
         places[mesh.rod_slice(1), 1] = 0.05 + 0.1 * (t[mesh.rod_slice(1)] - 0.6) ** 2
         found.append(contact(mesh, places, round_rod(0.02)))
-        sizes.append(len(_Edges(mesh, places, outline, None, _crossing_lines(mesh.grid.rods, outline)).rods))
+        sizes.append(len(_Edges(mesh, places, outline, None, mesh.grid.meetings(4 * outline.reach / FLATTEST)).rods))
     assert sizes[1] < 3 * sizes[0]
     assert found[0].clearance == pytest.approx(0.01, abs=2e-4)
     assert found[1].clearance == pytest.approx(0.01, abs=2e-4)

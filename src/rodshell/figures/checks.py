@@ -7,7 +7,6 @@ from pydantic import Field
 
 from rodshell.figures.form import Bent
 from rodshell.figures.records import (
-    NAME,
     Flag,
     Number,
     Point,
@@ -24,6 +23,7 @@ from rodshell.figures.records import (
     points,
     rows,
 )
+from rodshell.validation import NAME
 
 OTHER_SHAPES = ("pop_up", "deployment")  # with figures in addition to those on supports
 

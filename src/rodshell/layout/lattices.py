@@ -99,7 +99,7 @@ class SurfaceLattice(ABC):
     def parameters(self) -> dict[str, object]:
         """The lattice in SI."""
         known: dict[str, object] = {"kind": self.kind, "families": self.family_count, "rotate": self.rotate}
-        return known | {"spacing": self.spacings, "edge": self.longest_edge}
+        return known | {"spacing": self.spacings[:2], "edge": self.longest_edge}
 
     def build(self, target: Sized | None = None) -> Self:
         """The lattice with the spacing for a target."""

@@ -16,10 +16,11 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError, OutputError
-from rodshell.figures.records import FARTHEST, LARGEST, NAME, far_apart
+from rodshell.figures.records import FARTHEST, LARGEST, far_apart
 from rodshell.results.results import Results
 from rodshell.rods.supports import SUPPORTS
 from rodshell.untrusted import limit, raised, read_bytes
+from rodshell.validation import NAME
 
 States = Mapping[str, NDArray[Any]]
 

@@ -179,7 +179,10 @@ def _net_and_drape(results: Results, length: Length) -> Iterator[str]:
     if net := results.net:
         angle = "not known" if net.min_angle_deg is None else f"{net.min_angle_deg:.1f} deg"
         yield f"  footprint error {length(net.error_estimate)} before extrapolation; smallest angle {angle}"
-    if drape := results.drape:
+    drape, layout = results.drape, results.layout
+    if drape and layout and layout.families:
+        yield f"  drape     along {layout.kind} curves, {layout.families} families; gap {length(drape.max_gap)}"
+    elif drape:
         work = sum(level.factorizations or 0 for level in drape.levels)
         gap = "gap" if drape.method == "bound" else "deepest node inside by"
         edges = f", edges of {length(results.layout.edge)}" if drape.fall and results.layout else ""

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.figures.records import NAME
 from rodshell.units import shown
-from rodshell.validation import choice, described, flag
+from rodshell.validation import NAME, choice, described, flag
 
 if TYPE_CHECKING:
     from rodshell.rods.elements import Elements
