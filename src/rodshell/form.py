@@ -62,16 +62,15 @@ if TYPE_CHECKING:
 class Form:
     """What `Job.run` and `find_form` return. Two forms are equal that have the same case and the same shapes.
 
-    Parameters
-    ----------
-    case : everything that decided it, in SI, with what was left open ("auto") as it was decided.
-    asked : the same as it was asked for.
-    stages : what form finding returned, of the whole or of its patches; where it was refined, the refined ones.
-    options : of checks, fabrication and drawings.
-    inputs : contents of the files that the case names, by their path in it.
-    search : the search for anchor and heading, where the case asked for one.
-    refined : the form before and after its refinement, where the case asked for one.
-    reused : the stages that were taken over from an earlier form, see `Job.run`.
+    Args:
+        case: everything that decided it, in SI, with what was left open ("auto") as it was decided.
+        asked: the same as it was asked for.
+        stages: what form finding returned, of the whole or of its patches; where it was refined, the refined ones.
+        options: of checks, fabrication and drawings.
+        inputs: contents of the files that the case names, by their path in it.
+        search: the search for anchor and heading, where the case asked for one.
+        refined: the form before and after its refinement, where the case asked for one.
+        reused: the stages that were taken over from an earlier form, see `Job.run`.
     """
 
     case: Case
@@ -97,9 +96,8 @@ class Form:
     def target(self) -> Target:
         """The shape wanted.
 
-        Raises
-        ------
-        InputError : the form comes from a table of rods; so for `layout`.
+        Raises:
+            InputError: the form comes from a table of rods; so for `layout`.
         """
         return self.stages.target
 
@@ -147,9 +145,8 @@ class Form:
     def draped(self) -> Draped:
         """The grid on its target, of a form in one piece; of several patches see `patches`.
 
-        Raises
-        ------
-        InputError : the form has several patches, or comes from a table of rods; so for `trimmed`.
+        Raises:
+            InputError: the form has several patches, or comes from a table of rods; so for `trimmed`.
         """
         return self.stages.draped
 
@@ -323,17 +320,15 @@ class Form:
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
 
-        Parameters
-        ----------
-        options : as of `archive`.
-        kinds : of files in addition to the archive, such as ["dxf", "csv"] or "dxf, csv"; default: all that every
-            installation can.
-        force : also replace files that rodshell did not write, or that were changed since, where it has to write.
+        Args:
+            options: as of `archive`.
+            kinds: of files in addition to the archive, such as ["dxf", "csv"] or "dxf, csv"; default: all that every
+                installation can.
+            force: also replace files that rodshell did not write, or that were changed since, where it has to write.
 
-        Raises
-        ------
-        InputError : an unknown kind. OutputError : the folder cannot be written, or such files are there and `force` is
-            False.
+        Raises:
+            InputError: an unknown kind. OutputError : the folder cannot be written, or such files are there and `force`
+                is False.
         """
         wanted = wanted_kinds(kinds)  # before the checks, which take time
         return save(self.archive(options=options), folder, wanted, force=force)
@@ -341,9 +336,8 @@ class Form:
     def widget(self) -> "AnyWidget":
         """The 3D viewer for a notebook, whose `picked` is the id of the rod or joint that was clicked last.
 
-        Raises
-        ------
-        InputError : anywidget is not installed, or there is no shape in space.
+        Raises:
+            InputError: anywidget is not installed, or there is no shape in space.
         """
         scene = scene_of(self._archive)
         if scene is None:
@@ -421,14 +415,12 @@ class Form:
 def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "LoadChecks":
     """Check a form under loads: deflections, reactions, stability and utilisation under each of their combinations.
 
-    Parameters
-    ----------
-    form : whose shells are loaded, with each end condition that converged.
-    progress : called with stage and figures.
+    Args:
+        form: whose shells are loaded, with each end condition that converged.
+        progress: called with stage and figures.
 
-    Raises
-    ------
-    InputError : a load does not fit the form; the form comes from a table of rods.
+    Raises:
+        InputError: a load does not fit the form; the form comes from a table of rods.
     """
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")

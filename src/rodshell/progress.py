@@ -76,9 +76,8 @@ class TimeLimit:
 def limited(progress: Progress, seconds: float | None) -> Progress:
     """`progress` with a time limit of `seconds` [s] from now; None: no limit.
 
-    Raises
-    ------
-    InputError : it cannot be called.
+    Raises:
+        InputError: it cannot be called.
     """
     require_progress(progress)
     return progress if seconds is None else TimeLimit(progress, seconds)

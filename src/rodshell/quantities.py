@@ -27,12 +27,12 @@ MOST_STAGES = 1000  # of a deployment
 class Value:
     """How a value is given.
 
-    Parameters
-    ----------
-    read : from a case file or an option, to SI. A ValueError says what is wrong, without the key.
-    check : as read(name, value) of what Python gives; None: it is checked elsewhere.
-    words : that it may also be.
-    role : "name": it is text that is not empty; "file": the path of a file to be read; "folder": of one to be written.
+    Args:
+        read: from a case file or an option, to SI. A ValueError says what is wrong, without the key.
+        check: as read(name, value) of what Python gives; None: it is checked elsewhere.
+        words: that it may also be.
+        role: "name": it is text that is not empty; "file": the path of a file to be read; "folder": of one to be
+            written.
     """
 
     read: _Reader
@@ -44,10 +44,9 @@ class Value:
 def quantity(kind: Kind, sign: _Sign = number, unit: str | None = None) -> Value:
     """A number with a unit.
 
-    Parameters
-    ----------
-    sign : `number`, `positive` or `not_negative` of `validation`.
-    unit : in messages of Python; None: the SI unit of the kind.
+    Args:
+        sign: `number`, `positive` or `not_negative` of `validation`.
+        unit: in messages of Python; None: the SI unit of the kind.
     """
     si = si_unit(kind) if unit is None else unit
 
@@ -75,9 +74,8 @@ def _or_auto(value: Value) -> Value:
 def pair(value: Value, words: str, *, one_for_both: bool = False) -> Value:
     """[a, b] or "a, b"; a single value may stand for both.
 
-    Parameters
-    ----------
-    words : what Python has to give.
+    Args:
+        words: what Python has to give.
     """
 
     def read(given: object) -> tuple[float, float]:

@@ -61,9 +61,8 @@ class Run:
     """One run of a case; parameters as of `Job.run`, with the target where it was built before, and what its files held
     then.
 
-    Parameters
-    ----------
-    pops_up : False ends it with the drape, trimmed and mapped back.
+    Args:
+        pops_up: False ends it with the drape, trimmed and mapped back.
     """
 
     def __init__(
@@ -133,10 +132,9 @@ class Run:
     def _sized(self, rod: Rod, estimate: "Fit", stages_of: Callable[[Rod], Stages]) -> "tuple[Rod, Fit, Stages]":
         """The rod whose section is chosen by the bends of shells popped up with it; what it fits; those shells.
 
-        Parameters
-        ----------
-        rod : provisional, of which the first shell is made.
-        stages_of : the shells of a rod.
+        Args:
+            rod: provisional, of which the first shell is made.
+            stages_of: the shells of a rod.
         """
         fit, weight, before = estimate, self.options.judged_by(rod).shear_weight, self._sized_before()
         rod = before or rod

@@ -87,13 +87,12 @@ class Place:
 class Field:
     """A key of a table.
 
-    Parameters
-    ----------
-    value : how it is read; None: as text, one of `choices`, or tables.
-    tables : the classes that it may become, by their kinds.
-    choices : the words that it may be.
-    any_value : whether it may be something else than these words.
-    optional : whether it may be None: left out, or a table without keys.
+    Args:
+        value: how it is read; None: as text, one of `choices`, or tables.
+        tables: the classes that it may become, by their kinds.
+        choices: the words that it may be.
+        any_value: whether it may be something else than these words.
+        optional: whether it may be None: left out, or a table without keys.
     """
 
     name: str
@@ -187,13 +186,11 @@ def _field(name: str, hint: Any, default: Any) -> Field | None:
 def checked(record: Any, what: str | Mapping[str, str] = "{}") -> None:
     """Check the fields of a frozen dataclass in its `__post_init__`, and keep them as they are read from a file.
 
-    Parameters
-    ----------
-    what : what messages call a field, with {} for its name; or that by name.
+    Args:
+        what: what messages call a field, with {} for its name; or that by name.
 
-    Raises
-    ------
-    InputError : a value cannot be used.
+    Raises:
+        InputError: a value cannot be used.
     """
     for field in fields_of(type(record)):
         value = getattr(record, field.attribute)
@@ -217,16 +214,14 @@ def read(
 ) -> T:
     """An object of the keys in a table.
 
-    Parameters
-    ----------
-    given : what a file, options or Python says, by key.
-    unknown : the sentence on an unknown key of a table; default: it names the keys that the table has.
-    files : gives the path for the value of each key that names a file, or raises InputError; None: as it is. With it no
-        folder may be written.
+    Args:
+        given: what a file, options or Python says, by key.
+        unknown: the sentence on an unknown key of a table; default: it names the keys that the table has.
+        files: gives the path for the value of each key that names a file, or raises InputError; None: as it is. With it
+            no folder may be written.
 
-    Raises
-    ------
-    InputError : a key is unknown or missing, or a value cannot be used; in one sentence. A misspelt key goes first.
+    Raises:
+        InputError: a key is unknown or missing, or a value cannot be used; in one sentence. A misspelt key goes first.
     """
     _require_known(table, given, place, unknown or unknown_key)
     return _read(table, given, place, files)
@@ -253,9 +248,8 @@ def _require_known(table: type, given: Any, place: Place, unknown: Callable[...,
 def keys_in(table: type, given: Table = _EMPTY) -> Iterator[tuple[Field | None, str]]:
     """The keys that a table has; no field for `kind`.
 
-    Parameters
-    ----------
-    given : the table, where the keys of another stand in it whose kind it says.
+    Args:
+        given: the table, where the keys of another stand in it whose kind it says.
     """
     if kind_of(table):
         yield None, "kind"
@@ -364,9 +358,8 @@ def read_value(hint: Any, given: object) -> Any:
 def written(record: Any, *, changed: bool = False) -> dict[str, Any]:
     """The keys of an object in SI, as they stand in a case file, without the empty ones.
 
-    Parameters
-    ----------
-    changed : whether what is at its default is left out, except the kinds of tables.
+    Args:
+        changed: whether what is at its default is left out, except the kinds of tables.
     """
     keys: dict[str, Any] = {"kind": kind_of(record)} if kind_of(record) else {}
     for field in fields_of(type(record)):

@@ -17,14 +17,12 @@ def threads() -> int:
 def in_threads(work: Callable[[int, int], object], count: int, *, most: int | None = None) -> None:
     """Do `count` pieces of work, each in whichever thread is free.
 
-    Parameters
-    ----------
-    work : called with the number of a piece and that of the thread, from 0.
-    most : number of threads; by default `threads()`.
+    Args:
+        work: called with the number of a piece and that of the thread, from 0.
+        most: number of threads; by default `threads()`.
 
-    Raises
-    ------
-    BaseException : what a piece of work raised; of several one.
+    Raises:
+        BaseException: what a piece of work raised; of several one.
     """
     wanted = 1 if count <= 1 else min(threads() if most is None else most, count)
     if wanted == 1:

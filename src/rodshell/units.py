@@ -163,15 +163,13 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\
 def parse_quantity(value: object, kind: Kind, key: str) -> float:
     """Convert a quantity to SI.
 
-    Parameters
-    ----------
-    value : number in SI, or text such as "30 mm", "1 g/cm3", "1.5e-3" (SI without a unit).
-    kind : the expected kind of quantity.
-    key : the user's name for the value, for the error message.
+    Args:
+        value: number in SI, or text such as "30 mm", "1 g/cm3", "1.5e-3" (SI without a unit).
+        kind: the expected kind of quantity.
+        key: the user's name for the value, for the error message.
 
-    Raises
-    ------
-    InputError : not a number, not finite, an unknown unit or a unit of another kind.
+    Raises:
+        InputError: not a number, not finite, an unknown unit or a unit of another kind.
     """
     try:
         return read_quantity(value, kind)
@@ -210,9 +208,8 @@ def read_quantity(value: object, kind: Kind, *, size: bool = False) -> float:
 def out_of_range(number: float, unit: str, *, size: bool = False) -> str:
     """What a number in an SI unit may be, where it is something else (see `RANGES`): "at most 1e+06 m"; else "".
 
-    Parameters
-    ----------
-    size : whether it must be positive, so that it may also be too small.
+    Args:
+        size: whether it must be positive, so that it may also be too small.
     """
     least, most = RANGES.get(unit.replace(" ", ""), RANGES[""])
     low = least if size else -most
@@ -248,9 +245,8 @@ def _matched(value: object) -> re.Match[str] | None:
 def read_unit(text: str, kind: Kind) -> Decimal:
     """The SI value of one unit of this kind.
 
-    Raises
-    ------
-    ValueError : an unknown unit, or a unit of another kind.
+    Raises:
+        ValueError: an unknown unit, or a unit of another kind.
     """
     unit = re.sub(r"\s|\^|\*\*", "", text).replace("²", "2").replace("³", "3")
     units = _KINDS[kind]

@@ -35,10 +35,9 @@ NAME = "[a-z0-9]{1,40}"  # of a support: it stands in names of states and files
 def instance(name: str, value: object, kind: type | UnionType, wanted: str = "") -> None:
     """Refuse a `value` that is not of a `kind`.
 
-    Parameters
-    ----------
-    kind : class or union of classes.
-    wanted : what the value must be, in words; default "a rodshell KIND".
+    Args:
+        kind: class or union of classes.
+        wanted: what the value must be, in words; default "a rodshell KIND".
     """
     if not isinstance(value, kind):
         kinds = [each.__name__ for each in (get_args(kind) or (kind,))]
@@ -70,10 +69,9 @@ def either(words: Sequence[str]) -> str:
 def choices_of(name: str, value: Any, choices: Sequence[_Choice]) -> tuple[_Choice, ...]:
     """Return `value` as a tuple of different words out of `choices`.
 
-    Parameters
-    ----------
-    value : one word, or a sequence of words, which may be empty.
-    choices : the words that are allowed.
+    Args:
+        value: one word, or a sequence of words, which may be empty.
+        choices: the words that are allowed.
     """
     words = [value] if isinstance(value, str) else list(value) if isinstance(value, Sequence) else None
     if words is None:
@@ -84,9 +82,8 @@ def choices_of(name: str, value: Any, choices: Sequence[_Choice]) -> tuple[_Choi
 def number(name: str, value: object, unit: str = "") -> float:
     """Return `value`, a finite number in the range of its SI unit (`units.RANGES`), as a float; the message names both.
 
-    Parameters
-    ----------
-    unit : "" for a plain number.
+    Args:
+        unit: "" for a plain number.
     """
     real = _real(name, value, unit)
     wanted = out_of_range(real, unit) if isfinite(real) else "finite"
@@ -140,10 +137,9 @@ def flag(name: str, value: object) -> bool:
 def listed(name: str, value: object, wanted: str) -> tuple[Any, ...]:
     """Return the items of a list, an array, a set, a generator or the like as a tuple.
 
-    Parameters
-    ----------
-    value : of the argument; text is not a list of its letters, a mapping not one of its keys.
-    wanted : what it must be, in words, such as "a list of rods".
+    Args:
+        value: of the argument; text is not a list of its letters, a mapping not one of its keys.
+        wanted: what it must be, in words, such as "a list of rods".
     """
     given: Any = value
     if not isinstance(value, list | tuple):  # most are, and the rest takes longer
@@ -179,11 +175,10 @@ def mapping(name: str, value: object, wanted: str) -> Mapping[Any, Any]:
 def numbers(name: str, value: object, wanted: str, count: int, unit: str = "") -> tuple[float, ...]:
     """Return `value` as a tuple of finite floats in the range of their SI unit; see `number`.
 
-    Parameters
-    ----------
-    value : a sequence or an array.
-    wanted : what it must be, in words, such as "two finite numbers x, y in m".
-    unit : of each; "" for plain numbers.
+    Args:
+        value: a sequence or an array.
+        wanted: what it must be, in words, such as "two finite numbers x, y in m".
+        unit: of each; "" for plain numbers.
     """
     single = not hasattr(value, "__len__") or isinstance(value, str | bytes | dict) or getattr(value, "ndim", 1) == 0
     given: Any = () if single else value
@@ -227,9 +222,8 @@ def is_auto(value: object) -> bool:
 def file_path(name: str, value: object) -> Path:
     """Return `value` as a path, with ~ resolved.
 
-    Raises
-    ------
-    InputError : it is neither text nor a path, no system could have such a path, or nobody knows that home folder.
+    Raises:
+        InputError: it is neither text nor a path, no system could have such a path, or nobody knows that home folder.
     """
     if not isinstance(value, str | PathLike):
         raise InputError(f"{name} must be the path of a file, not {described(value)}")
@@ -254,10 +248,9 @@ def file_path(name: str, value: object) -> Path:
 def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
     """Return `given` as an array of finite numbers.
 
-    Parameters
-    ----------
-    given : numbers of the `shape`, or of one that can be broadcast to it.
-    shape : of the result; none for a single number.
+    Args:
+        given: numbers of the `shape`, or of one that can be broadcast to it.
+        shape: of the result; none for a single number.
     """
     import numpy as np  # here, so that the command line's help need not wait for it
 
@@ -278,10 +271,9 @@ def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
 def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None) -> "NDArray[_Scalar]":
     """Return `given` as an array; whether its numbers are finite is not checked.
 
-    Parameters
-    ----------
-    given : an array or nested sequences.
-    shape : length along each axis, None for any.
+    Args:
+        given: an array or nested sequences.
+        shape: length along each axis, None for any.
     """
     import numpy as np
 
@@ -348,12 +340,11 @@ def short(value: object) -> str:
 def keep(record: Any, check: Callable[..., object], unit: str, *names: str, what: str = "{}", **options: Any) -> None:
     """Check numbers of a frozen dataclass in its `__post_init__`, and keep them as Python's floats.
 
-    Parameters
-    ----------
-    record : the dataclass; a field with the default None may be None.
-    check : `number`, `positive` or `not_negative`.
-    what : what messages call a field, with {} for its name.
-    options : of `check`.
+    Args:
+        record: the dataclass; a field with the default None may be None.
+        check: `number`, `positive` or `not_negative`.
+        what: what messages call a field, with {} for its name.
+        options: of `check`.
     """
     optional = {field.name for field in fields(record) if field.default is None}
     for name in names:

@@ -10,13 +10,11 @@ from importlib.metadata import distribution
 def version_of(package: str) -> str:
     """The version of an installed package.
 
-    Parameters
-    ----------
-    package : its name on the package index.
+    Args:
+        package: its name on the package index.
 
-    Raises
-    ------
-    importlib.metadata.PackageNotFoundError : it is not installed.
+    Raises:
+        importlib.metadata.PackageNotFoundError: it is not installed.
     """
     found = distribution(package)
     head, _, _ = (found.read_text("METADATA") or "").partition("\n\n")  # a description may follow

@@ -48,10 +48,9 @@ UNDESCRIBED = "not_described"
 class Built(NamedTuple):
     """A case as library objects.
 
-    Parameters
-    ----------
-    anchor : x, y where the axes cross [m]; None: the default, or one that is searched for.
-    ends : supports on which the grid is popped up.
+    Args:
+        anchor: x, y where the axes cross [m]; None: the default, or one that is searched for.
+        ends: supports on which the grid is popped up.
     """
 
     target: "Target"
@@ -96,9 +95,8 @@ class Case:
     def to_toml(self) -> str:
         """The full input as a case file with SI numbers: loading it from anywhere gives the same case.
 
-        Raises
-        ------
-        InputError : it holds an object that no case file can describe.
+        Raises:
+            InputError: it holds an object that no case file can describe.
         """
         notes = []
         for name, held in self.held_objects.items():
@@ -212,15 +210,13 @@ class Case:
     def build(self, target: "Target | None" = None, progress: Progress = silent) -> Built:
         """The objects.
 
-        Parameters
-        ----------
-        target : the target, where it was built before.
-        progress : called while a file is read and fitted, and by the net by whose bends the rod is chosen.
+        Args:
+            target: the target, where it was built before.
+            progress: called while a file is read and fitted, and by the net by whose bends the rod is chosen.
 
-        Raises
-        ------
-        InputError : values that are fine alone do not fit together, the formula or the file cannot be used; with seams,
-            also keys that a form in patches does not have.
+        Raises:
+            InputError: values that are fine alone do not fit together, the formula or the file cannot be used; with
+                seams, also keys that a form in patches does not have.
         """
         from rodshell.checks.sizing import require_likely_sizes
         from rodshell.layout import GridLayout
@@ -317,9 +313,8 @@ class Case:
     def built_loads(self) -> "Loads | None":
         """What the shell is to be checked under; None where the case has no loads.
 
-        Raises
-        ------
-        InputError : two loads or two combinations of one name, and what `Loads` refuses.
+        Raises:
+            InputError: two loads or two combinations of one name, and what `Loads` refuses.
         """
         if not self.loads and not self.combinations:
             return None
@@ -343,9 +338,8 @@ class Case:
     def output_options(self) -> "OutputOptions":
         """Options of checks, fabrication and drawings.
 
-        Raises
-        ------
-        InputError : a value cannot be used.
+        Raises:
+            InputError: a value cannot be used.
         """
         from rodshell.output.options import OutputOptions
 

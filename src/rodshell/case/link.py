@@ -30,14 +30,12 @@ def studio_link(case: Case, *, address: str = ADDRESS) -> str:
     CODE is the case as JSON, compressed (raw deflate) and written in base64 for URLs without padding. It holds no
     files: a case that names some opens in a studio that was started with them, and is refused by others in a sentence.
 
-    Parameters
-    ----------
-    address : of the studio, as it prints it.
+    Args:
+        address: of the studio, as it prints it.
 
-    Raises
-    ------
-    InputError : not a case; one that is too large; one that holds an object that no case file can describe, or that is
-        about a table of rods.
+    Raises:
+        InputError: not a case; one that is too large; one that holds an object that no case file can describe, or that
+            is about a table of rods.
     """
     instance("case", case, Case, "the case of a job: job.case")
     text = json.dumps(page_case(case)[0], separators=(",", ":"))
@@ -59,9 +57,8 @@ def require_small(size: int) -> None:
 def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
     """What differs from a case without keys, in tables as in a case file; files as uploads, with their paths by name.
 
-    Raises
-    ------
-    InputError : as of `studio_link`; also a file of a kind that the studio does not read.
+    Raises:
+        InputError: as of `studio_link`; also a file of a kind that the studio does not read.
     """
     if case.of_table:
         raise InputError("the studio finds forms on a target: it does not open a table of rods")
@@ -83,13 +80,11 @@ def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
 def upload_name(name: str) -> str:
     """A plain file name for an upload.
 
-    Parameters
-    ----------
-    name : as the browser gave it.
+    Args:
+        name: as the browser gave it.
 
-    Raises
-    ------
-    InputError : not the name of a file that the studio reads.
+    Raises:
+        InputError: not the name of a file that the studio reads.
     """
     plain = re.sub(r"[^\w.() -]", "_", name.replace("\\", "/").rpartition("/")[2]).strip(". ")
     plain = plain.encode("utf-8", "replace")[-100:].decode("utf-8", "ignore").strip(". ")  # of bytes, as systems count

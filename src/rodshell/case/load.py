@@ -104,20 +104,18 @@ def load_case(
 ) -> Case:
     """The case of this name, in this file or with this content, with some keys changed.
 
-    Parameters
-    ----------
-    source : one of `BUILT_IN`; the path of a TOML file, or of a surface (`BY_SUFFIX`); the text of a TOML file; its
-        content as a mapping, in which dots may stand for tables in tables; None: an empty case.
-    overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
-        keeps those keys of its table that it has too.
-    otherwise : tables that stand in for those that the case does not have.
-    files : for a case of somebody who may not name any file: gives the path for the value of each key that names one,
-        or raises InputError.
+    Args:
+        source: one of `BUILT_IN`; the path of a TOML file, or of a surface (`BY_SUFFIX`); the text of a TOML file; its
+            content as a mapping, in which dots may stand for tables in tables; None: an empty case.
+        overrides: values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
+            keeps those keys of its table that it has too.
+        otherwise: tables that stand in for those that the case does not have.
+        files: for a case of somebody who may not name any file: gives the path for the value of each key that names
+            one, or raises InputError.
 
-    Raises
-    ------
-    InputError : no such case or file, not TOML, an unknown key, a value that cannot be used, the case of an object that
-        no case file can describe; in one sentence.
+    Raises:
+        InputError: no such case or file, not TOML, an unknown key, a value that cannot be used, the case of an object
+            that no case file can describe; in one sentence.
     """
     overrides = dict(_plain(overrides or {}))
     raw = _raw_of(source)
@@ -144,9 +142,8 @@ def is_described(path: Path) -> bool:
 def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
     """The same case with some keys changed, as `load_case` does.
 
-    Raises
-    ------
-    InputError : as of `load_case`; also a key of a table that was made from an object which keys do not describe.
+    Raises:
+        InputError: as of `load_case`; also a key of a table that was made from an object which keys do not describe.
     """
     held = case.held_objects
     if case.of_table:
@@ -374,14 +371,12 @@ def _parsed(name: str, text: str, wrong_type: str = "") -> _Raw:
 def toml_of(name: str, text: str, wrong_type: str = "") -> dict[str, Any]:
     """The tables of a text; `tomllib` is given none that it would take minutes or gigabytes for.
 
-    Parameters
-    ----------
-    name : of the text, for messages.
-    wrong_type : what is wrong with a file of this name, if anything.
+    Args:
+        name: of the text, for messages.
+        wrong_type: what is wrong with a file of this name, if anything.
 
-    Raises
-    ------
-    InputError : it is too large, or no TOML.
+    Raises:
+        InputError: it is too large, or no TOML.
     """
     if len(text) > limit(TEXT):
         raise InputError(f"{name} has more than {limit(TEXT) / 1e6:g} MB: shorten it, {raised(TEXT, len(text))}")
@@ -400,9 +395,8 @@ def toml_of(name: str, text: str, wrong_type: str = "") -> dict[str, Any]:
 def _plain(value: Any, depth: int = 0) -> Any:
     """A value as TOML gives it, NumPy's arrays as lists.
 
-    Raises
-    ------
-    InputError : tables and lists within each other, or keys, beyond what any case has: they would cost minutes.
+    Raises:
+        InputError: tables and lists within each other, or keys, beyond what any case has: they would cost minutes.
     """
     if depth > DEEPEST:
         raise InputError(_TOO_DEEP)

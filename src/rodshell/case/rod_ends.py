@@ -30,15 +30,13 @@ LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further i
 class RodEnds:
     """Rods by both their ends, flat and popped up; two tables are equal that have the same numbers.
 
-    Parameters
-    ----------
-    grid : m rods in the plane.
-    final : (m, 2, 3), where the start and the end of each rod go [m].
-    edge : longest edge of their mesh [m]; None: a sixth of the usual distance between joints.
+    Args:
+        grid: m rods in the plane.
+        final: (m, 2, 3), where the start and the end of each rod go [m].
+        edge: longest edge of their mesh [m]; None: a sixth of the usual distance between joints.
 
-    Raises
-    ------
-    InputError : `final` does not fit `grid`, or a rod would be stretched.
+    Raises:
+        InputError: `final` does not fit `grid`, or a rod would be stretched.
     """
 
     grid: FlatGrid
@@ -81,10 +79,9 @@ class RodEnds:
 class ResultRods:
     """The rods of an earlier result.
 
-    Parameters
-    ----------
-    ends : where they lie flat and popped up.
-    rod, joint : what they are and what joins them, as in a case file; empty where the result does not say.
+    Args:
+        ends: where they lie flat and popped up.
+        rod, joint: what they are and what joins them, as in a case file; empty where the result does not say.
     """
 
     ends: RodEnds
@@ -98,10 +95,9 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     A table whose columns end in _mm, as those of schedule/rods.csv do, says its unit itself. Cells are parted by
     commas, semicolons or tabs; unless by commas, a comma is a decimal point.
 
-    Raises
-    ------
-    InputError : no such file, no rods, a missing column, a cell without a finite number, an id used twice;
-        no unit, or another than the columns'; rods that span less than 1 mm or more than 1 km.
+    Raises:
+        InputError: no such file, no rods, a missing column, a cell without a finite number, an id used twice;
+            no unit, or another than the columns'; rods that span less than 1 mm or more than 1 km.
     """
     try:
         scale = None if unit is None else float(read_unit(unit, "length"))
@@ -189,10 +185,10 @@ def _labels(path: Path, names: list[str]) -> list[str] | None:
 def read_result(folder: Path) -> ResultRods:
     """The rods of an earlier result: their flat ends, where its shell has them, what they are and their joints.
 
-    Raises
-    ------
-    OutputError : the folder holds no result that can be read.
-    InputError : the result has no rods, or no shell in space; its rods lie in two layers, or have linkers of their own.
+    Raises:
+        OutputError: the folder holds no result that can be read.
+        InputError: the result has no rods, or no shell in space; its rods lie in two layers, or have linkers of their
+            own.
     """
     from rodshell.output.grid import rods_of
     from rodshell.results.archive import read

@@ -80,9 +80,8 @@ class RodTable(Holding):
         fit : what material and section have to fit; called where one is left open.
         strength : the permanent one of a material [Pa]; default: a preset's.
 
-        Raises
-        ------
-        InputError : something is left open, and there is nothing to fit.
+        Raises:
+            InputError: something is left open, and there is nothing to fit.
         """
         if not self.left_open:
             return Rod(self._section, self.material)

@@ -200,9 +200,8 @@ class SeamsTable:
     def patch_layouts(self) -> dict[str, PatchLayout]:
         """What patches have of their own, by name.
 
-        Raises
-        ------
-        InputError : two tables for one patch.
+        Raises:
+            InputError: two tables for one patch.
         """
         names = [patch.name for patch in self.patches]
         for name in names:

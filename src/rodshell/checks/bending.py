@@ -66,13 +66,11 @@ def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
 
     Exact for each shape; for a given section that of the corner of the box that its fibre distances span.
 
-    Parameters
-    ----------
-    kappa1, kappa2 : (n,) curvatures towards m1 and m2 [1/m].
+    Args:
+        kappa1, kappa2: (n,) curvatures towards m1 and m2 [1/m].
 
-    Raises
-    ------
-    InputError : a given section has no fibre distances.
+    Raises:
+        InputError: a given section has no fibre distances.
     """
     if (half := rod.section.half_widths) is None:
         raise InputError("the strain of a given section without fibre_distances is not known: give them")
@@ -83,13 +81,11 @@ def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
 def torsion_stress(rod: Rod, twist_rate: Floats) -> Floats:
     """Largest shear stress of torsion over the section [Pa].
 
-    Parameters
-    ----------
-    twist_rate : (n,) twist per length [rad/m].
+    Args:
+        twist_rate: (n,) twist per length [rad/m].
 
-    Raises
-    ------
-    InputError : a given section has no torsion modulus.
+    Raises:
+        InputError: a given section has no torsion modulus.
     """
     return np.asarray(_outline(rod)[2].max() * np.abs(twist_rate))
 
@@ -99,16 +95,14 @@ def largest_stress(
 ) -> Floats:
     """Largest s over the section [Pa], as the module defines it.
 
-    Parameters
-    ----------
-    kappa1, kappa2 : (n,) curvatures towards m1 and m2 [1/m].
-    axial : (n,) strain of the axis [-].
-    twist_rate : (n,) twist per length [rad/m].
-    weight : w, of the shear stress against the normal stress [-].
+    Args:
+        kappa1, kappa2: (n,) curvatures towards m1 and m2 [1/m].
+        axial: (n,) strain of the axis [-].
+        twist_rate: (n,) twist per length [rad/m].
+        weight: w, of the shear stress against the normal stress [-].
 
-    Raises
-    ------
-    InputError : the stress of a given section needs a value that is missing.
+    Raises:
+        InputError: the stress of a given section needs a value that is missing.
     """
     modulus = fibre_modulus(rod)
     bent, drawn, twist = fibre_strain(rod, kappa1, kappa2), np.abs(axial), np.abs(twist_rate)
@@ -127,9 +121,8 @@ def largest_stress(
 def fibre_modulus(rod: Rod) -> float:
     """Young's modulus of the outermost fibres [Pa].
 
-    Raises
-    ------
-    InputError : a given section without fibre_modulus or fibre_distances.
+    Raises:
+        InputError: a given section without fibre_modulus or fibre_distances.
     """
     if isinstance(rod.section, GivenSection):
         require_known_stress(rod, twisted=False)
@@ -142,9 +135,8 @@ def fibre_modulus(rod: Rod) -> float:
 def stress_is_known(rod: Rod, *, twisted: bool) -> bool:
     """Whether the stress of a rod is known, with that of torsion if it is `twisted`.
 
-    Parameters
-    ----------
-    twisted : the rods can be twisted.
+    Args:
+        twisted: the rods can be twisted.
     """
     return not _missing(rod, twisted)
 
@@ -152,13 +144,11 @@ def stress_is_known(rod: Rod, *, twisted: bool) -> bool:
 def require_known_stress(rod: Rod, *, twisted: bool) -> None:
     """Refuse a given section whose stress is not known.
 
-    Parameters
-    ----------
-    twisted : whether the rods can be twisted: by joints, or because their two bending stiffnesses differ.
+    Args:
+        twisted: whether the rods can be twisted: by joints, or because their two bending stiffnesses differ.
 
-    Raises
-    ------
-    InputError : values are missing that the stress needs.
+    Raises:
+        InputError: values are missing that the stress needs.
     """
     if missing := _missing(rod, twisted):
         needed = " and ".join([", ".join(missing[:-1]), missing[-1]] if missing[1:] else missing)
@@ -217,17 +207,16 @@ def _rectangle(width: float, height: float) -> tuple[Floats, Floats, Floats]:
 class Bending:
     """Bending, twist and stress at every node of every rod: arrays (k,) in the order of the mesh's `rod_nodes`.
 
-    Parameters
-    ----------
-    curvature : [1/m].
-    axial_strain : [-], mean of the edges on both sides.
-    stress : the largest over the section of bending, stretch and torsion together [Pa], see
-        `checks.bending`; None where the section's fibres are not known.
-    strain : of the outermost fibre, bending and axial; None as the stress.
-    normal_curvature, geodesic_curvature : parts of the curvature out of the shell and within it [1/m]; None where
-        no rods cross.
-    twist_rate : twist per length [rad/m]; zero where nothing twists the rods.
-    torsion_stress : largest shear stress of torsion over the section [Pa]; None as the stress.
+    Args:
+        curvature: [1/m].
+        axial_strain: [-], mean of the edges on both sides.
+        stress: the largest over the section of bending, stretch and torsion together [Pa], see
+            `checks.bending`; None where the section's fibres are not known.
+        strain: of the outermost fibre, bending and axial; None as the stress.
+        normal_curvature, geodesic_curvature: parts of the curvature out of the shell and within it [1/m]; None where
+            no rods cross.
+        twist_rate: twist per length [rad/m]; zero where nothing twists the rods.
+        torsion_stress: largest shear stress of torsion over the section [Pa]; None as the stress.
     """
 
     curvature: Floats
@@ -271,11 +260,10 @@ def bending_of(
 ) -> Bending:
     """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis.
 
-    Parameters
-    ----------
-    rod : the section and material of every rod.
-    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
-    edge_strains : (e,) axial strains that stress the edges; default: against their rest lengths.
+    Args:
+        rod: the section and material of every rod.
+        shear_weight: of the shear stress against the normal stress, see `checks.bending`.
+        edge_strains: (e,) axial strains that stress the edges; default: against their rest lengths.
     """
     mesh, positions = shell.mesh, shell.positions(state)
     normals = shell_normals(mesh, positions)
@@ -320,17 +308,17 @@ def bending(
 ) -> Bending:  # fmt: skip
     """Bending of the rods of `mesh` with nodes at `positions` (n, 3) [m].
 
-    Parameters
-    ----------
-    clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
-    components : (k, 2) curvatures towards m1 and m2 [1/m]; without, the stress of a section that is not round is an
-        upper bound, as if it bent towards its farthest point.
-    twist_rate : (k,) twist per length [rad/m]; without, none.
-    normals : (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without `components`.
-    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
-    edge_strains : (e,) as of `bending_of`.
-    by_joints : (k, 3) along the normals of joints, how much sharper than their nodes bend the sides of them that bend
-        most [1/m]; None: joints pass no moments about their normals.
+    Args:
+        clamps: (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
+        components: (k, 2) curvatures towards m1 and m2 [1/m]; without, the stress of a section that is not round is an
+            upper bound, as if it bent towards its farthest point.
+        twist_rate: (k,) twist per length [rad/m]; without, none.
+        normals: (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without
+            `components`.
+        shear_weight: of the shear stress against the normal stress, see `checks.bending`.
+        edge_strains: (e,) as of `bending_of`.
+        by_joints: (k, 3) along the normals of joints, how much sharper than their nodes bend the sides of them that
+            bend most [1/m]; None: joints pass no moments about their normals.
     """
     turns, tangents = _turns(mesh, positions, clamps)
     if by_joints is not None:
@@ -367,9 +355,8 @@ def bending(
 def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
     """(e, 3) first material director m1 of each edge in a `state` (N, 3).
 
-    Parameters
-    ----------
-    frames : the shell's bending and twist, whose frames are transported to the state.
+    Args:
+        frames: the shell's bending and twist, whose frames are transported to the state.
     """
     m1 = frames.refreshed(state).material_directors(state)
     result = np.zeros((len(shell.mesh.edges) + len(shell.ghosts), 3))  # of ghost edges, too
@@ -381,9 +368,8 @@ def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
 def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
     """(k, 3) normal of the shell at each entry of `rod_nodes`; None where some rod crosses no other.
 
-    Parameters
-    ----------
-    positions : (n, 3) of its nodes [m].
+    Args:
+        positions: (n, 3) of its nodes [m].
     """
     if (mesh.grid.joint_counts() == 0).any():
         return None
@@ -393,10 +379,9 @@ def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
 def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
     """(k,) curvature [1/m] at each entry of `rod_nodes`.
 
-    Parameters
-    ----------
-    positions : (n, 3) of its nodes [m].
-    clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
+    Args:
+        positions: (n, 3) of its nodes [m].
+        clamps: (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
     """
     return np.asarray(np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1))
 
@@ -404,10 +389,9 @@ def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = Non
 def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:
     """(k,) axial strain at each entry of `rod_nodes`: the mean over its edges, which at an end is one.
 
-    Parameters
-    ----------
-    mesh : the rods, with their rest lengths.
-    positions : (n, 3) of its nodes [m].
+    Args:
+        mesh: the rods, with their rest lengths.
+        positions: (n, 3) of its nodes [m].
     """
     lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
     return _mean_of_edges(mesh, lengths / mesh.edge_lengths - 1.0)

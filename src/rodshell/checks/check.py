@@ -36,9 +36,8 @@ WORTH = 0.01  # of the stress: less torsion is not worth a word
 class ShellChecks:
     """The checks of the shell with one kind of ends.
 
-    Parameters
-    ----------
-    self_weight, other_shapes : None where a time limit came before them, or the shell is not stable.
+    Args:
+        self_weight, other_shapes: None where a time limit came before them, or the shell is not stable.
     """
 
     bending: Bending
@@ -55,14 +54,13 @@ class ShellChecks:
 class Checks:
     """What was checked of the shells that converged.
 
-    Parameters
-    ----------
-    deployment : from flat, with pinned ends, or None; `deployment_bending` the bending of its stages, the flat grid
-        first.
-    self_weight : by end condition, what share of its own weight the shell carries.
-    contact : by end condition; `deployment_contact` of the deployment's stages.
-    other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
-    stopped, missing : when the time limit came, or "", and which checks were not reached.
+    Args:
+        deployment: from flat, with pinned ends, or None; `deployment_bending` the bending of its stages, the flat grid
+            first.
+        self_weight: by end condition, what share of its own weight the shell carries.
+        contact: by end condition; `deployment_contact` of the deployment's stages.
+        other_shapes: by end condition, of shells that are stable; empty where they were not looked for.
+        stopped, missing: when the time limit came, or "", and which checks were not reached.
     """
 
     bending: dict[Ends, Bending]
@@ -85,9 +83,8 @@ class Checks:
     def __getitem__(self, ends: Ends) -> ShellChecks:
         """The checks of the shell with these ends.
 
-        Raises
-        ------
-        KeyError : there is no such shell, or it did not converge.
+        Raises:
+            KeyError: there is no such shell, or it did not converge.
         """
         if ends not in self.bending:
             known = " and ".join(map(str, self.bending)) or "none"
@@ -178,18 +175,16 @@ def check(
 ) -> Checks:  # fmt: skip
     """Check every shell that converged.
 
-    Parameters
-    ----------
-    popped : the shells of one footprint by their end condition.
-    rod : of which they are made.
-    stages : of the deployment from flat of the pinned shell; 0: none.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.bending`.
-    progress : called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and what
-        was found until then is returned.
+    Args:
+        popped: the shells of one footprint by their end condition.
+        rod: of which they are made.
+        stages: of the deployment from flat of the pinned shell; 0: none.
+        shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
+        progress: called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and
+            what was found until then is returned.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind.
+    Raises:
+        InputError: a value is of the wrong kind.
     """
     by_ends = f"shells by their ends, such as {{{shown(PINNED.name)}: rodshell.pop_up(...)}}"
     for ends, shape in mapping("popped", popped, by_ends).items():

@@ -45,10 +45,9 @@ APART = Clearance(clearance=None, pairs=0, rods=None, where=None)
 def contact_of(shell: Shell, state: State, rod: Rod, *, each_grid: bool = False) -> Clearance:
     """Contact of a shell of equal rods in a `state` (N, 3).
 
-    Parameters
-    ----------
-    rod : the section of every rod.
-    each_grid : as of `contact`.
+    Args:
+        rod: the section of every rod.
+        each_grid: as of `contact`.
     """
     frames = shell.frames
     directors = None if frames is None else edge_directors(shell, frames, state)
@@ -60,11 +59,10 @@ def contact(
 ) -> Clearance:
     """Contact of the rods of `mesh`.
 
-    Parameters
-    ----------
-    positions : (k, 3) of each entry of `rod_nodes` [m].
-    directors : (e, 3) first material director of each edge; without, the normal of the shell.
-    each_grid : of grids side by side rods of two of them are not looked at, as where each is still on its own way.
+    Args:
+        positions: (k, 3) of each entry of `rod_nodes` [m].
+        directors: (e, 3) first material director of each edge; without, the normal of the shell.
+        each_grid: of grids side by side rods of two of them are not looked at, as where each is still on its own way.
     """
     outline = _Outline.of(rod, mesh)
     if outline is None:
@@ -285,10 +283,9 @@ def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[
 
     Where segments are parallel over a stretch, one pair of points of that stretch.
 
-    Parameters
-    ----------
-    a, a_end : (p, 3) ends of the first segment of each pair.
-    b, b_end : (p, 3) ends of the second segment of each pair, in the same unit.
+    Args:
+        a, a_end: (p, 3) ends of the first segment of each pair.
+        b, b_end: (p, 3) ends of the second segment of each pair, in the same unit.
     """
     u, v, w = a_end - a, b_end - b, a - b
     uu, vv, uv, uw, vw = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)

@@ -62,11 +62,11 @@ class OtherShape(figures.OtherShape):
 class Gap:
     """Where a deployment was lost, seen from flat and from the final shape.
 
-    Parameters
-    ----------
-    reached : share up to which the path forwards was followed, on whichever branch; 0 where none was found from flat.
-    left : share down to which the path backwards is stable.
-    limit : what ends it there, as of a `LoadPath`.
+    Args:
+        reached: share up to which the path forwards was followed, on whichever branch; 0 where none was found from
+            flat.
+        left: share down to which the path backwards is stable.
+        limit: what ends it there, as of a `LoadPath`.
     """
 
     reached: float
@@ -125,16 +125,14 @@ def deploy(
 ) -> Deployment:
     """Follow a popped-up shell back to the flat grid, and forwards from there where that path has a gap.
 
-    Parameters
-    ----------
-    shell : its ends being free to turn, its source frames being at the equilibrium.
-    stages : number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root of
-        the way.
-    progress : called with each share of the deployment that is looked for.
+    Args:
+        shell: its ends being free to turn, its source frames being at the equilibrium.
+        stages: number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root
+            of the way.
+        progress: called with each share of the deployment that is looked for.
 
-    Returns
-    -------
-    The stages reached. Those below the last one that was reached are missing.
+    Returns:
+        The stages reached. Those below the last one that was reached are missing.
     """
     path = _Path(shell, found, progress)
     shares = ((np.arange(stages, 0, -1) / stages) ** 2).tolist()
@@ -181,9 +179,8 @@ def deploy_grids(popped: PopUp, *, stages: int, progress: Progress = lambda shar
     """As `deploy`, of grids that lie side by side each on its own way: a snap of one then costs no steps of the others.
     The stages are those that all of them reached.
 
-    Parameters
-    ----------
-    popped : with pinned ends.
+    Args:
+        popped: with pinned ends.
     """
     grids = popped.alone or (popped,)
     ways = [deploy(grid.shell, grid.equilibrium, stages=stages, progress=progress) for grid in grids]
@@ -374,13 +371,11 @@ class _Path:
 def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
     """Whether the pinned shell comes to the clamped shape when its ends, held in place, are turned into their clamps.
 
-    Parameters
-    ----------
-    pinned, clamped : stable shells of one footprint and boundary.
+    Args:
+        pinned, clamped: stable shells of one footprint and boundary.
 
-    Returns
-    -------
-    None where that could not be followed. The path continues after a snap. Of grids side by side whether all do.
+    Returns:
+        None where that could not be followed. The path continues after a snap. Of grids side by side whether all do.
     """
     if pinned.alone:
         return all_true([reached_by_turning(*grid) for grid in zip(pinned.alone, clamped.alone, strict=True)])

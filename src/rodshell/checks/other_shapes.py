@@ -49,12 +49,11 @@ def other_shapes(
 ) -> OtherShapes:  # fmt: skip
     """Look for other stable equilibria of a shell, its supports being held where they are.
 
-    Parameters
-    ----------
-    found : its stable equilibrium without loads, the shell's source frames being there.
-    most_factorizations : the search ends before they are used up; kicks that are small come first.
-    deployment : of this shell; the shape that it ended in, where that is not the final one, is among those found.
-    progress : called with the number of each start before it.
+    Args:
+        found: its stable equilibrium without loads, the shell's source frames being there.
+        most_factorizations: the search ends before they are used up; kicks that are small come first.
+        deployment: of this shell; the shape that it ended in, where that is not the final one, is among those found.
+        progress: called with the number of each start before it.
     """
     search = _Search(shell, found, deployment)
     kicks = list[float]()
@@ -194,13 +193,11 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
 
     Rods in two layers are joined at their crossings.
 
-    Parameters
-    ----------
-    positions : (n, 3) of its nodes [m]; of rods in two layers on the surface between them.
+    Args:
+        positions: (n, 3) of its nodes [m]; of rods in two layers on the surface between them.
 
-    Returns
-    -------
-    (n, 3) the nodes on that surface [m].
+    Returns:
+        (n, 3) the nodes on that surface [m].
     """
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]

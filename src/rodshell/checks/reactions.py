@@ -64,10 +64,9 @@ def _imbalance(parts: Floats) -> float:
 def reactions(shell: Shell, found: Equilibrium) -> Reactions:
     """Reactions of a shell without loads, whose ends are held or pushed by the springs of supports.
 
-    Parameters
-    ----------
-    shell : with its source frames at the equilibrium.
-    found : the equilibrium; its gradient at the ends, without that of the springs, is what the supports exert.
+    Args:
+        shell: with its source frames at the equilibrium.
+        found: the equilibrium; its gradient at the ends, without that of the springs, is what the supports exert.
     """
     state, gradient = found.state, found.gradient
     if shell.springs:  # their forces are the supports'
@@ -88,13 +87,12 @@ def reactions(shell: Shell, found: Equilibrium) -> Reactions:
 class JointLoads:
     """Of each of the grid's c crossings, in its order.
 
-    Parameters
-    ----------
-    normals : (c, 3) unit normals of the two rods, on the side that was up in the flat grid.
-    forces : (c, 2, 3) on its first and its second rod [N]. Where two rods meet they are opposite; where more meet,
-        each is what all the others do together.
-    moments : (c, 3) on the second rod about the joint [N m].
-    flat_angles, angles : (c,) from the first rod's direction to the second's about the normal, flat and now [rad].
+    Args:
+        normals: (c, 3) unit normals of the two rods, on the side that was up in the flat grid.
+        forces: (c, 2, 3) on its first and its second rod [N]. Where two rods meet they are opposite; where more meet,
+            each is what all the others do together.
+        moments: (c, 3) on the second rod about the joint [N m].
+        flat_angles, angles: (c,) from the first rod's direction to the second's about the normal, flat and now [rad].
     """
 
     normals: Floats
@@ -144,14 +142,12 @@ class JointLoads:
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:
     """Of a shell in equilibrium at `state` (N, 3), its source frames being there; with shared DOFs or eccentric.
 
-    Parameters
-    ----------
-    shell : with shared DOFs or eccentric joints, its source frames being at the state.
-    state : (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
+    Args:
+        shell: with shared DOFs or eccentric joints, its source frames being at the state.
+        state: (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
 
-    Raises
-    ------
-    InputError : the moments of an energy between rods are not known.
+    Raises:
+        InputError: the moments of an energy between rods are not known.
     """
     mesh, positions = shell.mesh, shell.positions(state)
     met = mesh.at_crossings
@@ -204,10 +200,9 @@ def cut_forces(shell: Shell, state: Floats) -> Floats:
     cut. A moment that a joint transfers acts as a pair of forces on the nodes next to it, so that shear forces are
     those of spans only away from joints.
 
-    Parameters
-    ----------
-    shell : its source frames being at the state.
-    state : (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
+    Args:
+        shell: its source frames being at the state.
+        state: (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
     """
     mesh, start = shell.mesh, shell.mesh.rod_start
     gradient = _on_places(shell, state)

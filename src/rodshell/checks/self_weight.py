@@ -36,13 +36,12 @@ def self_weight(
 ) -> SelfWeight:
     """Load a shell with its own weight until it is no longer stable.
 
-    Parameters
-    ----------
-    found : the equilibrium of the shell without loads, its ends held, with or without bracing.
-    mass : (n,) of the nodes, with that of bracing [kg]; None: the shell's.
-    gravity : [m/s2].
-    most : largest factor that is looked for.
-    progress : as of `load_path`.
+    Args:
+        found: the equilibrium of the shell without loads, its ends held, with or without bracing.
+        mass: (n,) of the nodes, with that of bracing [kg]; None: the shell's.
+        gravity: [m/s2].
+        most: largest factor that is looked for.
+        progress: as of `load_path`.
     """
     if not shell.mass[shell.stretch.blocks, 2].all():  # joints may have some even then
         return SelfWeight(load_factor=None, deflection=None, limit="no mass")

@@ -54,11 +54,10 @@ THICKEST, WIDEST = 0.5, 1e3  # m: a section and a shell that are proposed
 class Bends(NamedTuple):
     """How rods bend, whatever their size.
 
-    Parameters
-    ----------
-    normal, geodesic : (k,) curvatures out of the shell, along its normal, and within it [1/m].
-    twist : (k,) twist per length [rad/m].
-    force : (k,) axial force over EI [1/m2].
+    Args:
+        normal, geodesic: (k,) curvatures out of the shell, along its normal, and within it [1/m].
+        twist: (k,) twist per length [rad/m].
+        force: (k,) axial force over EI [1/m2].
     """
 
     normal: Floats
@@ -75,15 +74,14 @@ class Bends(NamedTuple):
 class Fit:
     """What a rod that is not given has to fit.
 
-    Parameters
-    ----------
-    width : of the shell [m], by which the material is chosen.
-    slender : radius of a rod as slender as the paper's [m].
-    thickest : largest depth of a rod between its joints [m].
-    bends : called if they are needed.
-    thickest_of : what that depth is a share of, in words.
-    bends_from : where the bends are taken from, in words.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.bending`.
+    Args:
+        width: of the shell [m], by which the material is chosen.
+        slender: radius of a rod as slender as the paper's [m].
+        thickest: largest depth of a rod between its joints [m].
+        bends: called if they are needed.
+        thickest_of: what that depth is a share of, in words.
+        bends_from: where the bends are taken from, in words.
+        shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
     """
 
     width: float
@@ -106,12 +104,11 @@ class Fit:
     ) -> Self:
         """By the net of a layout on its target.
 
-        Parameters
-        ----------
-        layout : of the rods on it.
-        anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
-        joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
-        progress : called by the net, which is marched when bends are first asked for.
+        Args:
+            layout: of the rods on it.
+            anchor: x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+            joint: ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
+            progress: called by the net, which is marched when bends are first asked for.
         """
         slender = SLENDER * target.size
         room = ROOM * layout.least_spacing
@@ -132,10 +129,9 @@ class Fit:
     def between(cls, lengths: Floats, ends: Floats) -> Self:
         """By rods whose ends come to lie at given points: each bends like a sine, as if it were joined to no other.
 
-        Parameters
-        ----------
-        lengths : (m,) of the rods [m].
-        ends : (m, 2, 3) where their ends come to lie [m].
+        Args:
+            lengths: (m,) of the rods [m].
+            ends: (m, 2, 3) where their ends come to lie [m].
         """
         chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         ring = float(lengths.max()) / np.pi  # of a rod whose ends meet
@@ -149,10 +145,9 @@ class Fit:
     def by_pop_ups(self, shells: Iterable[PopUp], rod: Rod, *, shear_weight: float) -> Self:
         """The same by the bends that shells of a provisional `rod` have in equilibrium.
 
-        Parameters
-        ----------
-        shells : popped up from flat rods that are all alike.
-        shear_weight : strength over shear strength of its material.
+        Args:
+            shells: popped up from flat rods that are all alike.
+            shear_weight: strength over shear strength of its material.
         """
         bends = bends_of_pop_ups(shells, rod)
         return replace(self, bends=lambda: bends, bends_from="the bends of a pop-up", shear_weight=shear_weight)
@@ -181,14 +176,12 @@ class Fit:
         steps of 1, 1.5, 2, 3, 5, 7. Without a known strength the section is as slender as the paper's rods on its
         hemisphere, and with one no thicker than that.
 
-        Parameters
-        ----------
-        strength : permanent [Pa]; None: the preset's by its building code.
-        shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
+        Args:
+            strength: permanent [Pa]; None: the preset's by its building code.
+            shape: a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
 
-        Raises
-        ------
-        InputError : the tube's wall is too thick for what the bends allow.
+        Raises:
+            InputError: the tube's wall is too thick for what the bends allow.
         """
         strength = strength or permanent_strength(material)
         if strength is None:
@@ -218,12 +211,11 @@ class Fit:
 
         Other parameters as for `section`, which chose it.
 
-        Parameters
-        ----------
-        section : the one that was chosen.
-        material : of the rods; a preset has its own strength and the sizes in which it is sold.
-        strength : permanent [Pa]; None: the preset's.
-        shape : a circle or a tube, if one was asked for.
+        Args:
+            section: the one that was chosen.
+            material: of the rods; a preset has its own strength and the sizes in which it is sold.
+            strength: permanent [Pa]; None: the preset's.
+            shape: a circle or a tube, if one was asked for.
         """
         strength = strength or permanent_strength(material)
         if strength is None:
@@ -261,17 +253,15 @@ def require_likely_sizes(
 ) -> None:
     """Refuse sizes of which one was given in another unit than was meant. Only their ratios count.
 
-    Parameters
-    ----------
-    width : of the shell [m].
-    spacing : the smallest between rods [m].
-    section : of the rods, if it is known; one without a size is not judged.
-    unit : that the target's file was read in [m], if it was.
+    Args:
+        width: of the shell [m].
+        spacing: the smallest between rods [m].
+        section: of the rods, if it is known; one without a size is not judged.
+        unit: that the target's file was read in [m], if it was.
 
-    Raises
-    ------
-    InputError : the rods are as thick as the spacing or the shell, or far thinner than those of any shell; the spacing
-        is wider than the shell.
+    Raises:
+        InputError: the rods are as thick as the spacing or the shell, or far thinner than those of any shell; the
+            spacing is wider than the shell.
     """
     depth = 0.0 if section is None else section.depth
     shell, allowed = f"the shell of {length_text(width)}", ""
@@ -294,11 +284,10 @@ def require_likely_sizes(
 def doubt_of_unit(width: float, section: Section | GivenSection | None, unit: float | None) -> str:
     """What is said of a shell whose spacing follows its size, if no building is as wide, and no rod is like it.
 
-    Parameters
-    ----------
-    width : of the shell [m].
-    section : of the rods, if it is given.
-    unit : that the target's file was read in [m], if it was.
+    Args:
+        width: of the shell [m].
+        section: of the rods, if it is given.
+        unit: that the target's file was read in [m], if it was.
     """
     depth = 0.0 if section is None else section.depth
     if unit is None or depth * KNOWN < width < depth * limit(MOST_SLENDER):
@@ -310,12 +299,11 @@ def doubt_of_unit(width: float, section: Section | GivenSection | None, unit: fl
 def _other_unit(name: str, size: float, width: float, unit: float | None, usual: tuple[float, float]) -> str:
     """What to check, and sizes in another unit that would suit each other.
 
-    Parameters
-    ----------
-    name, size : what the shell is compared with [m].
-    width : of the shell [m].
-    unit : that its file was read in [m], or None.
-    usual : ratios of width and size.
+    Args:
+        name, size: what the shell is compared with [m].
+        width: of the shell [m].
+        unit: that its file was read in [m], or None.
+        usual: ratios of width and size.
     """
     meant = list[str]()
     for other in UNITS:
@@ -336,10 +324,9 @@ def bends_of(
 
     No rod runs across a crease.
 
-    Parameters
-    ----------
-    layout : of the rods on it.
-    anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+    Args:
+        layout: of the rods on it.
+        anchor: x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
     """
     if isinstance(layout, SurfaceLattice):
         return Bends(*surface_net(target, layout, anchor=anchor).curvatures)
@@ -370,9 +357,8 @@ def net_bends(net: ChebyshevNet) -> Bends:
 def bends_of_pop_ups(shells: Iterable[PopUp], rod: Rod) -> Bends:
     """The bends at every node of every rod, at joints on the side that bends more.
 
-    Parameters
-    ----------
-    rod : section and material of every rod.
+    Args:
+        rod: section and material of every rod.
     """
     parts = list[Bends]()
     for popped in shells:
@@ -387,9 +373,8 @@ def bends_of_pop_ups(shells: Iterable[PopUp], rod: Rod) -> Bends:
 def largest_strain(rod: Rod, bends: Bends, *, shear_weight: float = VON_MISES) -> float:
     """Largest strain of a section that bends like this, with stretch, and torsion by its stress [-].
 
-    Parameters
-    ----------
-    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
+    Args:
+        shear_weight: of the shear stress against the normal stress, see `checks.bending`.
     """
     assert rod.material is not None
     axial = bends.force * _bend_over_stretch(rod)

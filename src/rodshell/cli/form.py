@@ -44,9 +44,8 @@ def command(name: str, **values: Any) -> int:
 def run_case(case: "Case", name: str, output: RunOptions) -> int:
     """Run the job of a case and write its form; the exit code.
 
-    Parameters
-    ----------
-    output : where and what to write.
+    Args:
+        output: where and what to write.
     """
     from rodshell.results.archive import kept_case, read_inputs
 

@@ -119,10 +119,9 @@ def overrides_of(values: Mapping[str, str | None]) -> dict[str, object]:
 class RunOptions:
     """Options of the commands that run a job, of their output.
 
-    Parameters
-    ----------
-    kinds : of files in addition to the archive; None: all that every installation can.
-    limit : longest time for all but the files [s].
+    Args:
+        kinds: of files in addition to the archive; None: all that every installation can.
+        limit: longest time for all but the files [s].
     """
 
     out: str | None
@@ -178,9 +177,8 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
 def read_output_options(values: dict[str, Any]) -> RunOptions:
     """Take these options out of the `values` of a command.
 
-    Raises
-    ------
-    InputError : there is no such kind of file; the time limit is not a time, or not a positive one.
+    Raises:
+        InputError: there is no such kind of file; the time limit is not a time, or not a positive one.
     """
     kinds = wanted_kinds(values.pop("only"))
     limit = seconds_of(values.pop("time_limit"))
@@ -192,9 +190,8 @@ def read_output_options(values: dict[str, Any]) -> RunOptions:
 def wanted_kinds(only: str | None) -> list[str] | None:
     """The kinds of files that --only names.
 
-    Raises
-    ------
-    InputError : there is no such kind.
+    Raises:
+        InputError: there is no such kind.
     """
     if only is None:
         return None
@@ -206,9 +203,8 @@ def wanted_kinds(only: str | None) -> list[str] | None:
 def seconds_of(given: str | None) -> float | None:
     """What --time-limit gives [s].
 
-    Raises
-    ------
-    InputError : it is not a time, or not a positive one.
+    Raises:
+        InputError: it is not a time, or not a positive one.
     """
     from rodshell.units import parse_quantity
 

@@ -44,9 +44,8 @@ class Progress:
     On a terminal that is one live line; else one short line for each stage, and a long one after each `SILENCE`.
     Called as progress(stage, detail, residual) at each iteration; use it in a `with`, or in several in turn.
 
-    Raises
-    ------
-    KeyboardInterrupt : the job was interrupted, and the interrupt was lost.
+    Raises:
+        KeyboardInterrupt: the job was interrupted, and the interrupt was lost.
     """
 
     def __init__(self, *, quiet: bool = False) -> None:
@@ -103,13 +102,11 @@ class Progress:
 def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
     """Compile the kernels that were not compiled with the wheel or by an earlier run; how many they were.
 
-    Parameters
-    ----------
-    every : those of joints, meshes and dynamics too, which otherwise are compiled when a job calls them.
+    Args:
+        every: those of joints, meshes and dynamics too, which otherwise are compiled when a job calls them.
 
-    Raises
-    ------
-    KeyboardInterrupt : interrupted; what was compiled until then is kept.
+    Raises:
+        KeyboardInterrupt: interrupted; what was compiled until then is kept.
     """
     if COMPILED is not None or os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return 0
@@ -182,11 +179,10 @@ def run_and_deliver(
 ) -> int:
     """Run the job of a case and write its form; the exit code.
 
-    Parameters
-    ----------
-    names : patterns of the files that are written in addition to result.json, states.npz and those of the kinds.
-    pictures : more files of the form, by name.
-    formed_before : the form is on disk already; where its loads cannot be checked it is not written again.
+    Args:
+        names: patterns of the files that are written in addition to result.json, states.npz and those of the kinds.
+        pictures: more files of the form, by name.
+        formed_before: the form is on disk already; where its loads cannot be checked it is not written again.
     """
     from rodshell.output.files import reserved
 
@@ -235,9 +231,8 @@ def output_folder(
 
     names : patterns of what will be written there.
 
-    Raises
-    ------
-    OutputError : it cannot be written, or holds files of these names that rodshell did not write.
+    Raises:
+        OutputError: it cannot be written, or holds files of these names that rodshell did not write.
     """
     from rodshell.results.folder import open_folder
 

@@ -39,13 +39,12 @@ class Touching:
     The blocked directions stay among the unknowns (see `Freedom`), so that nodes may come and go from step to step
     while the pattern of the matrix stays the same.
 
-    Parameters
-    ----------
-    supports : the shell's supports, a constraint.
-    free : the free directions that they leave.
-    nodes : (k,) nodes that touch.
-    points, normals : (k, 3) a point of each node's plane [m], and its unit normal.
-    stuck : (k,) bool; nodes that friction holds at their position in the plane.
+    Args:
+        supports: the shell's supports, a constraint.
+        free: the free directions that they leave.
+        nodes: (k,) nodes that touch.
+        points, normals: (k, 3) a point of each node's plane [m], and its unit normal.
+        stuck: (k,) bool; nodes that friction holds at their position in the plane.
     """
 
     supports: Any  # a solver's `Constraint`; its type is defined in a package that imports this one
@@ -61,10 +60,9 @@ class Touching:
     def none(supports: Any, state: Floats) -> "Touching":
         """The constraint where nothing touches.
 
-        Parameters
-        ----------
-        supports : the shell's supports, a constraint.
-        state : (N, 3) [m].
+        Args:
+            supports: the shell's supports, a constraint.
+            state: (N, 3) [m].
         """
         nowhere, no_nodes = np.empty((0, 3)), np.empty(0, dtype=np.intp)
         return Touching(supports, supports.freedom(state), no_nodes, nowhere, nowhere, np.empty(0, dtype=bool))
@@ -105,10 +103,9 @@ class Touching:
     def free_share(self, nodes: Ints, normals: Floats) -> Floats:
         """(k,) cosines between the normals (k, 3) of `nodes` (k,) and the directions that their supports leave free.
 
-        Parameters
-        ----------
-        nodes : (k,) blocks.
-        normals : (k, 3) unit vectors.
+        Args:
+            nodes: (k,) blocks.
+            normals: (k, 3) unit vectors.
         """
         along = np.einsum("kcx,kx->kc", self.free.directions[nodes], normals)
         along[np.arange(3) >= self.free.count[nodes][:, None]] = 0.0
@@ -119,18 +116,16 @@ class Touching:
 class ModifiedMass:
     """Contact with a target during a motion [HQK 3.1].
 
-    Parameters
-    ----------
-    target : its body, closed by the wall below its rim.
-    nodes : (k,) blocks that may touch it.
-    stopped : which part of a touching node's velocity an inelastic impact removes: "all" of it [HQK 3.1], or the
-        "normal" part. The first acts on sliding nodes as a drag m/h, which depends on the time step.
-    friction : Coulomb's coefficient [-], by which touching nodes stick or slip; with friction only the normal part of
-        the velocity is removed.
+    Args:
+        target: its body, closed by the wall below its rim.
+        nodes: (k,) blocks that may touch it.
+        stopped: which part of a touching node's velocity an inelastic impact removes: "all" of it [HQK 3.1], or the
+            "normal" part. The first acts on sliding nodes as a drag m/h, which depends on the time step.
+        friction: Coulomb's coefficient [-], by which touching nodes stick or slip; with friction only the normal part
+            of the velocity is removed.
 
-    Raises
-    ------
-    InputError : the coefficient is negative or not finite; `stopped` is neither "all" nor "normal".
+    Raises:
+        InputError: the coefficient is negative or not finite; `stopped` is neither "all" nor "normal".
     """
 
     target: Target
@@ -153,10 +148,9 @@ class ModifiedMass:
     def touching(self, supports: Any, state: Floats) -> Touching:
         """The constraint at the start of a step: nothing touches, whatever touched in the step before.
 
-        Parameters
-        ----------
-        supports : the shell's supports, a constraint.
-        state : (N, 3) [m].
+        Args:
+            supports: the shell's supports, a constraint.
+            state: (N, 3) [m].
         """
         return Touching.none(supports, state)
 
@@ -166,10 +160,9 @@ class ModifiedMass:
         Nodes that touch already are not tested again: above a concave surface a node on its plane is below it by an
         amount quadratic in its slide, and elsewhere by round-off (ERRATA to Algorithm 1, which could loop on them).
 
-        Parameters
-        ----------
-        state : (N, 3) at the end of the step [m].
-        touching : the constraint of the step so far.
+        Args:
+            state: (N, 3) at the end of the step [m].
+            touching: the constraint of the step so far.
         """
         outside = np.ones(len(state), dtype=bool)
         outside[self.nodes] = self.target.outside(state[self.nodes])
@@ -194,14 +187,13 @@ class ModifiedMass:
     def released(self, touching: Touching, reactions: Floats) -> tuple[Touching, Floats] | None:
         """The constraint without the nodes that friction cannot hold; None where it holds all.
 
-        Parameters
-        ----------
-        reactions : (N, 3) of all supports [N]; that of a stuck node must lie in the friction cone,
-            |tangential| <= friction * normal.
+        Args:
+            reactions: (N, 3) of all supports [N]; that of a stuck node must lie in the friction cone,
+                |tangential| <= friction * normal.
 
-        Returns
-        -------
-        The constraint, and the friction force (N, 3) [N] on the released nodes while they slip, against their motion.
+        Returns:
+            The constraint, and the friction force (N, 3) [N] on the released nodes while they slip, against their
+            motion.
         """
         if not touching.stuck.any():
             return None
@@ -219,10 +211,9 @@ class ModifiedMass:
     def landed(self, velocity: Floats, touching: Touching) -> Floats:
         """(N, 3) the velocity after the inelastic impact.
 
-        Parameters
-        ----------
-        velocity : (N, 3) before the impact [m/s].
-        touching : the nodes that touch, with their normals.
+        Args:
+            velocity: (N, 3) before the impact [m/s].
+            touching: the nodes that touch, with their normals.
         """
         result, nodes = velocity.copy(), touching.nodes
         if self.stops_all:

@@ -19,11 +19,10 @@ from rodshell.validation import brief
 class BoundToTarget:
     """Every node on the surface, where it slides in its two tangent directions, or fewer; a constraint with curvature.
 
-    Parameters
-    ----------
-    target : the surface, continued past its end.
-    count : (n,) free directions of each node: 2 in the tangent plane; 1 along `guides`; 0 held.
-    guides : (n, 3) direction that a node with one free direction follows (its part in the tangent plane).
+    Args:
+        target: the surface, continued past its end.
+        count: (n,) free directions of each node: 2 in the tangent plane; 1 along `guides`; 0 held.
+        guides: (n, 3) direction that a node with one free direction follows (its part in the tangent plane).
     """
 
     target: Target
@@ -47,10 +46,9 @@ class BoundToTarget:
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
         """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N].
 
-        Parameters
-        ----------
-        state : (n, 3) nodes [m].
-        gradient : (n, 3) of the energy there [N].
+        Args:
+            state: (n, 3) nodes [m].
+            gradient: (n, 3) of the energy there [N].
         """
         _, slope, hessian = self.target.implicit(state)
         normal, curvature = np.empty_like(slope), np.empty_like(hessian)
@@ -72,12 +70,11 @@ class UnilateralContact:
 
     E = (max(0, p - k gap)^2 - p^2) / 2k for each node; its force is max(0, p - k gap) along the normal.
 
-    Parameters
-    ----------
-    target : its body, closed by the wall below its rim.
-    blocks : (m, 1) nodes.
-    stiffness : (m,) k [N/m].
-    multipliers : (m,) p [N]: the contact force at the solution, updated by the caller.
+    Args:
+        target: its body, closed by the wall below its rim.
+        blocks: (m, 1) nodes.
+        stiffness: (m,) k [N/m].
+        multipliers: (m,) p [N]: the contact force at the solution, updated by the caller.
     """
 
     target: Target
@@ -90,9 +87,8 @@ class UnilateralContact:
     def forces(self, state: Floats) -> Floats:
         """(m,) contact forces [N] at `state` (N, 3).
 
-        Parameters
-        ----------
-        state : (N, 3) [m].
+        Args:
+            state: (N, 3) [m].
         """
         gap = self.target.contact(state[self.blocks[:, 0]]).distance
         return np.maximum(0.0, self.multipliers - self.stiffness * gap)

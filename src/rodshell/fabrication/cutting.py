@@ -22,14 +22,13 @@ def splices(
     A splice lies halfway between two neighbouring joints. The choice has the fewest pieces; among such choices the
     fewest `short` pieces; among those the least bend at its most bent splice.
 
-    Parameters
-    ----------
-    length : of the rod as cut [m], over which all distances are measured.
-    joints : distances of the joints from the start [m].
-    stock : longest piece [m].
-    short : pieces under this length are avoided [m].
-    stations, curvature : the rod's bend [1/m] at some ascending distances from the start [m].
-    taken : splices of other laths of the rod; none is made between the same joints [m from the start].
+    Args:
+        length: of the rod as cut [m], over which all distances are measured.
+        joints: distances of the joints from the start [m].
+        stock: longest piece [m].
+        short: pieces under this length are avoided [m].
+        stations, curvature: the rod's bend [1/m] at some ascending distances from the start [m].
+        taken: splices of other laths of the rod; none is made between the same joints [m from the start].
     """
     if length <= stock:
         return []

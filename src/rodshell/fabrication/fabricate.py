@@ -30,11 +30,10 @@ SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no m
 class Lath:
     """A lath as it is cut: a rod, or what lies on it over a part of its length.
 
-    Parameters
-    ----------
-    number : 1 is the rod itself, whole.
-    start, stop : its cut ends, allowances included, from the rod's start [m].
-    splices : distances from the rod's start [m].
+    Args:
+        number: 1 is the rod itself, whole.
+        start, stop: its cut ends, allowances included, from the rod's start [m].
+        splices: distances from the rod's start [m].
     """
 
     rod: int
@@ -53,9 +52,8 @@ class Lath:
 def _lath_name(rod: str, number: int) -> str:
     """What a lath is called: the first as its rod, the second "U07-2".
 
-    Parameters
-    ----------
-    rod : its id; number : of the lath.
+    Args:
+        rod: its id; number : of the lath.
     """
     return rod if number == 1 else f"{rod}-{number}"
 
@@ -87,17 +85,15 @@ def fabricate(
 ) -> Fabricated:  # fmt: skip
     """Cut list, layers, splices, stock and bracing of a grid.
 
-    Parameters
-    ----------
-    curvature : (k,) the sharpest bend that each entry of `rod_nodes` sees [1/m], which splices avoid.
-    final : (n, 3) the final shape, for the bracing [m].
-    pattern : of the bracing; default: both diagonals of every cell.
-    prestrain : by which cables are shortened when they are put in [-]; None: the bracing is not of cables.
-    to_supports : diagonals also from the outermost joints to the rod ends.
+    Args:
+        curvature: (k,) the sharpest bend that each entry of `rod_nodes` sees [1/m], which splices avoid.
+        final: (n, 3) the final shape, for the bracing [m].
+        pattern: of the bracing; default: both diagonals of every cell.
+        prestrain: by which cables are shortened when they are put in [-]; None: the bracing is not of cables.
+        to_supports: diagonals also from the outermost joints to the rod ends.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind.
+    Raises:
+        InputError: a value is of the wrong kind.
     """
     instance("mesh", mesh, GridMesh)
     instance("rod", rod, Rod)

@@ -104,11 +104,10 @@ def said(
 ) -> Said:  # fmt: skip
     """A finding in the words of `SENTENCES`.
 
-    Parameters
-    ----------
-    sentence : its name there: the code, or the code and a variant.
-    support, figure, limit, unit, place, offers : see `Finding`.
-    words : that the sentence needs in addition.
+    Args:
+        sentence: its name there: the code, or the code and a variant.
+        support, figure, limit, unit, place, offers: see `Finding`.
+        words: that the sentence needs in addition.
     """
     finding = Finding(
         code=sentence.partition(":")[0], support=support, figure=figure, limit=limit, unit=unit, place=place,

@@ -188,9 +188,8 @@ def by_ends(meaning: str) -> Any:
 def json_text(content: Mapping[str, Any]) -> str:
     """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null.
 
-    Parameters
-    ----------
-    content : keys and values; NumPy's arrays and numbers are converted.
+    Args:
+        content: keys and values; NumPy's arrays and numbers are converted.
     """
     lines = []
     for name, value in plain(content).items():
@@ -209,9 +208,8 @@ def _dumps(value: Any) -> str:
 def plain(value: Any) -> Any:
     """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable.
 
-    Parameters
-    ----------
-    value : dictionaries, sequences, arrays, records, numbers, texts.
+    Args:
+        value: dictionaries, sequences, arrays, records, numbers, texts.
     """
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None

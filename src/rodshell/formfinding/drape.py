@@ -30,26 +30,25 @@ def drape(
 ) -> Draped:
     """Lay a flat grid of rods on a target.
 
-    Parameters
-    ----------
-    rod : section and material of every rod.
-    target : the surface, and where it ends.
-    method : `Bound()` marches the inextensible net and binds the grid to it; `Gravity()` lets the rods hang on the
-        target (static equilibrium, frictionless unilateral contact), from flat; `Fall()` lets them fall on it in
-        time, as the paper does.
-    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
-    joint : the connection of rods where they cross; ball joints by default. `Bound()`, whose net is purely geometric,
-        uses its eccentricity, which places the rods in two layers, and whether it holds the rods against rolling.
-    warm_start : a grid draped before. `Bound()` starts its net from the earlier one, which saves time and gives
-        the same result. The others always start from flat: without friction a grid that starts from an earlier result
-        may turn and come to rest elsewhere.
-    progress : called as progress(stage, detail, residual) at every iteration.
+    Args:
+        rod: section and material of every rod.
+        target: the surface, and where it ends.
+        method: `Bound()` marches the inextensible net and binds the grid to it; `Gravity()` lets the rods hang on the
+            target (static equilibrium, frictionless unilateral contact), from flat; `Fall()` lets them fall on it in
+            time, as the paper does.
+        anchor: x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+        joint: the connection of rods where they cross; ball joints by default. `Bound()`, whose net is purely
+            geometric, uses its eccentricity, which places the rods in two layers, and whether it holds the rods against
+            rolling.
+        warm_start: a grid draped before. `Bound()` starts its net from the earlier one, which saves time and gives the
+            same result. The others always start from flat: without friction a grid that starts from an earlier result
+            may turn and come to rest elsewhere.
+        progress: called as progress(stage, detail, residual) at every iteration.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind, or the layout does not fit the target or the method.
-    NetLimitError : no net covers the target from this anchor and heading.
-    StabilityError : the fall's time step is beyond the stability limit of explicit ties.
+    Raises:
+        InputError: a value is of the wrong kind, or the layout does not fit the target or the method.
+        NetLimitError: no net covers the target from this anchor and heading.
+        StabilityError: the fall's time step is beyond the stability limit of explicit ties.
     """
     require_progress(progress)
     for name, value, kind in (("layout", layout, Layout), ("rod", rod, Rod), ("target", target, Target)):

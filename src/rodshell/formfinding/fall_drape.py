@@ -58,16 +58,14 @@ def fall_drape(
 ) -> Draped:
     """Let a layout fall on a target in time; see `drape`.
 
-    Parameters
-    ----------
-    fall : height, time stepping, coupling, impacts, friction and drag.
-    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+    Args:
+        fall: height, time stepping, coupling, impacts, friction and drag.
+        anchor: x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
 
-    Raises
-    ------
-    InputError : the anchor lies outside the target.
-    StabilityError : the time step is beyond the stability limit of explicit ties, at the start or after landing.
-    ConvergenceError : the first step fails, however small. Where a later step fails, the fall ends, not at rest.
+    Raises:
+        InputError: the anchor lies outside the target.
+        StabilityError: the time step is beyond the stability limit of explicit ties, at the start or after landing.
+        ConvergenceError: the first step fails, however small. Where a later step fails, the fall ends, not at rest.
     """
     top = anchor_point(target, anchor)
     grid = initial_grid(target, layout, anchor)

@@ -32,10 +32,9 @@ BEYOND = 0.1  # share of the rods' length beyond their buckling moment; with les
 def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     """(c, 2, 3) tangents of both rods at each joint, from the neighbours on either side; not normalised [m].
 
-    Parameters
-    ----------
-    mesh : of n nodes and c joints.
-    positions : (n, 3) of the nodes [m].
+    Args:
+        mesh: of n nodes and c joints.
+        positions: (n, 3) of the nodes [m].
     """
     before, after = np.moveaxis(positions[mesh.rod_nodes[mesh.beside_crossings]], 2, 0)
     return np.asarray(after - before)
@@ -44,9 +43,8 @@ def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
 def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
     """(c, 3) unit normals at the joints, across both rods, on the side that is up in the flat grid.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes [m].
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
     """
     tangents, flat = joint_tangents(mesh, positions), joint_tangents(mesh, mesh.flat)
     up = np.sign(cross(flat[:, 0], flat[:, 1])[:, 2:])
@@ -56,9 +54,8 @@ def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
 def node_normals(mesh: GridMesh, positions: Floats) -> Floats:
     """(n, 3) unit normals at all nodes, those of the joints interpolated linearly along the rods.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes [m].
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
     """
     (crossings, share), at_joints = mesh.between_crossings, joint_normals(mesh, positions)
     first, last = at_joints[crossings].transpose(1, 0, 2)
@@ -72,11 +69,10 @@ def place_in_layers(
 ) -> tuple[GridMesh, Floats, Floats]:
     """The mesh in two layers, with the positions (k, 3) of its nodes [m] and the normals (k, 3) there.
 
-    Parameters
-    ----------
-    mesh : of n nodes, whose rods meet in shared nodes.
-    positions, normals : (n, 3) of the surface between the layers [m], [-].
-    eccentricity : distance of the layers [m].
+    Args:
+        mesh: of n nodes, whose rods meet in shared nodes.
+        positions, normals: (n, 3) of the surface between the layers [m], [-].
+        eccentricity: distance of the layers [m].
     """
     layered = mesh.in_layers(eccentricity)
     rod_normals = normals[mesh.rod_nodes]
@@ -86,11 +82,10 @@ def place_in_layers(
 def middle_surface(mesh: GridMesh, layered: GridMesh, positions: Floats) -> Floats:
     """(n, 3) positions of the nodes of `mesh`, on the surface between two layers of rods [m].
 
-    Parameters
-    ----------
-    mesh : of n nodes, whose rods meet in shared nodes.
-    layered : the same mesh in layers, of k nodes; or `mesh` itself.
-    positions : (k, 3) of the nodes of `layered` [m].
+    Args:
+        mesh: of n nodes, whose rods meet in shared nodes.
+        layered: the same mesh in layers, of k nodes; or `mesh` itself.
+        positions: (k, 3) of the nodes of `layered` [m].
     """
     if not layered.layered:
         return positions
@@ -115,12 +110,11 @@ def thickness_warnings(
 ) -> tuple[str, ...]:
     """A warning where thick rods, laid one above the other, would differ in length from lines on one surface.
 
-    Parameters
-    ----------
-    normal : (n, 3) of the target at the mesh's nodes.
-    positions : (n, 3) of the mesh's nodes, on the target [m].
-    touching : (n,) which of them lie on the target itself, not on its continuation.
-    spacing : of the rods [m].
+    Args:
+        normal: (n, 3) of the target at the mesh's nodes.
+        positions: (n, 3) of the mesh's nodes, on the target [m].
+        touching: (n,) which of them lie on the target itself, not on its continuation.
+        spacing: of the rods [m].
     """
     thick = rod_thickness(rod)
     bent = thick * _curvatures(normal, positions, mesh.edges, touching)
@@ -189,13 +183,12 @@ def flat_warnings(points: Floats, rod: Rod) -> tuple[str, ...]:
 class StrongBending:
     """How the rods of a net bend about their strong axis.
 
-    Parameters
-    ----------
-    ratio : of the larger bending stiffness to the smaller [-].
-    flat : whether they lie flat, the strong axis being the surface's normal; else they stand on edge.
-    curvature : about the strong axis, where the moment is largest [1/m].
-    moment : the largest moment over that at which a rod buckles sideways between its joints [-].
-    beyond : share of the rods' length where the moment is beyond that [-].
+    Args:
+        ratio: of the larger bending stiffness to the smaller [-].
+        flat: whether they lie flat, the strong axis being the surface's normal; else they stand on edge.
+        curvature: about the strong axis, where the moment is largest [1/m].
+        moment: the largest moment over that at which a rod buckles sideways between its joints [-].
+        beyond: share of the rods' length where the moment is beyond that [-].
     """
 
     ratio: float
@@ -226,10 +219,9 @@ def strong_bending(
 ) -> StrongBending | None:
     """How rods that cannot roll at their joints bend about their strong axis; None where both axes are alike.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes, on the target [m].
-    touching : (n,) which of them lie on the target itself, not on its continuation.
+    Args:
+        positions: (n, 3) of the mesh's nodes, on the target [m].
+        touching: (n,) which of them lie on the target itself, not on its continuation.
     """
     stiffnesses = rod.bend_stiffnesses
     weak, strong = sorted(stiffnesses)
@@ -258,9 +250,8 @@ def section_rotation(shell: Shell, state: Floats) -> Floats | None:
     From 0 to pi/2, between the rod's first material director and the normal, both projected along the rod; None where
     rods have no directors, because they bend alike in all directions.
 
-    Parameters
-    ----------
-    state : (N, 3) of the shell, with the source frames there.
+    Args:
+        state: (N, 3) of the shell, with the source frames there.
     """
     mesh = shell.mesh
     frames = shell.frames

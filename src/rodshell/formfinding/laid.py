@@ -46,14 +46,12 @@ def lay(
 ) -> Draped:
     """Lay the rods of a lattice on a target along its curves; see `drape`.
 
-    Parameters
-    ----------
-    anchor : x, y of the point of the target from which the rods are set out [m]; default: its highest point.
+    Args:
+        anchor: x, y of the point of the target from which the rods are set out [m]; default: its highest point.
 
-    Raises
-    ------
-    NetLimitError : a curve does not reach the end of the target, or there is none; names the place.
-    InputError : no two rods cross; the joints are eccentric.
+    Raises:
+        NetLimitError: a curve does not reach the end of the target, or there is none; names the place.
+        InputError: no two rods cross; the joints are eccentric.
     """
     if joint is not None and joint.eccentricity:
         raise InputError(
@@ -119,9 +117,8 @@ def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
 def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progress = silent) -> FlatState:
     """The state of least bending in the plane that keeps the rods' lengths and joints.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes on the target [m], from whose plan the search starts.
+    Args:
+        positions: (n, 3) of the mesh's nodes on the target [m], from whose plan the search starts.
     """
     start = positions * [1.0, 1.0, 0.0]
     chords = np.linalg.norm(np.diff(start[mesh.edges], axis=1)[:, 0], axis=1)

@@ -49,10 +49,9 @@ def find_patched_stages(
     """Cut a target into patches, lay their rods such that they meet, drape each, and pop up all as one shell; see
     `rodshell.find_form`.
 
-    Parameters
-    ----------
-    patch_layouts : settings of single patches, by name.
-    warm_start, same_drape : as in `find_stages`; patches are matched by their names.
+    Args:
+        patch_layouts: settings of single patches, by name.
+        warm_start, same_drape: as in `find_stages`; patches are matched by their names.
     """
     layout, supports = require_chebyshev(layout, "seams"), supports_of(ends)
     names = tuple(support.name for support in supports)
@@ -93,9 +92,8 @@ def best_heading(
 ) -> float:
     """The heading at the target's summit [rad] that leaves out the smallest share of the rods; a few are tried.
 
-    Raises
-    ------
-    RodshellError : every heading fails; the error is that of the first heading.
+    Raises:
+        RodshellError: every heading fails; the error is that of the first heading.
     """
     layout, shares, reasons = require_chebyshev(layout, "seams"), dict[float, float](), list[RodshellError]()
     for heading in HEADINGS:
@@ -143,11 +141,10 @@ def _layout_of(patch: Patch, layout: GridLayout, overrides: PatchLayout) -> Grid
 def cut_with_ends(draped: Draped, end_points: Mapping[tuple[str, int], Floats]) -> Trimmed:
     """Trim a draped grid, and move the rod ends at seams to the points where they meet others.
 
-    Parameters
-    ----------
-    draped : a grid on its patch.
-    end_points : (3,) the point of each of these ends, by rod and side [m]; the ends of rods in layers are put above or
-        below it.
+    Args:
+        draped: a grid on its patch.
+        end_points: (3,) the point of each of these ends, by rod and side [m]; the ends of rods in layers are put above
+            or below it.
     """
     trimmed = trim(draped, fewest=FEWEST)
     mesh, positions = trimmed.mesh, trimmed.positions.copy()

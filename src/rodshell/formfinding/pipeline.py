@@ -46,12 +46,11 @@ from rodshell.validation import instance
 class Agreement:
     """Distance between rods and target, over nodes and the middles of edges; of rods in layers from their own layer.
 
-    Parameters
-    ----------
-    gaps : (n,) signed distance of each node, positive outside [m].
-    max, rms : of all nodes and edge middles [m].
-    where : the point of the rods with the largest distance [m].
-    size : the target's size, by which the relative figures are divided [m].
+    Args:
+        gaps: (n,) signed distance of each node, positive outside [m].
+        max, rms: of all nodes and edge middles [m].
+        where: the point of the rods with the largest distance [m].
+        size: the target's size, by which the relative figures are divided [m].
     """
 
     gaps: Floats
@@ -130,17 +129,16 @@ def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type:
 class Stages:
     """Every stage of one shell: of one grid, of several that are joined at seams, or of a table of rods.
 
-    Parameters
-    ----------
-    name : of a patch of a form; else "".
-    rod, joint, ends : as they were given; `ends` are the requested end conditions.
-    footprint : the flat grids, ready to be cut; of several patches in a row.
-    boundary : where the rod ends go.
-    dropped : rods that are not built, with the reason.
-    lying : the draped grid, cut to its target; None for a table of rods, and for several patches.
-    popped, agreement : by end condition; missing where an earlier stage did not converge.
-    patches : the stages of each patch by its name, its shells being parts of the whole; none of a single grid.
-    seams : how the patches are joined; None for a single grid.
+    Args:
+        name: of a patch of a form; else "".
+        rod, joint, ends: as they were given; `ends` are the requested end conditions.
+        footprint: the flat grids, ready to be cut; of several patches in a row.
+        boundary: where the rod ends go.
+        dropped: rods that are not built, with the reason.
+        lying: the draped grid, cut to its target; None for a table of rods, and for several patches.
+        popped, agreement: by end condition; missing where an earlier stage did not converge.
+        patches: the stages of each patch by its name, its shells being parts of the whole; none of a single grid.
+        seams: how the patches are joined; None for a single grid.
     """
 
     name: str
@@ -170,9 +168,8 @@ class Stages:
     def trimmed(self) -> Trimmed:
         """The draped grid cut to its target.
 
-        Raises
-        ------
-        InputError : this is a table of rods, or there are several patches.
+        Raises:
+            InputError: this is a table of rods, or there are several patches.
         """
         if self.patches:
             raise InputError(f"this form has {len(self.patches)} patches: take patches[k].draped or .trimmed")
@@ -290,12 +287,12 @@ def find_stages(
 ) -> Stages:
     """Drape, trim, map back, pop up and compare; see `rodshell.find_form`.
 
-    Parameters
-    ----------
-    warm_start : stages found before, from whose net and shells the new ones start.
-    same_drape : whether nothing that the drape depends on has changed since: then drape and footprint of `warm_start`
-        are taken over, and so are its pop-ups with the same ends, except those that a time limit stopped.
-    cut : how the draped shell is trimmed.
+    Args:
+        warm_start: stages found before, from whose net and shells the new ones start.
+        same_drape: whether nothing that the drape depends on has changed since: then drape and footprint of
+            `warm_start` are taken over, and so are its pop-ups with the same ends, except those that a time limit
+            stopped.
+        cut: how the draped shell is trimmed.
     """
     supports = supports_of(ends)
     require_joint(joint)
@@ -320,9 +317,8 @@ def with_pop_ups(stages: Stages, supports: Sequence[Support], earlier: Stages | 
 
     Where the drape of a patch did not converge the others are popped up alone.
 
-    Parameters
-    ----------
-    earlier : whose finished pop-ups are taken over where the grids lie as before, and are first guesses elsewhere.
+    Args:
+        earlier: whose finished pop-ups are taken over where the grids lie as before, and are first guesses elsewhere.
     """
     if not all(part.draped.converged for part in stages.parts):
         each = {name: with_pop_ups(patch, supports, None, progress) for name, patch in stages.patches.items()}
@@ -371,11 +367,10 @@ def popped_again(
 ) -> Stages:
     """The form of another flat grid on the same target: popped up and compared.
 
-    Parameters
-    ----------
-    form : whose target, rods and joints are kept.
-    footprint, boundary : the other grid, and where its rod ends go.
-    ends : the only end condition of the other form.
+    Args:
+        form: whose target, rods and joints are kept.
+        footprint, boundary: the other grid, and where its rod ends go.
+        ends: the only end condition of the other form.
     """
     support = form.popped[ends].support if ends in form.popped else ends
     popped = pop_up(footprint, boundary, form.rod, ends=support, joint=form.joint, progress=progress)
@@ -388,9 +383,8 @@ def popped_again(
 def meshed_again(form: Stages, ends: Ends) -> Stages:
     """The same rods on a new mesh with the same longest edge, popped up from the shape that they had.
 
-    Parameters
-    ----------
-    form : of a target, with a pop-up.
+    Args:
+        form: of a target, with a pop-up.
     """
     old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
     mesh, normals = mesh_grid(old.grid, form.layout.longest_edge), None
@@ -417,15 +411,13 @@ def pop_up_stages(
 ) -> Stages:
     """Pop up rods given by their flat lines and the final positions of their ends.
 
-    Parameters
-    ----------
-    finals : (m, 2, 3) where the two ends of each rod of `grid` go [m].
-    joint : the connection of rods where they cross, without eccentricity; ball joints by default.
-    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+    Args:
+        finals: (m, 2, 3) where the two ends of each rod of `grid` go [m].
+        joint: the connection of rods where they cross, without eccentricity; ball joints by default.
+        edge: longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
 
-    Raises
-    ------
-    InputError : no rod has three joints; the joint is eccentric.
+    Raises:
+        InputError: no rod has three joints; the joint is eccentric.
     """
     require_joint(joint)
     joint = joint or Ball()

@@ -55,13 +55,12 @@ NEARBY = 0.1  # of the length: a state further from the guess may be another equ
 class PopUp:
     """The popped-up shell, and how it was found.
 
-    Parameters
-    ----------
-    support, start : what holds the rods' ends, and where the solve started from.
-    footprint, boundary : as they were given, in layers where joints are eccentric.
-    shell : the mechanical model, its source frames being at the equilibrium.
-    equilibrium : with the ends held where they are; its report counts the work of all solves on the way.
-    alone : of grids side by side the shell of each; of one grid none.
+    Args:
+        support, start: what holds the rods' ends, and where the solve started from.
+        footprint, boundary: as they were given, in layers where joints are eccentric.
+        shell: the mechanical model, its source frames being at the equilibrium.
+        equilibrium: with the ends held where they are; its report counts the work of all solves on the way.
+        alone: of grids side by side the shell of each; of one grid none.
     """
 
     support: Support
@@ -132,28 +131,27 @@ def pop_up(
     Grids that lie side by side are one shell. From flat, and where all together are not stable, each is popped up
     alone, so that what becomes of one does not depend on the others.
 
-    Parameters
-    ----------
-    ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp); or a
-        support of your own, which lets go of the ends once the shell has popped up.
-    start : "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
-        flat grid, which leaves its plane to the side that the boundary's directions point away from (without
-        directions to that of +z), then turns the clamps.
-    warm_start : a shell popped up before with the same ends, for start="draped": the displacements and axial forces
-        that it had on the same rods are the first guess. Where that does not lead to a stable state nearby, the
-        draped state is used.
-    joint : the connection of rods where they cross: one joint for all crossings, or a sequence with one for each;
-        ball joints by default. Eccentric joints place the rods in two layers: each rod starts on its own line, half
-        of their distance above or below the draped surface, and the boundary's ends lie there.
-    like : a pop-up of the same footprint, such as with other ends. Where its matrices have the same pattern they are
-        not analysed again, which saves time and changes nothing else.
-    most_factorizations : with start="flat", about how many each path (of the ends, and of the clamps) may take before
-        it is given up; None: no such limit, and a path that Newton's method loses is followed in short steps.
+    Args:
+        ends: "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp); or a
+            support of your own, which lets go of the ends once the shell has popped up.
+        start: "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
+            flat grid, which leaves its plane to the side that the boundary's directions point away from (without
+            directions to that of +z), then turns the clamps.
+        warm_start: a shell popped up before with the same ends, for start="draped": the displacements and axial forces
+            that it had on the same rods are the first guess. Where that does not lead to a stable state nearby, the
+            draped state is used.
+        joint: the connection of rods where they cross: one joint for all crossings, or a sequence with one for each;
+            ball joints by default. Eccentric joints place the rods in two layers: each rod starts on its own line, half
+            of their distance above or below the draped surface, and the boundary's ends lie there.
+        like: a pop-up of the same footprint, such as with other ends. Where its matrices have the same pattern they are
+            not analysed again, which saves time and changes nothing else.
+        most_factorizations: with start="flat", about how many each path (of the ends, and of the clamps) may take
+            before it is given up; None: no such limit, and a path that Newton's method loses is followed in short
+            steps.
 
-    Raises
-    ------
-    InputError : an argument of the wrong kind; `start` is "draped" and the boundary has no draped state; `warm_start`
-        has other ends, or comes with start="flat"; the joints do not fit the grid.
+    Raises:
+        InputError: an argument of the wrong kind; `start` is "draped" and the boundary has no draped state;
+            `warm_start` has other ends, or comes with start="flat"; the joints do not fit the grid.
     """
     support = support_of(ends)
     choice("start", start, STARTS)
@@ -462,14 +460,12 @@ def turned(now: Floats, goal: Floats, t: float) -> Floats:
 def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
     """Each flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
 
-    Parameters
-    ----------
-    points : (2m, 3) where both ends of each rod in turn are to go [m].
-    height : of the plane [m].
+    Args:
+        points: (2m, 3) where both ends of each rod in turn are to go [m].
+        height: of the plane [m].
 
-    Returns
-    -------
-    (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
+    Returns:
+        (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
     """
     laid = np.empty_like(mesh.flat)
     for k, motion in enumerate(_motions(mesh, points)):

@@ -42,9 +42,8 @@ ALONE = "it ends on a seam where no rod of the next patch can meet it"
 def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
     """The patches by their names A, B, ..., from left to right.
 
-    Raises
-    ------
-    InputError : the seams cut off nothing, or there are more patches than letters.
+    Raises:
+        InputError: the seams cut off nothing, or there are more patches than letters.
     """
     creased = target if isinstance(target, Creased) else None
     seams = creased.seams if creased else seams
@@ -191,12 +190,12 @@ class PatchNet:
 class Seams:
     """How the patches of a target are joined.
 
-    Parameters
-    ----------
-    target, layout : of the whole.
-    nets : the rods of each patch, by its name.
-    meetings : where rods of two patches end at one point.
-    moved : of each patch the largest distance between a rod end of its mesh and that point, to which it was moved [m].
+    Args:
+        target, layout: of the whole.
+        nets: the rods of each patch, by its name.
+        meetings: where rods of two patches end at one point.
+        moved: of each patch the largest distance between a rod end of its mesh and that point, to which it was moved
+            [m].
     """
 
     target: Target
@@ -266,10 +265,9 @@ def lay_patches(
 
     Rods that meet no other at a seam are left out, and so are those that would swing without them.
 
-    Parameters
-    ----------
-    patches, layouts, anchors : by the patches' names; anchors x, y [m], default the patch's middle.
-    eccentricity : see `chebyshev_net`; at a seam the points midway between the layers meet.
+    Args:
+        patches, layouts, anchors: by the patches' names; anchors x, y [m], default the patch's middle.
+        eccentricity: see `chebyshev_net`; at a seam the points midway between the layers meet.
     """
     patch_nets, waiting, meetings = dict[str, PatchNet](), list[_OpenEnd](), list[Meeting]()
     for name, patch in patches.items():

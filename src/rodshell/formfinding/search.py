@@ -85,16 +85,14 @@ def search(
 ) -> Search:
     """Try anchors and headings with a coarse grid.
 
-    Parameters
-    ----------
-    objective : "shear", the largest angle by which joints close or open from 90 degrees; "curvature", the largest
-        of any rod on the target [1/m]; "gap", rms of the clamped pop-up over the target's size.
-    anchors : points of the plan [m]; "auto": the default one and four around it.
-    headings : angles of family u against x [rad]; "auto": 0 to 75 degrees in steps of 15.
+    Args:
+        objective: "shear", the largest angle by which joints close or open from 90 degrees; "curvature", the largest
+            of any rod on the target [1/m]; "gap", rms of the clamped pop-up over the target's size.
+        anchors: points of the plan [m]; "auto": the default one and four around it.
+        headings: angles of family u against x [rad]; "auto": 0 to 75 degrees in steps of 15.
 
-    Raises
-    ------
-    InputError : no trial has a net; an unknown objective.
+    Raises:
+        InputError: no trial has a net; an unknown objective.
     """
     instance("target", target, Target)
     instance("layout", layout, Layout)

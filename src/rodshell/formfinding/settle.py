@@ -22,21 +22,18 @@ def settle(
 ) -> PopUp:
     """Let a popped-up shell come to rest with further energies, and with rod ends that may move.
 
-    Parameters
-    ----------
-    popped : the shell, in equilibrium.
-    energies : what acts on its nodes in addition to rods and joints: a `LocalEnergy`, or what has its methods.
-    free : directions (up to three, at right angles) along which rod ends may move, by the number of the end in
-        `footprint.points`: 2 i is the start of rod i, 2 i + 1 its end. A spring there is one of the energies.
+    Args:
+        popped: the shell, in equilibrium.
+        energies: what acts on its nodes in addition to rods and joints: a `LocalEnergy`, or what has its methods.
+        free: directions (up to three, at right angles) along which rod ends may move, by the number of the end in
+            `footprint.points`: 2 i is the start of rod i, 2 i + 1 its end. A spring there is one of the energies.
 
-    Returns
-    -------
-    The shell in its new equilibrium; `report.stable` says whether it stays there.
+    Returns:
+        The shell in its new equilibrium; `report.stable` says whether it stays there.
 
-    Raises
-    ------
-    InputError : there is no such end; its directions are not at right angles; a clamped end is to move; an energy names
-        a node that the shell has not.
+    Raises:
+        InputError: there is no such end; its directions are not at right angles; a clamped end is to move; an energy
+            names a node that the shell has not.
     """
     instance("popped", popped, PopUp, "what rodshell.pop_up returned")
     require_progress(progress)

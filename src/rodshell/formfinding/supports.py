@@ -25,10 +25,9 @@ def let_go(
 ) -> tuple[Shell, Equilibrium]:
     """A shell on its support.
 
-    Parameters
-    ----------
-    held : the equilibrium with the rods' ends held at `points` (2m, 3).
-    counting : makes a progress of what is done, and of how many iterations it takes at most.
+    Args:
+        held: the equilibrium with the rods' ends held at `points` (2m, 3).
+        counting: makes a progress of what is done, and of how many iterations it takes at most.
     """
     slides = slides_of(support, support.free(points), len(points))
     springs = energies_of(support.energies(shell.ends, points), shell.node_count)
@@ -42,9 +41,8 @@ def let_go(
 def at_rest(shell: Shell, near: Equilibrium, progress: Callable[[int, float], None]) -> tuple[Shell, Equilibrium]:
     """A shell in equilibrium with all its energies, its ends being free to slide where they can.
 
-    Parameters
-    ----------
-    near : the equilibrium of the same shell with other energies, or with its ends held.
+    Args:
+        near: the equilibrium of the same shell with other energies, or with its ends held.
     """
     problem = replace(near.problem, elements=shell.elements, constraint=Supports(shell.held_ends()))
     found = find_stable(problem, near.state, near.forces, limit_steps=True, progress=progress)
@@ -54,9 +52,8 @@ def at_rest(shell: Shell, near: Equilibrium, progress: Callable[[int, float], No
 def energies_of(given: object, nodes: int) -> tuple[Elements, ...]:
     """One or several energies of a shell with so many nodes.
 
-    Raises
-    ------
-    InputError : one is not an energy, or acts on a node that the shell has not.
+    Raises:
+        InputError: one is not an energy, or acts on a node that the shell has not.
     """
     added = (given,) if _is_energy(given) else tuple(listed("energies", given, _ENERGY))
     for energy in added:
@@ -74,9 +71,8 @@ def _is_energy(given: object) -> TypeGuard[Elements]:
 def slides_of(support: Support, free: object, ends: int) -> dict[int, tuple[Direction, ...]]:
     """Directions along which some of so many rod ends may move, by the number of the end.
 
-    Raises
-    ------
-    InputError : there is no such end; its directions are not at right angles; the support holds directions.
+    Raises:
+        InputError: there is no such end; its directions are not at right angles; the support holds directions.
     """
     slides = dict[int, tuple[Direction, ...]]()
     for end, directions in mapping("free", free, "directions by the number of the rod end").items():

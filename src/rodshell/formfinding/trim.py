@@ -24,12 +24,11 @@ FEWEST_JOINTS = 3  # a rod with fewer swings about the line through its joints
 class Boundary:
     """The final boundary G: where the rod ends go.
 
-    Parameters
-    ----------
-    points : (2m, 3), start and end of each rod's own line in turn [m].
-    tangents : (2m, 3) outward unit tangents of the draped rods there: the directions of clamps.
-    draped : (n, 3) the state of the whole trimmed shell that has these ends, or None [m].
-    normals : (n, 3) of the surface at the draped nodes, where rods lie in layers or along its curves; else None.
+    Args:
+        points: (2m, 3), start and end of each rod's own line in turn [m].
+        tangents: (2m, 3) outward unit tangents of the draped rods there: the directions of clamps.
+        draped: (n, 3) the state of the whole trimmed shell that has these ends, or None [m].
+        normals: (n, 3) of the surface at the draped nodes, where rods lie in layers or along its curves; else None.
     """
 
     points: Floats
@@ -66,9 +65,8 @@ class Boundary:
 class Footprint:
     """The trimmed grid, flat: its rods end on the footprint G0.
 
-    Parameters
-    ----------
-    mesh : of the m trimmed rods.
+    Args:
+        mesh: of the m trimmed rods.
     """
 
     mesh: GridMesh
@@ -94,11 +92,10 @@ class Footprint:
 class Trimmed:
     """The draped grid without its overhangs.
 
-    Parameters
-    ----------
-    mesh : of the trimmed rods; rods in layers have separate nodes in it, each on its own line.
-    positions : (n, 3) of its nodes [m].
-    dropped : names of the rods that are left out, each with the reason.
+    Args:
+        mesh: of the trimmed rods; rods in layers have separate nodes in it, each on its own line.
+        positions: (n, 3) of its nodes [m].
+        dropped: names of the rods that are left out, each with the reason.
     """
 
     draped: Draped
@@ -114,14 +111,13 @@ class Trimmed:
 def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     """Cut every rod at the target's end and drop the rods that cannot be built or would swing [HQK 3.2].
 
-    Parameters
-    ----------
-    draped : a grid lying on its target.
-    fewest : number of joints from which a rod does not swing.
+    Args:
+        draped: a grid lying on its target.
+        fewest: number of joints from which a rod does not swing.
 
-    Raises
-    ------
-    InputError : `draped` is of another kind; no rod is left, or a hanging rod is too short to reach the target's end.
+    Raises:
+        InputError: `draped` is of another kind; no rod is left, or a hanging rod is too short to reach the target's
+            end.
     """
     instance("draped", draped, Draped, "what rodshell.drape returned")
     whole("fewest", fewest, 0)
@@ -156,9 +152,8 @@ def in_layers(footprint: Footprint, boundary: Boundary, eccentricity: float) -> 
 
     Without a draped state the boundary's points are already the ends of the rods' own lines.
 
-    Parameters
-    ----------
-    eccentricity : distance of the layers [m].
+    Args:
+        eccentricity: distance of the layers [m].
     """
     mesh, draped = footprint.mesh, boundary.draped
     if draped is None:
@@ -204,9 +199,8 @@ def ends_past_net(trimmed: Trimmed) -> Floats | None:
 def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     """(2m, 3) outward unit tangents at start and end of each rod in turn, to second order from the last two edges.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes [m].
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
     """
     return unit(_end_tangents(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
 

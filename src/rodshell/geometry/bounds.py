@@ -9,9 +9,8 @@ def bounds(points: Floats) -> tuple[Floats, Floats]:
     """Lowest and highest coordinates (d,), (d,) of points; coordinate by coordinate, for which NumPy takes a twentieth
     of the time of `points.min(axis=0)`.
 
-    Parameters
-    ----------
-    points : (n, d) one or more.
+    Args:
+        points: (n, d) one or more.
     """
     columns = np.ascontiguousarray(points.T)
     return columns.min(axis=1), columns.max(axis=1)

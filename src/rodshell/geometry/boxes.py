@@ -14,9 +14,8 @@ Corners = Sequence[tuple[float, float]]
 def boxes_meet(box: Floats, others: Iterable[Floats]) -> bool:
     """Whether the rectangle (4, 2) covers a part of one of the others.
 
-    Parameters
-    ----------
-    box : (4, 2) corners in a row; others : the same of each.
+    Args:
+        box: (4, 2) corners in a row; others : the same of each.
     """
     corners = box.tolist()
     return any(not _apart(corners, other.tolist()) for other in others)
@@ -35,9 +34,8 @@ def _apart(box: Corners, other: Corners) -> bool:
 def lines_meet(box: Floats, lines: Floats) -> bool:
     """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2): no axis separates them.
 
-    Parameters
-    ----------
-    box : (4, 2) corners in a row; lines : (m, 2, 2) ends.
+    Args:
+        box: (4, 2) corners in a row; lines : (m, 2, 2) ends.
     """
     return bool(each_meets(box[None], lines[None])[0])
 
@@ -48,9 +46,8 @@ def each_meets(boxes, lines):  # type: ignore[no-untyped-def]
 
     In coordinates along its sides each rectangle is the square from -1 to 1.
 
-    Parameters
-    ----------
-    boxes : (n, 4, 2) corners of each in a row; lines : (n, m, 2, 2) ends of its m lines.
+    Args:
+        boxes: (n, 4, 2) corners of each in a row; lines : (n, m, 2, 2) ends of its m lines.
     """
     met = np.zeros(len(boxes), dtype=np.bool_)
     for n in range(len(boxes)):
@@ -72,9 +69,8 @@ def each_meets(boxes, lines):  # type: ignore[no-untyped-def]
 def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:
     """(k,) length of all lines together that is within the rectangle where it is after each shift.
 
-    Parameters
-    ----------
-    box : (4, 2) corners in a row; shifts : (k, 2) of it; lines : (m, 2, 2) ends.
+    Args:
+        box: (4, 2) corners in a row; shifts : (k, 2) of it; lines : (m, 2, 2) ends.
     """
     corners = (box + shifts[:, None]).reshape(-1, 2)
     lines = lines_near(lines, corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf))
@@ -93,9 +89,8 @@ def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:
 def lines_near(lines: Floats, low: Floats, high: Floats) -> Floats:
     """Those of the lines (m, 2, 2) that may come into a rectangle.
 
-    Parameters
-    ----------
-    lines : (m, 2, 2) ends; low, high : (2,) lower left and upper right corner of the rectangle.
+    Args:
+        lines: (m, 2, 2) ends; low, high : (2,) lower left and upper right corner of the rectangle.
     """
     a, b = lines[:, 0], lines[:, 1]
     near = (np.minimum(a, b) < high) & (np.maximum(a, b) > low)

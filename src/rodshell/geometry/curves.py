@@ -14,15 +14,13 @@ TOUCH = 1e-6  # of the extent of all polylines: ends this close are joined
 def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
     """Interpolate with polynomials, one for each requested point.
 
-    Parameters
-    ----------
-    knots : (n, p), parameters at which each polynomial is known [m].
-    points : (n, p, d), its values there.
-    s : (n,) requested parameters [m].
+    Args:
+        knots: (n, p), parameters at which each polynomial is known [m].
+        points: (n, p, d), its values there.
+        s: (n,) requested parameters [m].
 
-    Returns
-    -------
-    (n, d) values at `s`.
+    Returns:
+        (n, d) values at `s`.
     """
     result = np.empty((points.shape[0], points.shape[2]))
     for n in range(len(s)):
@@ -50,15 +48,13 @@ def on_curve(knots: Floats, points: Floats, s: Floats) -> Floats:
 
     In each interval the cubic goes through the four nearest knots, or through all if there are fewer.
 
-    Parameters
-    ----------
-    knots : (m,) ascending parameters [m].
-    points : (m, 3) points of the curve there [m].
-    s : (n,) requested parameters [m].
+    Args:
+        knots: (m,) ascending parameters [m].
+        points: (m, 3) points of the curve there [m].
+        s: (n,) requested parameters [m].
 
-    Returns
-    -------
-    (n, 3) points of the curve at `s` [m].
+    Returns:
+        (n, 3) points of the curve at `s` [m].
     """
     return np.asarray(_on_curve(knots, np.ascontiguousarray(points), s))
 
@@ -80,18 +76,16 @@ def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
 def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: float) -> Floats:
     """Interpolate m lines with common knots, as `on_curve` does.
 
-    Parameters
-    ----------
-    knots : (k,) ascending parameters of all lines [m].
-    points : (k, m, 3) points of the lines [m]; NaN where a line is not known. Of each line the run of known points
-        around `origin` is used.
-    origin : index of the knot around which the lines are known.
-    s : (n,) requested parameters [m].
-    beyond : the cubics are continued past the known points by this many steps of the knots.
+    Args:
+        knots: (k,) ascending parameters of all lines [m].
+        points: (k, m, 3) points of the lines [m]; NaN where a line is not known. Of each line the run of known points
+            around `origin` is used.
+        origin: index of the knot around which the lines are known.
+        s: (n,) requested parameters [m].
+        beyond: the cubics are continued past the known points by this many steps of the knots.
 
-    Returns
-    -------
-    (m, n, 3) points [m]; NaN further away from the known points.
+    Returns:
+        (m, n, 3) points [m]; NaN further away from the known points.
     """
     count, lines, spare, most = len(knots), points.shape[1], len(s), min(4, len(knots))
     result = np.empty((lines, len(s), 3))
@@ -168,13 +162,11 @@ def _right_of(knots, at):  # type: ignore[no-untyped-def]
 def closed_loops(strokes: Iterable[Floats]) -> list[Floats]:
     """Join polylines end to end into closed loops; those that stay open are left out.
 
-    Parameters
-    ----------
-    strokes : polylines (n, 3) in any order and direction [m].
+    Args:
+        strokes: polylines (n, 3) in any order and direction [m].
 
-    Returns
-    -------
-    Loops (n, 3), the longest first; the first point is not repeated at the end.
+    Returns:
+        Loops (n, 3), the longest first; the first point is not repeated at the end.
     """
     loops = [line[:-1] for line in join_end_to_end(strokes) if len(line) > 3 and np.array_equal(line[0], line[-1])]
     return sorted(loops, key=lambda x: -float(np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1).sum()))
@@ -183,13 +175,11 @@ def closed_loops(strokes: Iterable[Floats]) -> list[Floats]:
 def join_end_to_end(strokes: Iterable[Floats]) -> list[Floats]:
     """Join polylines whose ends touch.
 
-    Parameters
-    ----------
-    strokes : polylines (n, 3) in any order and direction [m].
+    Args:
+        strokes: polylines (n, 3) in any order and direction [m].
 
-    Returns
-    -------
-    Polylines (n, 3); a closed polyline ends with its first point.
+    Returns:
+        Polylines (n, 3); a closed polyline ends with its first point.
     """
     given = list(strokes)
     if not given:

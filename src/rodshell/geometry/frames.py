@@ -61,14 +61,12 @@ def parallel_transport(vectors: Floats, start: Floats, end: Floats) -> Floats:
     It consists of two reflections, which need neither an angle nor an axis. For opposite tangents the smallest rotation
     is not unique, and the result is not finite.
 
-    Parameters
-    ----------
-    vectors : (..., 3) to be rotated.
-    start, end : (..., 3) unit tangents.
+    Args:
+        vectors: (..., 3) to be rotated.
+        start, end: (..., 3) unit tangents.
 
-    Returns
-    -------
-    (..., 3) the rotated vectors.
+    Returns:
+        (..., 3) the rotated vectors.
     """
     middle = start + end
     share = dot(middle, vectors) / (1.0 + dot(start, end))
@@ -78,14 +76,12 @@ def parallel_transport(vectors: Floats, start: Floats, end: Floats) -> Floats:
 def adapted(directors: Floats, tangents: Floats) -> Floats:
     """Make directors perpendicular to tangents, and scale them to length 1.
 
-    Parameters
-    ----------
-    directors : (..., 3).
-    tangents : (..., 3) unit vectors.
+    Args:
+        directors: (..., 3).
+        tangents: (..., 3) unit vectors.
 
-    Raises
-    ------
-    InputError : a director is parallel to its tangent, or zero.
+    Raises:
+        InputError: a director is parallel to its tangent, or zero.
     """
     across = directors - dot(directors, tangents)[..., None] * tangents
     flat = np.linalg.norm(across, axis=-1) <= _ALONG * np.linalg.norm(directors, axis=-1)
@@ -99,14 +95,12 @@ def adapted(directors: Floats, tangents: Floats) -> Floats:
 def directors_along(tangents: Floats, first: Floats) -> Floats:
     """Transport a director in parallel along a rod: a frame without twist.
 
-    Parameters
-    ----------
-    tangents : (n, 3) unit tangents of the rod's edges, in their order.
-    first : (3,) director of the first edge; its part perpendicular to the edge is used.
+    Args:
+        tangents: (n, 3) unit tangents of the rod's edges, in their order.
+        first: (3,) director of the first edge; its part perpendicular to the edge is used.
 
-    Returns
-    -------
-    (n, 3) unit directors.
+    Returns:
+        (n, 3) unit directors.
     """
     with np.errstate(divide="ignore"):
         weights = 1.0 / (1.0 + dot(tangents[:-1], tangents[1:]))
@@ -122,13 +116,11 @@ def directors_along(tangents: Floats, first: Floats) -> Floats:
 def signed_angle(start: Floats, end: Floats, axis: Floats) -> Floats:
     """Signed angles between vectors, about an axis.
 
-    Parameters
-    ----------
-    start, end : (..., 3) vectors perpendicular to the axis.
-    axis : (..., 3) unit vectors.
+    Args:
+        start, end: (..., 3) vectors perpendicular to the axis.
+        axis: (..., 3) unit vectors.
 
-    Returns
-    -------
-    (...) angles from `start` to `end` in (-pi, pi] [rad].
+    Returns:
+        (...) angles from `start` to `end` in (-pi, pi] [rad].
     """
     return np.asarray(np.arctan2(dot(axis, cross(start, end)), dot(start, end)))

@@ -16,10 +16,9 @@ def near_pairs(points: Floats, radius: float) -> Ints:
     Cells are at least as wide as the radius, so that a near point lies in the same cell or in one of its neighbours;
     those above each other have consecutive numbers and are searched as one.
 
-    Parameters
-    ----------
-    points : (n, 3) coordinates [m].
-    radius : largest distance [m], positive.
+    Args:
+        points: (n, 3) coordinates [m].
+        radius: largest distance [m], positive.
     """
     if len(points) < 2:
         return np.empty((0, 2), dtype=np.intp)

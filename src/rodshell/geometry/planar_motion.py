@@ -12,9 +12,8 @@ from rodshell.geometry.frames import cross
 class PlanarMotion:
     """A turn about the vertical, and a shift in plan.
 
-    Parameters
-    ----------
-    centre : (3,) which goes to `goal` (3,), both in plan [m]; turn : (2, 2), of rows x, y.
+    Args:
+        centre: (3,) which goes to `goal` (3,), both in plan [m]; turn : (2, 2), of rows x, y.
     """
 
     centre: Floats
@@ -25,9 +24,8 @@ class PlanarMotion:
     def onto(points: Floats, goals: Floats) -> "PlanarMotion":
         """The motion of the shortest paths in plan, in the least-squares sense: Procrustes' problem [Schönemann 1966].
 
-        Parameters
-        ----------
-        points : (n, 3) that move; goals : (n, 3) where each is to go [m].
+        Args:
+            points: (n, 3) that move; goals : (n, 3) where each is to go [m].
         """
         centre, goal = points.mean(axis=0), goals.mean(axis=0)
         a, b = (points - centre) * (1.0, 1.0, 0.0), (goals - goal) * (1.0, 1.0, 0.0)

@@ -33,12 +33,11 @@ from rodshell.validation import brief
 class RodNodes:
     """A mesh as its rods see it: *rod node* k is entry k of `mesh.rod_nodes`, a node as one of its rods has it.
 
-    Parameters
-    ----------
-    mesh : the mesh, its rods sharing their nodes at joints or lying in layers.
-    blocks : (k,) block of the state that holds each rod node: that of the mesh's node, or the rod's own where rods do
-        not share nodes.
-    first_angle : block of the first edge's twist angle; those of the other edges follow.
+    Args:
+        mesh: the mesh, its rods sharing their nodes at joints or lying in layers.
+        blocks: (k,) block of the state that holds each rod node: that of the mesh's node, or the rod's own where rods
+            do not share nodes.
+        first_angle: block of the first edge's twist angle; those of the other edges follow.
     """
 
     mesh: GridMesh
@@ -61,10 +60,9 @@ class RodNodes:
     def has_edge(self, rod_nodes: Ints, side: int) -> Bools:
         """Whether the rod has an edge before (side 0) or after (side 1) each of the `rod_nodes`.
 
-        Parameters
-        ----------
-        rod_nodes : (k,) indices of rod nodes.
-        side : 0 before, 1 after.
+        Args:
+            rod_nodes: (k,) indices of rod nodes.
+            side: 0 before, 1 after.
         """
         rods = self.rods[rod_nodes]
         limit = self.mesh.rod_start[rods] if side == 0 else self.mesh.rod_stop[rods] - 1
@@ -73,30 +71,27 @@ class RodNodes:
     def edge(self, rod_nodes: Ints, side: int) -> Ints:
         """Edge before (side 0) or after (side 1) each rod node, where there is one; edges are counted rod by rod.
 
-        Parameters
-        ----------
-        rod_nodes : (k,) indices of rod nodes.
-        side : 0 before, 1 after.
+        Args:
+            rod_nodes: (k,) indices of rod nodes.
+            side: 0 before, 1 after.
         """
         return np.asarray(rod_nodes - self.rods[rod_nodes] - (1 - side))
 
     def angle(self, rod_nodes: Ints, side: int) -> Ints:
         """Block of that edge's twist angle.
 
-        Parameters
-        ----------
-        rod_nodes : (k,) indices of rod nodes.
-        side : 0 before, 1 after.
+        Args:
+            rod_nodes: (k,) indices of rod nodes.
+            side: 0 before, 1 after.
         """
         return np.asarray(self.first_angle + self.edge(rod_nodes, side))
 
     def neighbour(self, rod_nodes: Ints, side: int) -> Ints:
         """Block of the node at that edge's other end.
 
-        Parameters
-        ----------
-        rod_nodes : (k,) indices of rod nodes.
-        side : 0 before, 1 after.
+        Args:
+            rod_nodes: (k,) indices of rod nodes.
+            side: 0 before, 1 after.
         """
         return np.asarray(self.blocks[rod_nodes + (1 if side else -1)])
 
@@ -139,10 +134,9 @@ T = TypeVar("T", bound=SectionElements)
 def edge_tangents(state: State, blocks: Ints, legs: Ints) -> Floats:
     """(m, l, 3) unit tangents at `state` (N, 3) of the edges `legs` (l, 4) of the joints on `blocks` (m, k).
 
-    Parameters
-    ----------
-    blocks : (m, k) nodes and twist angles of the joints.
-    legs : (l, 4) edges of each joint, see `Stencils`.
+    Args:
+        blocks: (m, k) nodes and twist angles of the joints.
+        legs: (l, 4) edges of each joint, see `Stencils`.
     """
     return unit(state[blocks[:, legs[:, 1]]] - state[blocks[:, legs[:, 0]]])
 
@@ -150,9 +144,8 @@ def edge_tangents(state: State, blocks: Ints, legs: Ints) -> Floats:
 def with_source(elements: T, state: State) -> T:
     """An energy of sections with its source frames moved to `state` (N, 3).
 
-    Parameters
-    ----------
-    state : (N, 3) the state of the new source frames.
+    Args:
+        state: (N, 3) the state of the new source frames.
     """
     tangents = edge_tangents(state, elements.blocks, elements.legs)
     directors = parallel_transport(elements.source_directors, elements.source_tangents, tangents)
@@ -180,9 +173,8 @@ class Stencils(NamedTuple):
 def stencils(rod_nodes: RodNodes, pairs: Ints) -> Iterator[Stencils]:
     """The joints between the rod nodes `pairs` (m, 2), set by set of those that are alike.
 
-    Parameters
-    ----------
-    pairs : (m, 2) rod nodes that meet, on the first and on the second rod.
+    Args:
+        pairs: (m, 2) rod nodes that meet, on the first and on the second rod.
     """
     sides = np.column_stack([rod_nodes.has_edge(pairs[:, rod], side) for rod in range(2) for side in range(2)])
     for pattern in np.unique(sides, axis=0):
@@ -210,15 +202,14 @@ def _stencil(rod_nodes: RodNodes, pairs: Ints, has_edge: Bools) -> tuple[Ints, I
 def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore[no-untyped-def]
     """Length of an edge; its tangent, material directors, spin w, and (source + t) / (1 + source.t).
 
-    Parameters
-    ----------
-    x : (N, 3) node positions [m] and twist angles [rad].
-    blocks : (k,) nodes and twist angles of the joint.
-    leg : (4,) the edge, see `Stencils`.
-    source, director : (3,) tangent and first director of the edge's source frame.
-    t, m1, m2 : (3,) filled with the unit tangent and the material directors.
-    w : (3,) filled with the spin of the frame by the edge vector [1/m].
-    half : (3,) filled with (source + t) / (1 + source.t).
+    Args:
+        x: (N, 3) node positions [m] and twist angles [rad].
+        blocks: (k,) nodes and twist angles of the joint.
+        leg: (4,) the edge, see `Stencils`.
+        source, director: (3,) tangent and first director of the edge's source frame.
+        t, m1, m2: (3,) filled with the unit tangent and the material directors.
+        w: (3,) filled with the spin of the frame by the edge vector [1/m].
+        half: (3,) filled with (source + t) / (1 + source.t).
     """
     square, both, along = 0.0, 1.0, 0.0
     for k in range(3):
@@ -247,12 +238,11 @@ def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore
 def by_edge(weight, length, t, m1, m2, w, jacobian):  # type: ignore[no-untyped-def]
     """(6, 4) derivatives of the edge's share of T and N by (e, theta); dm1 = -(m1.dt) t + m2 (dtheta - w.de).
 
-    Parameters
-    ----------
-    weight : share of the edge in its rod's section.
-    length : of the edge [m].
-    t, m1, m2, w : (3,) tangent, material directors and spin of the edge, see `frame`.
-    jacobian : (6, 4), filled; its rows are the components of T and N.
+    Args:
+        weight: share of the edge in its rod's section.
+        length: of the edge [m].
+        t, m1, m2, w: (3,) tangent, material directors and spin of the edge, see `frame`.
+        jacobian: (6, 4), filled; its rows are the components of T and N.
     """
     for i in range(3):
         for j in range(3):
@@ -270,13 +260,12 @@ def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ign
     As in `bend_twist`: first for a frame that does not spin, then the spin dtheta -> dtheta - w.de, then the
     symmetric part of the derivative of w; what is antisymmetric cancels.
 
-    Parameters
-    ----------
-    weight : share of the edge in its rod's section.
-    by_t, by_n : (3,) derivatives of the energy by T and N [J].
-    length : of the edge [m].
-    t, m1, m2, w, half : (3,) see `frame`.
-    local : (4, 4), to which is added, by the edge vector and the twist angle.
+    Args:
+        weight: share of the edge in its rod's section.
+        by_t, by_n: (3,) derivatives of the energy by T and N [J].
+        length: of the edge [m].
+        t, m1, m2, w, half: (3,) see `frame`.
+        local: (4, 4), to which is added, by the edge vector and the twist angle.
     """
     tt, nt, n1, n2 = 0.0, 0.0, 0.0, 0.0
     for k in range(3):
@@ -306,11 +295,10 @@ def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ign
 def spread(local, leg, other, hessian):  # type: ignore[no-untyped-def]
     """Add `local` (4, 4), by (e, theta) of two edges, to the rows and columns of their nodes and angles.
 
-    Parameters
-    ----------
-    local : (4, 4) second derivatives by the edge vector and twist angle of one edge (rows) and of another (columns).
-    leg, other : (4,) the edges of the rows and of the columns, see `Stencils`.
-    hessian : (3k, 3k) of the joint, to which is added.
+    Args:
+        local: (4, 4) second derivatives by the edge vector and twist angle of one edge (rows) and of another (columns).
+        leg, other: (4,) the edges of the rows and of the columns, see `Stencils`.
+        hessian: (3k, 3k) of the joint, to which is added.
     """
     for i in range(3):
         for j in range(3):
@@ -333,13 +321,12 @@ UP = (0.0, 0.0, 1.0)
 class Corners:
     """The corners of crossings in which linkers lie.
 
-    Parameters
-    ----------
-    blocks : (n, 5) outer node and twist angle of e, joint (on the rod of e), twist angle and outer node of f.
-    joints : (n, 2) block of the joint on the rod of e and on that of f: the same where they share it.
-    signs : (n, 2) -1 for a reversed edge.
-    lengths : (n,) Voronoi length of the corner: half of both edges [m].
-    rods : (n, 2) rod of e and of f.
+    Args:
+        blocks: (n, 5) outer node and twist angle of e, joint (on the rod of e), twist angle and outer node of f.
+        joints: (n, 2) block of the joint on the rod of e and on that of f: the same where they share it.
+        signs: (n, 2) -1 for a reversed edge.
+        lengths: (n,) Voronoi length of the corner: half of both edges [m].
+        rods: (n, 2) rod of e and of f.
     """
 
     blocks: Ints
@@ -354,10 +341,9 @@ class Corners:
     def of(rod_nodes: RodNodes, crossings: Ints, wanted: int) -> "Corners":
         """Corners of some crossings of the grid.
 
-        Parameters
-        ----------
-        crossings : (m,) their indices.
-        wanted : 2 for two opposite corners, as in the paper, or 4 for all; where a rod ends, all that there are.
+        Args:
+            crossings: (m,) their indices.
+            wanted: 2 for two opposite corners, as in the paper, or 4 for all; where a rod ends, all that there are.
         """
         pairs = rod_nodes.at_crossings[crossings]
         rows = []
@@ -390,11 +376,10 @@ class Corners:
 class LinkerBend:
     """Bends and twists of linkers. Build them with `of`.
 
-    Parameters
-    ----------
-    blocks : (n, 5) as in `BendTwist`.
-    signs : (n, 2) -1 where the twist angle belongs to the reversed edge.
-    bends : the same elements on separate rows, five each, with the signs of the linkers' angles.
+    Args:
+        blocks: (n, 5) as in `BendTwist`.
+        signs: (n, 2) -1 where the twist angle belongs to the reversed edge.
+        bends: the same elements on separate rows, five each, with the signs of the linkers' angles.
     """
 
     blocks: Ints
@@ -408,11 +393,10 @@ class LinkerBend:
     def of(corners: Corners, blocks: Ints, flat: Floats, stiffness: Floats) -> "LinkerBend":
         """Linkers at rest in the flat grid.
 
-        Parameters
-        ----------
-        blocks : (n, 5) their blocks: those of the corners, or copies of them.
-        flat : (N, 3) state of the flat grid [m].
-        stiffness : (n, 3) EI1, EI2 and GJ [N m2].
+        Args:
+            blocks: (n, 5) their blocks: those of the corners, or copies of them.
+            flat: (N, 3) state of the flat grid [m].
+            stiffness: (n, 3) EI1, EI2 and GJ [N m2].
         """
         rows = np.arange(5 * len(blocks)).reshape(-1, 5)
         per_length = stiffness / corners.lengths[:, None]

@@ -39,12 +39,11 @@ def elastic_joints(
 ) -> tuple[RelativeRotation, ...]:
     """The joints that resist some rotation, as elements.
 
-    Parameters
-    ----------
-    crossings : (m,) indices of the grid's crossings.
-    joints : m, the joint at each of them.
-    rod_stiffness : (k, 3) EI1, EI2 and GJ at each rod node [N m2].
-    size : number of blocks of the state.
+    Args:
+        crossings: (m,) indices of the grid's crossings.
+        joints: m, the joint at each of them.
+        rod_stiffness: (k, 3) EI1, EI2 and GJ at each rod node [N m2].
+        size: number of blocks of the state.
     """
     stiff = np.array([resists(joint) for joint in joints], dtype=bool)
     crossings, joints = crossings[stiff], [joint for joint, kept in zip(joints, stiff, strict=True) if kept]
@@ -174,14 +173,12 @@ def _bisectors(rod_nodes: RodNodes, pairs: Ints, directions: Floats) -> tuple[Fl
 def refuse_mixtures(node: Ints, joints: Sequence[Joint]) -> None:
     """Refuse nodes at which three rods or more meet with joints of different kinds.
 
-    Parameters
-    ----------
-    node : (c,) node of each crossing.
-    joints : c, the joint at each.
+    Args:
+        node: (c,) node of each crossing.
+        joints: c, the joint at each.
 
-    Raises
-    ------
-    InputError : there is such a node.
+    Raises:
+        InputError: there is such a node.
     """
     first: dict[int, Joint] = {}
     for joint_node, joint in zip(node.tolist(), joints, strict=True):

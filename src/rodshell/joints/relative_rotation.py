@@ -41,16 +41,15 @@ from rodshell.validation import brief
 class RelativeRotation:
     """Elastic joints between two rods, all with the same number of edges. Build them with `starting_at`.
 
-    Parameters
-    ----------
-    blocks : (m, k) the nodes and twist angles that a joint touches, each once.
-    legs : (l, 4) for each edge of a joint the columns of `blocks` of its first node, its second node and its twist
-        angle, and its rod: 0 for A, 1 for B. Edges run as they do in their rod.
-    weights : (m, l) share of each edge in its rod's section; those of a rod add up to 1.
-    stiffness : (m, 3, 3) of shear and the two tilts at rest, the shear apart from the tilts [N m].
-    deviators : (m, 2) complex, D_A and D_B by the axes of the tilts at rest [1/N m].
-    rest_angle : (m,) angle from TA to TB at rest [rad].
-    source_tangents, source_directors : (m, l, 3) t and d1 of each edge in its source frame.
+    Args:
+        blocks: (m, k) the nodes and twist angles that a joint touches, each once.
+        legs: (l, 4) for each edge of a joint the columns of `blocks` of its first node, its second node and its twist
+            angle, and its rod: 0 for A, 1 for B. Edges run as they do in their rod.
+        weights: (m, l) share of each edge in its rod's section; those of a rod add up to 1.
+        stiffness: (m, 3, 3) of shear and the two tilts at rest, the shear apart from the tilts [N m].
+        deviators: (m, 2) complex, D_A and D_B by the axes of the tilts at rest [1/N m].
+        rest_angle: (m,) angle from TA to TB at rest [rad].
+        source_tangents, source_directors: (m, l, 3) t and d1 of each edge in its source frame.
     """
 
     blocks: Ints
@@ -79,10 +78,9 @@ class RelativeRotation:
     ) -> Self:
         """Joints whose source frames are those of `state`.
 
-        Parameters
-        ----------
-        directors : (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for all.
-        blocks, legs, weights, stiffness, deviators, rest_angle : see the class.
+        Args:
+            directors: (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for all.
+            blocks, legs, weights, stiffness, deviators, rest_angle: see the class.
         """
         tangents = edge_tangents(state, blocks, legs)
         wanted = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, legs[:, 2]]]

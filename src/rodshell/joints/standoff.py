@@ -23,11 +23,11 @@ SIDES = np.kron([[0, 0, 1, 0, -1, 0], [0, 0, 0, 1, 0, -1]], np.eye(3))  # (a, b)
 class Standoffs:
     """Springs between nodes and places above crossings.
 
-    Parameters
-    ----------
-    blocks : (m, 6) nodes x, x_J, x_1, x_2, x_3, x_4; where a rod ends at the crossing, x_J stands for the node missing.
-    distances : (m,) d along the normal [m].
-    stiffness : (m,) C [N/m].
+    Args:
+        blocks: (m, 6) nodes x, x_J, x_1, x_2, x_3, x_4; where a rod ends at the crossing, x_J stands for the node
+            missing.
+        distances: (m,) d along the normal [m].
+        stiffness: (m,) C [N/m].
     """
 
     blocks: Ints

@@ -49,14 +49,12 @@ class _Penalty:
 
     ERRATA E7 to HQK Eqs 5, 6: C is a penalty stiffness, not a multiplier; "C1 = C2 = 1e6 EI" mixes N/m and N m/rad.
 
-    Parameters
-    ----------
-    C1 : stiffness of ties of nodes [N/m]; None: derived from the rods.
-    C2 : stiffness of ties of twist angles, which linkers have [N m/rad]; None: derived from the rods.
+    Args:
+        C1: stiffness of ties of nodes [N/m]; None: derived from the rods.
+        C2: stiffness of ties of twist angles, which linkers have [N m/rad]; None: derived from the rods.
 
-    Raises
-    ------
-    InputError : a stiffness is not a positive number.
+    Raises:
+        InputError: a stiffness is not a positive number.
     """
 
     C1: float | None = None
@@ -69,10 +67,9 @@ class _Penalty:
     def with_defaults(self, rod: Rod, edge: float) -> Self:
         """The same with the defaults for a rod filled in.
 
-        Parameters
-        ----------
-        rod : section and material of the rods.
-        edge : length of their edges [m].
+        Args:
+            rod: section and material of the rods.
+            edge: length of their edges [m].
         """
         nodes, angles = self._defaults(rod, edge)
         return replace(self, C1=self.C1 or nodes, C2=self.C2 or angles)
@@ -121,11 +118,10 @@ Coupling = SharedDofs | ImplicitPenalty | ExplicitPenalty
 class Ties:
     """Springs between pairs of blocks [HQK Eqs 5, 6]: E = C/2 |a - b|^2 of nodes and of twist angles.
 
-    Parameters
-    ----------
-    blocks : (t, 2) the two nodes, or the two twist angles, whose edges must coincide and have the same reference
-        frame (ERRATA E8 to Eq 6).
-    stiffness : (t,) C1 [N/m] of nodes, C2 [N m/rad] of twist angles.
+    Args:
+        blocks: (t, 2) the two nodes, or the two twist angles, whose edges must coincide and have the same reference
+            frame (ERRATA E8 to Eq 6).
+        stiffness: (t,) C1 [N/m] of nodes, C2 [N m/rad] of twist angles.
     """
 
     blocks: Ints
@@ -158,11 +154,10 @@ UP = np.array([0.0, 0.0, 1.0])
 class OffsetTie:
     """Springs between two rods' nodes; blocks, legs, weights and sources as of `RelativeRotation`.
 
-    Parameters
-    ----------
-    middles : (2,) columns of `blocks` of the joint's node on A and on B.
-    stiffness : (m,) C [N/m].
-    offsets : (m,) d [m].
+    Args:
+        middles: (2,) columns of `blocks` of the joint's node on A and on B.
+        stiffness: (m,) C [N/m].
+        offsets: (m,) d [m].
     """
 
     blocks: Ints
@@ -197,12 +192,11 @@ class OffsetTie:
 def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: Floats, size: int) -> list[OffsetTie]:
     """Ties of the eccentric crossings.
 
-    Parameters
-    ----------
-    rod_nodes : of the mesh, whose rods lie in layers.
-    eccentricity : (c,) of each crossing of the grid [m]; those with 0 have no such tie.
-    stiffness : (c,) C [N/m].
-    size : number of blocks of the state.
+    Args:
+        rod_nodes: of the mesh, whose rods lie in layers.
+        eccentricity: (c,) of each crossing of the grid [m]; those with 0 have no such tie.
+        stiffness: (c,) C [N/m].
+        size: number of blocks of the state.
     """
     eccentric = np.flatnonzero(eccentricity)
     if len(eccentric) == 0:

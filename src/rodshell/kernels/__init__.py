@@ -37,9 +37,8 @@ def njit(**options: object) -> Callable[[Kernel], Kernel]:
     """Declare a kernel: its machine code if it was compiled with the wheel, else what Numba makes of it when it is
     called.
 
-    Parameters
-    ----------
-    options : of numba.njit, such as error_model="numpy".
+    Args:
+        options: of numba.njit, such as error_model="numpy".
     """
 
     def declared(function: Kernel) -> Kernel:

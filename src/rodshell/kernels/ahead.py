@@ -12,10 +12,9 @@ from rodshell.kernels.table import KERNELS, OF_SOME_JOBS
 def compile_kernels(progress: Callable[[int, int], None], *, every: bool) -> int:
     """Compile the kernels that are not kept; how many they were.
 
-    Parameters
-    ----------
-    progress : called with how many of them are done, and how many there are.
-    every : those of some jobs as well, which Numba otherwise compiles at their first call.
+    Args:
+        progress: called with how many of them are done, and how many there are.
+        every: those of some jobs as well, which Numba otherwise compiles at their first call.
     """
     missing = [row for row in _rows(every) if not is_kept(*row)]
     for done, (kernel, arguments) in enumerate(missing):

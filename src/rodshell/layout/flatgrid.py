@@ -31,16 +31,15 @@ class FlatRod(NamedTuple):
     is measured from the middle of the layout. A rod of family "free" is given by its two ends, and s is measured from
     its first end.
 
-    Parameters
-    ----------
-    name : label such as "U09".
-    family : "u", "v" or "free".
-    offset : of the rod's line; 0 for a free one [m].
-    start, end : material coordinates of the ends [m].
-    origin : point of the rod's line at which s is 0 [m].
-    direction : unit vector along the rod.
-    virtual : whether the line only shapes the net and is not built.
-    profile : how its section changes along it; None: not at all.
+    Args:
+        name: label such as "U09".
+        family: "u", "v" or "free".
+        offset: of the rod's line; 0 for a free one [m].
+        start, end: material coordinates of the ends [m].
+        origin: point of the rod's line at which s is 0 [m].
+        direction: unit vector along the rod.
+        virtual: whether the line only shapes the net and is not built.
+        profile: how its section changes along it; None: not at all.
     """
 
     name: str
@@ -57,12 +56,11 @@ class FlatRod(NamedTuple):
     def u(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
         """A rod of family "u", along x.
 
-        Parameters
-        ----------
-        name : label such as "U09".
-        offset : y of the rod's line [m].
-        start, end : x of the ends [m].
-        virtual : whether the line only shapes the net and is not built.
+        Args:
+            name: label such as "U09".
+            offset: y of the rod's line [m].
+            start, end: x of the ends [m].
+            virtual: whether the line only shapes the net and is not built.
         """
         return FlatRod(name, "u", offset, start, end, (0.0, offset), (1.0, 0.0), virtual)
 
@@ -70,12 +68,11 @@ class FlatRod(NamedTuple):
     def v(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
         """A rod of family "v", along y.
 
-        Parameters
-        ----------
-        name : label such as "V09".
-        offset : x of the rod's line [m].
-        start, end : y of the ends [m].
-        virtual : whether the line only shapes the net and is not built.
+        Args:
+            name: label such as "V09".
+            offset: x of the rod's line [m].
+            start, end: y of the ends [m].
+            virtual: whether the line only shapes the net and is not built.
         """
         return FlatRod(name, "v", offset, start, end, (offset, 0.0), (0.0, 1.0), virtual)
 
@@ -91,9 +88,8 @@ class FlatRod(NamedTuple):
     def cut(self, start: float, end: float) -> "FlatRod":
         """The same rod with other ends.
 
-        Parameters
-        ----------
-        start, end : material coordinates of the new ends [m].
+        Args:
+            start, end: material coordinates of the new ends [m].
         """
         line = self.name, self.family, self.offset, start, end, self.origin, self.direction
         return FlatRod(*line, self.virtual, self.profile)
@@ -102,17 +98,14 @@ class FlatRod(NamedTuple):
 def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
     """Find the rods that pieces of rods belong to.
 
-    Parameters
-    ----------
-    pieces : rods, each of which is one of the whole rods or a piece of one.
+    Args:
+        pieces: rods, each of which is one of the whole rods or a piece of one.
 
-    Returns
-    -------
-    (m,) the index of the whole rod of each piece.
+    Returns:
+        (m,) the index of the whole rod of each piece.
 
-    Raises
-    ------
-    ValueError : a piece belongs to no rod.
+    Raises:
+        ValueError: a piece belongs to no rod.
     """
     on_line: dict[tuple[object, object], list[tuple[int, FlatRod]]] = {}
     for k, rod in enumerate(rods):
@@ -133,10 +126,9 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
 class Crossings:
     """Where rods cross. Two of these are equal if their content is.
 
-    Parameters
-    ----------
-    rods : (c, 2) indices of the two rods.
-    at : (c, 2) material coordinates on each of the two [m].
+    Args:
+        rods: (c, 2) indices of the two rods.
+        at: (c, 2) material coordinates on each of the two [m].
     """
 
     rods: Ints
@@ -174,11 +166,10 @@ class Crossings:
 class FlatGrid:
     """Straight rods and the crossings at which they are joined. Grids with the same content are equal.
 
-    Parameters
-    ----------
-    rods : straight rods: in the plane, or, where `passed` is given, each for itself.
-    crossings : of these rods; not all places where rods cross need be joined.
-    passed : where rods cross without a joint, or would if they were longer; None: where their lines do.
+    Args:
+        rods: straight rods: in the plane, or, where `passed` is given, each for itself.
+        crossings: of these rods; not all places where rods cross need be joined.
+        passed: where rods cross without a joint, or would if they were longer; None: where their lines do.
     """
 
     rods: tuple[FlatRod, ...]
@@ -194,14 +185,12 @@ class FlatGrid:
     def of(rods: Sequence[FlatRod], *, margin: float = 0.0) -> "FlatGrid":
         """Join rods wherever they cross.
 
-        Parameters
-        ----------
-        margin : crossings closer to an end of either rod are not joined [m].
+        Args:
+            margin: crossings closer to an end of either rod are not joined [m].
 
-        Raises
-        ------
-        InputError : something else is given; a rod's numbers are not finite, it has no direction, or does not end
-            behind its start.
+        Raises:
+            InputError: something else is given; a rod's numbers are not finite, it has no direction, or does not end
+                behind its start.
         """
         rods = listed("rods", rods, "a list of rodshell.FlatRod")
         refuse_too_many(len(rods))
@@ -235,14 +224,12 @@ class FlatGrid:
         """The grid of pieces of its rods, joined where these are; and which crossing (c,) of this grid each of its
         crossings is.
 
-        Parameters
-        ----------
-        pieces : each a rod of the grid, or a piece of it.
-        margin : crossings closer to an end of either piece are left out [m].
+        Args:
+            pieces: each a rod of the grid, or a piece of it.
+            margin: crossings closer to an end of either piece are left out [m].
 
-        Raises
-        ------
-        ValueError : a piece belongs to no rod.
+        Raises:
+            ValueError: a piece belongs to no rod.
         """
         whole, ends = whole_rods(self.rods, pieces), np.array([(piece.start, piece.end) for piece in pieces])
         slack = margin - 1e-9 * np.diff(ends).ravel()  # a crossing exactly at an end is a joint at that end
@@ -319,13 +306,11 @@ class FlatGrid:
     def with_profiles(self, profiles: Profile | Sequence[Profile | None] | None) -> "FlatGrid":
         """The same rods, whose sections change along them.
 
-        Parameters
-        ----------
-        profiles : the same for all rods, or one for each; None: the section does not change.
+        Args:
+            profiles: the same for all rods, or one for each; None: the section does not change.
 
-        Raises
-        ------
-        InputError : not as many profiles as rods.
+        Raises:
+            InputError: not as many profiles as rods.
         """
         each = profiles if isinstance(profiles, Sequence) else (profiles,) * len(self.rods)
         if len(each) != len(self.rods):
@@ -341,13 +326,11 @@ class FlatGrid:
     def without(self, leave_out: Callable[["FlatGrid"], Bools]) -> tuple["FlatGrid", list[str]]:
         """Remove rods repeatedly, until `leave_out` marks none.
 
-        Parameters
-        ----------
-        leave_out : marks the rods (m,) of a grid that are to be removed.
+        Args:
+            leave_out: marks the rods (m,) of a grid that are to be removed.
 
-        Returns
-        -------
-        The grid, and the names of the rods that were removed.
+        Returns:
+            The grid, and the names of the rods that were removed.
         """
         grid, names = self, list[str]()
         while (out := leave_out(grid)).any():
@@ -363,14 +346,12 @@ class FlatGrid:
 def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> FlatGrid:
     """Make a flat grid of straight rods, joined wherever they cross.
 
-    Parameters
-    ----------
-    ends : (m, 2, 2) the two end points of each rod in the plane [m].
-    names : m different labels; default "R01", "R02", ...
+    Args:
+        ends: (m, 2, 2) the two end points of each rod in the plane [m].
+        names: m different labels; default "R01", "R02", ...
 
-    Raises
-    ------
-    InputError : the ends are not finite numbers of that shape; a rod has no length or crosses no other; two overlap.
+    Raises:
+        InputError: the ends are not finite numbers of that shape; a rod has no length or crosses no other; two overlap.
     """
     try:
         points = np.asarray(ends, dtype=float)
@@ -472,13 +453,11 @@ def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> Ints:
     From the first rod of each connected part outwards, each rod gets the lowest layer in which it crosses no rod. Two
     families of rods get two layers; that of the first rod is the lower one.
 
-    Parameters
-    ----------
-    crossings : pairs of indices of rods that cross.
+    Args:
+        crossings: pairs of indices of rods that cross.
 
-    Returns
-    -------
-    (rods,) layer of each rod, 1 the lowest.
+    Returns:
+        (rods,) layer of each rod, 1 the lowest.
     """
     crossed: list[list[int]] = [[] for _ in range(rods)]
     for a, b in crossings:
@@ -499,9 +478,8 @@ def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> Ints:
 def sides(grid: FlatGrid) -> Floats:
     """Side of each rod (m,) of a grid in two layers: -1 for the lower layer, 1 for the upper.
 
-    Raises
-    ------
-    InputError : the rods need more than two layers, such as three that cross each other.
+    Raises:
+        InputError: the rods need more than two layers, such as three that cross each other.
     """
     layer = layers(len(grid.rods), grid.crossings.rods.tolist())
     if layer.max(initial=0) > 2:

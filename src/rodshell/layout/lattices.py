@@ -25,18 +25,17 @@ class Sized(Protocol):
 class SurfaceLattice(ABC):
     """Families of rods along curves of the target.
 
-    Parameters
-    ----------
-    spacing : between the rods of a family, where they cross the curve through the anchor from which they are set out
-        [m]: of the first family and of the others, or one length for all; "auto" for an eighth of the target's size.
-    edge : longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing.
-    rotate : angle of the first family against the target's x axis, in plan at the anchor [rad].
-    left_out : names of rods that are not built.
+    Args:
+        spacing: between the rods of a family, where they cross the curve through the anchor from which they are set out
+            [m]: of the first family and of the others, or one length for all; "auto" for an eighth of the target's
+            size.
+        edge: longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing.
+        rotate: angle of the first family against the target's x axis, in plan at the anchor [rad].
+        left_out: names of rods that are not built.
 
-    Raises
-    ------
-    InputError : a value of the wrong kind or not finite; a spacing or an edge that is not positive; an edge longer than
-        the spacing.
+    Raises:
+        InputError: a value of the wrong kind or not finite; a spacing or an edge that is not positive; an edge longer
+            than the spacing.
     """
 
     spacing: Annotated[LengthsOrAuto | float, "distance between neighbouring rods: one, or first,others"] = "auto"
@@ -55,9 +54,8 @@ class SurfaceLattice(ABC):
     def spacings(self) -> tuple[float, ...]:
         """Of each family [m].
 
-        Raises
-        ------
-        InputError : they are "auto", which `build` decides for a target.
+        Raises:
+            InputError: they are "auto", which `build` decides for a target.
         """
         if not isinstance(self.spacing, tuple):
             raise InputError('the spacing "auto" depends on the target: build(target) gives the lattice there')
@@ -112,10 +110,9 @@ class Geodesic(SurfaceLattice):
     """Laths that lie flat on the target, along geodesics, set out at equal arcs of a geodesic through the anchor that
     they cross at right angles. Developed, each lath is straight.
 
-    Parameters
-    ----------
-    families : 2, at right angles at the anchor, or 3, at 60 degrees; the third is shifted by half a spacing, so that
-        two laths meet at each crossing, not nearly three.
+    Args:
+        families: 2, at right angles at the anchor, or 3, at 60 degrees; the third is shifted by half a spacing, so that
+            two laths meet at each crossing, not nearly three.
     """
 
     families: Annotated[Whole, "number of families of laths, 2 or 3"] = 2

@@ -31,16 +31,15 @@ class GridMesh:
     Rods share one node at a joint, or are in two layers (`in_layers`). Two meshes are equal only if they are the same
     object.
 
-    Parameters
-    ----------
-    grid : the rods and joints that were meshed.
-    flat : (n, 3) node positions in the flat, unstressed state [m]; z = 0, or the height of the rod's layer.
-    rod_nodes : (k,) nodes of all rods, one rod after the other in the order of `grid.rods`.
-    rod_start : (m,) where each rod begins in `rod_nodes`.
-    stations : (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
-    joint_nodes : (c,) node of each of the grid's crossings, on its first rod.
-    second_nodes : (c,) the same on its second rod, where rods are in layers and share no nodes; None: the same node.
-    side_by_side : the grids that it consists of, in the order of their rods, nodes and crossings; empty: of one.
+    Args:
+        grid: the rods and joints that were meshed.
+        flat: (n, 3) node positions in the flat, unstressed state [m]; z = 0, or the height of the rod's layer.
+        rod_nodes: (k,) nodes of all rods, one rod after the other in the order of `grid.rods`.
+        rod_start: (m,) where each rod begins in `rod_nodes`.
+        stations: (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
+        joint_nodes: (c,) node of each of the grid's crossings, on its first rod.
+        second_nodes: (c,) the same on its second rod, where rods are in layers and share no nodes; None: the same node.
+        side_by_side: the grids that it consists of, in the order of their rods, nodes and crossings; empty: of one.
     """
 
     grid: FlatGrid
@@ -165,9 +164,8 @@ class GridMesh:
         """Of each entry of `rod_nodes` the crossings before and after it on its rod (k, 2), and how far it is on the
         way from the first to the second (k,), 0 to 1; before a rod's first crossing and past its last both are that.
 
-        Raises
-        ------
-        ValueError : some rod crosses no other.
+        Raises:
+            ValueError: some rod crosses no other.
         """
         if (self.grid.joint_counts() == 0).any():
             raise ValueError("a rod that crosses no other has nothing to interpolate between")
@@ -195,13 +193,11 @@ class GridMesh:
     def in_layers(self, eccentricity: float) -> "GridMesh":
         """The same rods in two layers; node k of the result is entry k of this mesh's `rod_nodes`.
 
-        Parameters
-        ----------
-        eccentricity : distance of the layers [m].
+        Args:
+            eccentricity: distance of the layers [m].
 
-        Raises
-        ------
-        InputError : the rods need more than two layers.
+        Raises:
+            InputError: the rods need more than two layers.
         """
         side, pairs = sides(self.grid)[self.rod_of], self.at_crossings
         flat = self.flat[self.rod_nodes]
@@ -227,14 +223,12 @@ class GridMesh:
     def prolong(self, positions: Floats, fine: "GridMesh", *, rods: Sequence[int] | None = None) -> Floats:
         """Interpolate positions on another mesh of the same rods, by local cubics along each rod.
 
-        Parameters
-        ----------
-        positions : (n, 3) of the nodes of this mesh [m].
-        rods : for each rod of `fine` the rod of this mesh that it is a part of; default: the same.
+        Args:
+            positions: (n, 3) of the nodes of this mesh [m].
+            rods: for each rod of `fine` the rod of this mesh that it is a part of; default: the same.
 
-        Returns
-        -------
-        (n, 3) positions of the nodes of `fine` [m].
+        Returns:
+            (n, 3) positions of the nodes of `fine` [m].
         """
         result = np.empty((fine.node_count, 3))
         for k, rod in enumerate(rods if rods is not None else range(len(self.rod_start))):
@@ -281,14 +275,12 @@ def _edges_and_bends(rod_nodes, rod_start, stations):  # type: ignore[no-untyped
 def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
     """Divide a flat grid into edges: each span between joints, and each end of a rod, into the fewest equal edges.
 
-    Parameters
-    ----------
-    edge : longest edge [m]; infinite: as few edges as possible.
-    marks : for each rod the material coordinates of further points that must be nodes [m].
+    Args:
+        edge: longest edge [m]; infinite: as few edges as possible.
+        marks: for each rod the material coordinates of further points that must be nodes [m].
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind; the edge is not positive; not as many marks as rods.
+    Raises:
+        InputError: a value is of the wrong kind; the edge is not positive; not as many marks as rods.
     """
     instance("grid", grid, FlatGrid)
     edge = positive("edge", edge, "m", infinite=True)
@@ -448,14 +440,12 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float = 0.0) ->
     Where a joint of the mesh is not in the part, because it is too close to an end, each rod keeps its own node, unless
     that would be so close to the end that it makes an edge far shorter and stiffer than the other edges.
 
-    Parameters
-    ----------
-    rods : pieces of its rods, cut at nodes.
-    margin : joints closer to an end of either rod are not in the part [m].
+    Args:
+        rods: pieces of its rods, cut at nodes.
+        margin: joints closer to an end of either rod are not in the part [m].
 
-    Returns
-    -------
-    The part, and its nodes (n,) in `mesh`.
+    Returns:
+        The part, and its nodes (n,) in `mesh`.
     """
     grid, joints = mesh.grid.cut(rods, margin=margin)
     index = whole_rods(mesh.grid.rods, rods)
@@ -511,10 +501,9 @@ def _cut(spans, rod_nodes, stations, crossings, crossing_nodes, node_count, limi
 def spans_along(mesh: GridMesh, ends: Floats, whole: Ints) -> Ints:
     """(m, 2) the first and the last entry of a mesh's `rod_nodes` on each piece of a rod.
 
-    Parameters
-    ----------
-    ends : (m, 2) material coordinates of start and end of each piece [m].
-    whole : (m,) the rod of the mesh that it belongs to.
+    Args:
+        ends: (m, 2) material coordinates of start and end of each piece [m].
+        whole: (m,) the rod of the mesh that it belongs to.
     """
     return np.asarray(_spans(mesh.rod_start[whole], mesh.rod_stop[whole] - 1, mesh.stations, ends))
 
@@ -543,14 +532,12 @@ def _usual_edges(mesh: GridMesh) -> Floats:
 def edge_counts(lengths: Floats, edge: float) -> Ints:
     """Number of equal edges into which lengths are divided.
 
-    Parameters
-    ----------
-    lengths : (n,) [m].
-    edge : longest edge, which may be exceeded by 1e-6 of it [m].
+    Args:
+        lengths: (n,) [m].
+        edge: longest edge, which may be exceeded by 1e-6 of it [m].
 
-    Returns
-    -------
-    (n,) the smallest possible numbers.
+    Returns:
+        (n,) the smallest possible numbers.
     """
     return np.maximum(1, np.ceil(lengths / edge - 1e-6)).astype(np.intp)
 
@@ -558,13 +545,11 @@ def edge_counts(lengths: Floats, edge: float) -> Ints:
 def side_by_side(meshes: Mapping[str, GridMesh], gap: float) -> GridMesh:
     """Grids in a row, each moved but not rotated and centred on the x axis, and the row on the origin.
 
-    Parameters
-    ----------
-    gap : between two grids [m].
+    Args:
+        gap: between two grids [m].
 
-    Returns
-    -------
-    Rods, nodes and joints of one grid after the other; rod U01 of grid A is A-U01.
+    Returns:
+        Rods, nodes and joints of one grid after the other; rod U01 of grid A is A-U01.
     """
     low = {name: mesh.flat[:, :2].min(axis=0) for name, mesh in meshes.items()}
     high = {name: mesh.flat[:, :2].max(axis=0) for name, mesh in meshes.items()}

@@ -17,9 +17,8 @@ def transferred_nodes(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
 
     Where two rods meet, the values transferred along them differ slightly: the mean is taken, without a kink in either.
 
-    Parameters
-    ----------
-    values : (m, d) at the m nodes of `mesh`, of any unit.
+    Args:
+        values: (m, d) at the m nodes of `mesh`, of any unit.
     """
     total, count = np.zeros((to.node_count, values.shape[1])), np.zeros((to.node_count, 1))
     along_rods = list[tuple[Ints, Floats, Floats]]()
@@ -39,9 +38,8 @@ def transferred_nodes(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
 def transferred_edges(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
     """(e,) values at the edges of the mesh `to`; zero on rods that have no counterpart.
 
-    Parameters
-    ----------
-    values : (f,) at the f edges of `mesh`, of any unit.
+    Args:
+        values: (f,) at the f edges of `mesh`, of any unit.
     """
     result = np.zeros(len(to.edges))
     for rod, old in corresponding_rods(mesh, to):

@@ -22,13 +22,11 @@ STEPS = 8  # in which a prestress is applied that is too much for one
 def stressed(cables: Cables, structure: Structure, target: Target) -> Structure:
     """The structure with its cables stressed, in the equilibrium that it then finds.
 
-    Parameters
-    ----------
-    target : whose openings the cables must not cross.
+    Args:
+        target: whose openings the cables must not cross.
 
-    Raises
-    ------
-    InputError : a cable crosses an opening; the shell does not withstand the prestress.
+    Raises:
+        InputError: a cable crosses an opening; the shell does not withstand the prestress.
     """
     mesh, before = structure.mesh, structure.equilibrium
     pairs = braced_diagonals(
@@ -76,16 +74,14 @@ def braced_diagonals(
 ) -> Ints:  # fmt: skip
     """(d, 2) crossings that diagonals join; the rod ends, start and end of each in turn, are counted on from them.
 
-    Parameters
-    ----------
-    positions : (n, 3) of its nodes [m].
-    target : whose openings the diagonals must not cross.
-    pattern, across_openings : as of `Cables`.
-    to_supports : whether cables continue to the supports.
+    Args:
+        positions: (n, 3) of its nodes [m].
+        target: whose openings the diagonals must not cross.
+        pattern, across_openings: as of `Cables`.
+        to_supports: whether cables continue to the supports.
 
-    Raises
-    ------
-    InputError : a diagonal crosses an opening, and that is refused; there is no cell.
+    Raises:
+        InputError: a diagonal crosses an opening, and that is refused; there is no cell.
     """
     pairs = diagonals(mesh.grid, Pattern.of(pattern))
     if not len(pairs):

@@ -74,15 +74,15 @@ class LoadedShell(figures.LoadedShell):
 class LoadChecks:
     """A form under loads.
 
-    Parameters
-    ----------
-    shells : by combination and end condition; an end condition whose shell did not converge is left out.
-    braced : (d, 2) crossings that each brace joins, the rod ends counted on from them; without bracing there are none.
-    limits : what the rods are judged by.
-    stopped, missing : when a time limit came, or "", and which combinations were not reached.
-    refused : why the form cannot be checked under these loads, or "".
-    frequencies : lowest natural frequencies of the shells without loads, with bracing and locked joints [Hz].
-    self_weight : how much of their own weight braced shells carry; empty without bracing.
+    Args:
+        shells: by combination and end condition; an end condition whose shell did not converge is left out.
+        braced: (d, 2) crossings that each brace joins, the rod ends counted on from them; without bracing there are
+            none.
+        limits: what the rods are judged by.
+        stopped, missing: when a time limit came, or "", and which combinations were not reached.
+        refused: why the form cannot be checked under these loads, or "".
+        frequencies: lowest natural frequencies of the shells without loads, with bracing and locked joints [Hz].
+        self_weight: how much of their own weight braced shells carry; empty without bracing.
     """
 
     asked: Loads
@@ -133,15 +133,13 @@ def check_shells(
 ) -> LoadChecks:  # fmt: skip
     """Check every shell of a form that converged under each combination.
 
-    Parameters
-    ----------
-    stages : of the form; of one in patches these are loaded together, their seams held as supports are.
-    progress : called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found until
-        then is returned.
+    Args:
+        stages: of the form; of one in patches these are loaded together, their seams held as supports are.
+        progress: called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found
+            until then is returned.
 
-    Raises
-    ------
-    InputError : a load does not fit the form; a strength is given, and the stress of its rods is not known.
+    Raises:
+        InputError: a load does not fit the form; a strength is given, and the stress of its rods is not known.
     """
     if stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
@@ -189,9 +187,8 @@ def check_shells(
 def unchecked(loads: Loads, *, refused: str = "", stopped: str = "") -> LoadChecks:
     """No checks of a form under these loads.
 
-    Parameters
-    ----------
-    refused, stopped : why: the loads do not fit the form, or a computation failed.
+    Args:
+        refused, stopped: why: the loads do not fit the form, or a computation failed.
     """
     none: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     braced = np.empty((0, 2), dtype=np.intp)
@@ -205,9 +202,8 @@ def _said(progress: Progress, where: str, what: str) -> None:
 def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: Stages) -> Structure:
     """The erected shell with its bracing locked, and then its joints.
 
-    Raises
-    ------
-    InputError : as of the bracing; the supports leave a mechanism.
+    Raises:
+        InputError: as of the bracing; the supports leave a mechanism.
     """
     structure, bracing = Structure.erected(popped, stages.rod), loads.bracing
     if bracing is not None:
@@ -244,9 +240,8 @@ def mechanism(structure: Structure) -> str | None:
 def tributary_of(stages: Stages) -> Tributary:
     """The areas of the target that each node of a form takes.
 
-    Parameters
-    ----------
-    stages : of a form that has a target.
+    Args:
+        stages: of a form that has a target.
     """
     layout, anchor = stages.layout, stages.target.summit
     if stages.seams is None:
@@ -295,12 +290,11 @@ def loaded_shell(
 ) -> LoadedShell:  # fmt: skip
     """A structure under one combination.
 
-    Parameters
-    ----------
-    structure : in equilibrium without the loads.
-    load : what acts at the combination's factor 1.
-    loads : for how stability is looked at, and for holes and slip of joints.
-    progress : called with what is being done.
+    Args:
+        structure: in equilibrium without the loads.
+        load: what acts at the combination's factor 1.
+        loads: for how stability is looked at, and for holes and slip of joints.
+        progress: called with what is being done.
     """
 
     def following(count: int, factor: float) -> None:

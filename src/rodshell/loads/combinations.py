@@ -14,18 +14,16 @@ from rodshell.validation import brief, choice, described, instance, mapping, not
 class Loads:
     """What a shell is checked under.
 
-    Parameters
-    ----------
-    combinations : by name, the factors of loads by their names.
-    bracing : that is put in before the loads act; None: none.
-    locked_joints : how pins are tightened after that, before the loads act; None: they stay free.
-    stability : how stability is looked at.
-    strength : what rods and joints withstand.
-    durations : by a load's name, how long it acts; default: by its kind, see `loads.kinds`.
+    Args:
+        combinations: by name, the factors of loads by their names.
+        bracing: that is put in before the loads act; None: none.
+        locked_joints: how pins are tightened after that, before the loads act; None: they stay free.
+        stability: how stability is looked at.
+        strength: what rods and joints withstand.
+        durations: by a load's name, how long it acts; default: by its kind, see `loads.kinds`.
 
-    Raises
-    ------
-    InputError : a combination names a load that is not there; there is no combination; a factor is not a number.
+    Raises:
+        InputError: a combination names a load that is not there; there is no combination; a factor is not a number.
     """
 
     loads: dict[str, Load | Forces]

@@ -16,19 +16,16 @@ from rodshell.units import shown
 def fixed_forces(stages: Stages, ends: Ends, loads: Loads, combination: str) -> tuple[float, Floats]:
     """What a shell carries under one combination.
 
-    Parameters
-    ----------
-    stages : of a form in one piece, popped up with these ends.
+    Args:
+        stages: of a form in one piece, popped up with these ends.
 
-    Returns
-    -------
-    The factor on the weight of rods and joints, which changes with a design, and (n, 3) all other forces on the mesh's
-    nodes [N].
+    Returns:
+        The factor on the weight of rods and joints, which changes with a design, and (n, 3) all other forces on the
+        mesh's nodes [N].
 
-    Raises
-    ------
-    InputError : the form is in patches, braced, or has joints that are locked; a load is not a force; the rods have
-        no mass.
+    Raises:
+        InputError: the form is in patches, braced, or has joints that are locked; a load is not a force; the rods have
+            no mass.
     """
     wish = f"refine.under = {shown(combination)}"
     if stages.patches:

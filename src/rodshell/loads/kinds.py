@@ -55,9 +55,8 @@ class SelfWeight:
     def forces(self, nodes: "LoadedNodes") -> "Floats":
         """(n, 3) [N].
 
-        Raises
-        ------
-        InputError : the rods have no mass.
+        Raises:
+            InputError: the rods have no mass.
         """
         if not nodes.mass.all():
             raise InputError("the rods have no mass, so that their weight is not known: give rod.section.mass")
@@ -68,11 +67,11 @@ class SelfWeight:
 class Snow:
     """Snow on the plan.
 
-    Parameters
-    ----------
-    distribution : "uniform"; "half": on the half of the plan that lies towards `direction`, none on the other;
-        "drifted": on both halves a triangle, from 0 at the edge and the middle to the value at the quarter towards
-        `direction`, to half of it at the other quarter, as the drifted load of cylindrical roofs [EN 1991-1-3, 5.3.5].
+    Args:
+        distribution: "uniform"; "half": on the half of the plan that lies towards `direction`, none on the other;
+            "drifted": on both halves a triangle, from 0 at the edge and the middle to the value at the quarter towards
+            `direction`, to half of it at the other quarter, as the drifted load of cylindrical roofs [EN 1991-1-3,
+            5.3.5].
     """
 
     kind: ClassVar = "snow"
@@ -116,10 +115,9 @@ def _coefficient(value: object) -> float | str:
 class Wind:
     """Wind pressure along the surface's normal.
 
-    Parameters
-    ----------
-    coefficient : pressure coefficient, positive towards the surface from above: a number, or a formula in x along the
-        wind and y across it, from the middle of the plan's extent in both [m], such as "-1.2 + 0.1*x".
+    Args:
+        coefficient: pressure coefficient, positive towards the surface from above: a number, or a formula in x along
+            the wind and y across it, from the middle of the plan's extent in both [m], such as "-1.2 + 0.1*x".
     """
 
     kind: ClassVar = "wind"
@@ -157,9 +155,8 @@ class Wind:
     def forces(self, nodes: "LoadedNodes") -> "Floats":
         """(n, 3) [N].
 
-        Raises
-        ------
-        InputError : the formula is not finite at a node.
+        Raises:
+            InputError: the formula is not finite at a node.
         """
         import numpy as np
 
@@ -194,9 +191,8 @@ class PointLoad:
     def forces(self, nodes: "LoadedNodes") -> "Floats":
         """(n, 3) [N].
 
-        Raises
-        ------
-        InputError : no rod is near.
+        Raises:
+            InputError: no rod is near.
         """
         result = 0.0 * nodes.positions
         result[nodes.nearest(self.at, "a point load")] = self.force
@@ -222,9 +218,8 @@ class LineLoad:
     def forces(self, nodes: "LoadedNodes") -> "Floats":
         """(n, 3) [N].
 
-        Raises
-        ------
-        InputError : a part of the line is away from every rod.
+        Raises:
+            InputError: a part of the line is away from every rod.
         """
         import numpy as np
 

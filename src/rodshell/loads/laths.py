@@ -36,13 +36,11 @@ SAMPLES = 32  # of a lath's curve from joint to joint, for its length
 def laid(laths: Laths, structure: Structure, target: Target) -> Structure:
     """The structure with its laths laid, in the equilibrium that both find.
 
-    Parameters
-    ----------
-    target : whose openings the laths must not cross.
+    Args:
+        target: whose openings the laths must not cross.
 
-    Raises
-    ------
-    InputError : a lath crosses an opening; no stable equilibrium of both is found; the laths have no rod.
+    Raises:
+        InputError: a lath crosses an opening; no stable equilibrium of both is found; the laths have no rod.
     """
     mesh, before = structure.mesh, structure.equilibrium
     if laths.rod is None:

@@ -23,9 +23,8 @@ from rodshell.model.rod_sections import RodSections
 def locked(joints: LockedJoints, structure: Structure) -> Structure:
     """The structure with its joints locked as it stands, in the same equilibrium.
 
-    Parameters
-    ----------
-    structure : erected and braced, its joints pins.
+    Args:
+        structure: erected and braced, its joints pins.
     """
     shell, before = structure.shell, structure.equilibrium
     mesh = shell.mesh

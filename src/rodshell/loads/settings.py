@@ -33,16 +33,15 @@ OnOpenings = Annotated[AcrossOpenings, "what becomes of diagonals across an open
 class Cables:
     """Cables that carry tension alone, straight from joint to joint, in the outer layer of rods.
 
-    Parameters
-    ----------
-    rod : section and material of the cables; of their stiffnesses EA counts.
-    pattern : "both" diagonals of every cell, "one", or "every = n": lines of both through every n-th joint.
-    prestrain : by which the erected shell's cables are shorter, free of stress, than where they go [-]. Slack cables
-        brace nothing: factors without prestress are small.
-    ends_at : where lines of cables end: at the outermost "joints", so that the fields at the rim are not braced, or at
-        the "supports" beyond.
-    across_openings : what becomes of diagonals that leave the shell, across an opening: the bracing is refused, or they
-        are left out.
+    Args:
+        rod: section and material of the cables; of their stiffnesses EA counts.
+        pattern: "both" diagonals of every cell, "one", or "every = n": lines of both through every n-th joint.
+        prestrain: by which the erected shell's cables are shorter, free of stress, than where they go [-]. Slack cables
+            brace nothing: factors without prestress are small.
+        ends_at: where lines of cables end: at the outermost "joints", so that the fields at the rim are not braced, or
+            at the "supports" beyond.
+        across_openings: what becomes of diagonals that leave the shell, across an opening: the bracing is refused, or
+            they are left out.
     """
 
     kind: ClassVar = "cables"
@@ -65,11 +64,10 @@ class Cables:
 class Laths:
     """A third layer of laths.
 
-    Parameters
-    ----------
-    rod : section and material; None: those of the grid's rods.
-    pattern, across_openings : as of `Cables`.
-    eccentricity : 0: they share the joints' nodes.
+    Args:
+        rod: section and material; None: those of the grid's rods.
+        pattern, across_openings: as of `Cables`.
+        eccentricity: 0: they share the joints' nodes.
     """
 
     kind: ClassVar = "laths"
@@ -93,11 +91,10 @@ Bracing = Cables | Laths
 class LockedJoints:
     """Pins that are tightened before loads act.
 
-    Parameters
-    ----------
-    shear : stiffness of a tightened joint about its normal [N m/rad]; `inf` is rigid.
-    slip : moment about the normal that it transfers before it slips [N m]; None: not known. With `Strength.slip` both
-        count together.
+    Args:
+        shear: stiffness of a tightened joint about its normal [N m/rad]; `inf` is rigid.
+        slip: moment about the normal that it transfers before it slips [N m]; None: not known. With `Strength.slip`
+            both count together.
 
     """
 
@@ -135,11 +132,10 @@ def _imperfection(value: object) -> str | float:
 class Stability:
     """How stability is looked at.
 
-    Parameters
-    ----------
-    imperfection : largest displacement of the geometry with imperfections [m], or a part of the span such as
-        "span/500"; None: the perfect geometry alone.
-    modes : lowest buckling modes that are looked for; an imperfection in each of them is tried, with either sign.
+    Args:
+        imperfection: largest displacement of the geometry with imperfections [m], or a part of the span such as
+            "span/500"; None: the perfect geometry alone.
+        modes: lowest buckling modes that are looked for; an imperfection in each of them is tried, with either sign.
     """
 
     imperfection: Annotated[
@@ -155,9 +151,8 @@ class Stability:
     def amplitude(self, span: float) -> float | None:
         """Largest displacement of the geometry with imperfections [m]; None: the perfect geometry alone.
 
-        Parameters
-        ----------
-        span : of the shell [m].
+        Args:
+            span: of the shell [m].
         """
         given = self.imperfection
         if not isinstance(given, str):
@@ -180,12 +175,11 @@ def _service_class(value: object) -> int:
 class Strength:
     """What rods and joints withstand, where it is not that of the material's preset.
 
-    Parameters
-    ----------
-    permanent, long, medium, short, instantaneous : design strength in bending for loads that act so long [Pa]. Given
-        ones stand in place of all of the preset's; one that is missing is that of the next longer duration.
-    erection : the same while the shell is erected [Pa]; None: the short one.
-    effective_length : for the Euler load of a span.
+    Args:
+        permanent, long, medium, short, instantaneous: design strength in bending for loads that act so long [Pa]. Given
+            ones stand in place of all of the preset's; one that is missing is that of the next longer duration.
+        erection: the same while the shell is erected [Pa]; None: the short one.
+        effective_length: for the Euler load of a span.
     """
 
     permanent: Annotated[Stress | None, "design strength under permanent loads; default: a preset's"] = None

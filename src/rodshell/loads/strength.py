@@ -65,16 +65,14 @@ class Limits(DesignStrength):
     ) -> "Limits":  # fmt: skip
         """The limits of a rod.
 
-        Parameters
-        ----------
-        asked : what was given for it.
-        characteristic : bending strength [Pa]; None: not known.
-        of_preset : whether it is the preset's; a given one is taken as it is, for every duration.
-        shear_weight : bending strength over shear strength.
+        Args:
+            asked: what was given for it.
+            characteristic: bending strength [Pa]; None: not known.
+            of_preset: whether it is the preset's; a given one is taken as it is, for every duration.
+            shear_weight: bending strength over shear strength.
 
-        Raises
-        ------
-        InputError : a service class is given, and nothing depends on it.
+        Raises:
+            InputError: a service class is given, and nothing depends on it.
         """
         name = rod.material.name if rod.material is not None else None
         factors = DESIGN.get(name) if name is not None else None
@@ -121,9 +119,8 @@ class Limits(DesignStrength):
 def preset_limits(rod: Rod, service_class: int | None) -> Limits:
     """The limits of a rod by its material's preset; of other materials none is known.
 
-    Parameters
-    ----------
-    service_class : of timber, as of `Strength`.
+    Args:
+        service_class: of timber, as of `Strength`.
     """
     material = rod.material
     factors = None if material is None or material.name is None else DESIGN.get(material.name)
@@ -139,10 +136,9 @@ def preset_limits(rod: Rod, service_class: int | None) -> Limits:
 class Utilisation:
     """What the rods and joints of a shell use of their strength, at each entry (k,) of `rod_nodes`.
 
-    Parameters
-    ----------
-    uses : by what; what is not known is missing.
-    euler : largest compression of the spans next to each entry, over their Euler load.
+    Args:
+        uses: by what; what is not known is missing.
+        euler: largest compression of the spans next to each entry, over their Euler load.
     """
 
     uses: dict[By, Floats]
@@ -164,9 +160,8 @@ class Utilisation:
     def with_permanent(self, permanent: "Utilisation") -> "Utilisation":
         """The same, where the erected shell's own utilisation counts too, and the slip of its joints.
 
-        Parameters
-        ----------
-        permanent : of the erected shell by the permanent strength.
+        Args:
+            permanent: of the erected shell by the permanent strength.
         """
         uses = dict(self.uses)
         if "slip" in permanent.uses:
@@ -184,19 +179,17 @@ def utilisation(
 ) -> Utilisation:  # fmt: skip
     """Utilisation of a shell in equilibrium.
 
-    Parameters
-    ----------
-    shell : with its source frames at the state.
-    rod : section and material of every rod.
-    forces : (e,) axial force of each edge, tension positive [N].
-    asked : holes, slip and effective lengths.
-    bent : the shell's bending, where it is known.
-    moments : (c,) of locked joints about their normals [N m]; None or empty: none is locked.
-    slip_moment : at which locked joints slip [N m]; None: not known.
+    Args:
+        shell: with its source frames at the state.
+        rod: section and material of every rod.
+        forces: (e,) axial force of each edge, tension positive [N].
+        asked: holes, slip and effective lengths.
+        bent: the shell's bending, where it is known.
+        moments: (c,) of locked joints about their normals [N m]; None or empty: none is locked.
+        slip_moment: at which locked joints slip [N m]; None: not known.
 
-    Raises
-    ------
-    InputError : holes in rods whose section varies or is not known.
+    Raises:
+        InputError: holes in rods whose section varies or is not known.
     """
     mesh, section = shell.mesh, rod.section
     bent = bent or bending_under(shell, state, rod, forces, limits)
@@ -236,9 +229,8 @@ def bending_under(shell: Shell, state: Floats, rod: Rod, forces: Floats, limits:
     """Bending and stress of a shell whose axial forces (e,) [N] are known: where rods are warm their lengths do not say
     them.
 
-    Parameters
-    ----------
-    shell, state, rod, forces, limits : as of `utilisation`.
+    Args:
+        shell, state, rod, forces, limits: as of `utilisation`.
     """
     strains = forces / shell.stretch.stiffness
     return bending_of(shell, state, rod, shear_weight=limits.shear_weight, edge_strains=strains)
@@ -254,13 +246,11 @@ def area_of(rod: Rod) -> float:
 def net_section(section: Section | GivenSection, hole: float) -> float:
     """Largest stress at a hole through the section along its first axis, over that of the full section.
 
-    Parameters
-    ----------
-    hole : diameter [m].
+    Args:
+        hole: diameter [m].
 
-    Raises
-    ------
-    InputError : the hole is as wide as the rod; the section is a given one.
+    Raises:
+        InputError: the hole is as wide as the rod; the section is a given one.
     """
     if isinstance(section, GivenSection):
         raise InputError("strength.hole: the net section of a given section is not known: leave it out")
@@ -276,9 +266,8 @@ def net_section(section: Section | GivenSection, hole: float) -> float:
 def net_factors(mesh: GridMesh, section: Section | GivenSection, hole: float) -> Floats:
     """(k,) stress of the net section over that of the full one, at each entry of `rod_nodes`: 1 but at joints.
 
-    Parameters
-    ----------
-    section, hole : as of `net_section`; 0: there is no hole.
+    Args:
+        section, hole: as of `net_section`; 0: there is no hole.
     """
     factors = np.ones(len(mesh.rod_nodes))
     if hole:
@@ -303,11 +292,10 @@ def _shear_forces(shell: Shell, state: Floats) -> Floats:
 class Spans:
     """The s spans between neighbouring joints, and between the last joints and the ends, rod by rod.
 
-    Parameters
-    ----------
-    first, last : (s,) entries of `rod_nodes` at their ends.
-    middle : (s,) edge in the middle of each.
-    lengths : (s,) [m].
+    Args:
+        first, last: (s,) entries of `rod_nodes` at their ends.
+        middle: (s,) edge in the middle of each.
+        lengths: (s,) [m].
     """
 
     first: Ints

@@ -29,12 +29,11 @@ from rodshell.solve.modes import frequencies
 class LathLayer:
     """A third layer of laths.
 
-    Parameters
-    ----------
-    shell : the model of the laths alone, each straight when it is free of stress.
-    blocks : (N,) the structure's block that holds each of its blocks.
-    rows : crossings that each lath runs over.
-    entries : entries of its mesh's `rod_nodes` at these crossings, lath by lath.
+    Args:
+        shell: the model of the laths alone, each straight when it is free of stress.
+        blocks: (N,) the structure's block that holds each of its blocks.
+        rows: crossings that each lath runs over.
+        entries: entries of its mesh's `rod_nodes` at these crossings, lath by lath.
     """
 
     shell: Shell
@@ -51,9 +50,8 @@ class LathLayer:
     def forces(self, axial: Floats) -> Floats:
         """(d,) mean axial force from crossing to crossing [N], tension positive.
 
-        Parameters
-        ----------
-        axial : (e,) forces of the laths' edges [N].
+        Args:
+            axial: (e,) forces of the laths' edges [N].
         """
         first = self.entries - (np.searchsorted(self.shell.mesh.rod_start, self.entries, side="right") - 1)
         sums = np.append(0.0, np.cumsum(axial))
@@ -68,15 +66,14 @@ class LathLayer:
 class Structure:
     """A shell as loads find it.
 
-    Parameters
-    ----------
-    shell : the model of the grid, its source frames being at the equilibrium.
-    equilibrium : of grid and bracing without loads, its ends held.
-    braced : (d, 2) crossings that its bracing joins, the rod ends counted on from them.
-    bracing_mass : (n,) mass of the bracing whose weight the mesh's nodes carry [kg]; None: there is no bracing.
-    cables : its energy; None: there are no cables.
-    laths : its third layer; None: there is none.
-    locked : crossings of the joints of each of the shell's last elements, which lock them; empty: none is locked.
+    Args:
+        shell: the model of the grid, its source frames being at the equilibrium.
+        equilibrium: of grid and bracing without loads, its ends held.
+        braced: (d, 2) crossings that its bracing joins, the rod ends counted on from them.
+        bracing_mass: (n,) mass of the bracing whose weight the mesh's nodes carry [kg]; None: there is no bracing.
+        cables: its energy; None: there are no cables.
+        laths: its third layer; None: there is none.
+        locked: crossings of the joints of each of the shell's last elements, which lock them; empty: none is locked.
     """
 
     shell: Shell
@@ -126,9 +123,8 @@ class Structure:
         """(c,) moment of each locked joint about its normal in an equilibrium of the structure [N m], positive where
         the angle from the first rod to the second has grown; empty where none is locked.
 
-        Parameters
-        ----------
-        found : an equilibrium of this structure.
+        Args:
+            found: an equilibrium of this structure.
         """
         if not self.locked:
             return np.zeros(0)
@@ -143,9 +139,8 @@ class Structure:
         The mass of rods and laths is spread along their edges, so that the frequencies of bending are of fourth order
         in their length (see `solve.modes.frequencies`); joints and cables are at the nodes.
 
-        Parameters
-        ----------
-        count : so many, or as many as there are.
+        Args:
+            count: so many, or as many as there are.
         """
         shell, mass = self.shell, np.zeros((self.size, 3))
         mass[: len(shell.mass)] = shell.mass
@@ -170,9 +165,8 @@ class Structure:
     def laths_alone(self, found: Equilibrium) -> tuple[Shell, Floats] | None:
         """The model of the laths of a third layer alone and its state; None: there are none.
 
-        Parameters
-        ----------
-        found : an equilibrium of this structure.
+        Args:
+            found: an equilibrium of this structure.
         """
         if self.laths is None:
             return None
@@ -185,27 +179,24 @@ class Structure:
     def shell_at(self, found: Equilibrium) -> Shell:
         """The grid's model with its source frames at an equilibrium of the structure.
 
-        Parameters
-        ----------
-        found : an equilibrium of this structure, loaded or not.
+        Args:
+            found: an equilibrium of this structure, loaded or not.
         """
         return self.shell.with_elements(found.elements[: len(self.shell.elements)])
 
     def support_forces(self, found: Equilibrium) -> Reactions:
         """What the supports exert in an equilibrium, with the springing of the bent rods.
 
-        Parameters
-        ----------
-        found : an equilibrium of this structure, loaded or not.
+        Args:
+            found: an equilibrium of this structure, loaded or not.
         """
         return reactions(self.shell, found)
 
     def reactions(self, found: Equilibrium) -> Reactions:
         """What the supports exert in an equilibrium in addition to what they exert without loads.
 
-        Parameters
-        ----------
-        found : an equilibrium of this structure under loads.
+        Args:
+            found: an equilibrium of this structure under loads.
         """
         loaded, before = self.support_forces(found), self.support_forces(self.equilibrium)
         points = found.state[self.shell.ends]

@@ -41,12 +41,11 @@ REACH = 1.0  # distances of two rods: a point load farther from every rod is ref
 class Tributary:
     """What each of the n nodes of a mesh takes of a surface.
 
-    Parameters
-    ----------
-    area : (n,) of the surface [m2].
-    plan : (n,) of its plan [m2].
-    vectors : (n, 3) areas times the unit normals that point up [m2].
-    plan_positions : (n, 2) middle of each node's part of the plan [m]; of a node without one its own place.
+    Args:
+        area: (n,) of the surface [m2].
+        plan: (n,) of its plan [m2].
+        vectors: (n, 3) areas times the unit normals that point up [m2].
+        plan_positions: (n, 2) middle of each node's part of the plan [m]; of a node without one its own place.
     """
 
     area: Floats
@@ -61,12 +60,11 @@ class Tributary:
 class LoadedNodes:
     """The nodes of a shell that loads act on.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the unloaded shell [m].
-    mass : (n,) of rods and joints, lumped [kg].
-    tributary : areas of the target that each node takes.
-    spacing : distance of two neighbouring rods [m].
+    Args:
+        positions: (n, 3) of the unloaded shell [m].
+        mass: (n,) of rods and joints, lumped [kg].
+        tributary: areas of the target that each node takes.
+        spacing: distance of two neighbouring rods [m].
     """
 
     positions: Floats
@@ -86,9 +84,8 @@ class LoadedNodes:
     def nearest(self, at: Sequence[float], what: str) -> int:
         """The node that is nearest to a point of the plan [m].
 
-        Raises
-        ------
-        InputError : `what` acts there, and no rod is near.
+        Raises:
+            InputError: `what` acts there, and no rod is near.
         """
         away = np.linalg.norm(self.positions[:, :2] - np.asarray(at), axis=1)
         nearest = int(np.argmin(away))
@@ -111,13 +108,12 @@ def tributary_areas(
 ) -> Tributary:
     """The areas of a surface that the nodes on it take.
 
-    Parameters
-    ----------
-    target : the surface, up to its end; where parts lie one above the other, the uppermost.
-    positions : (n, 3) of the nodes, on the surface or next to it [m].
-    anchor : point of the plan from which the triangles are laid [m].
-    rotate : angle of their sides [rad].
-    spacing : smallest distance of two neighbouring rods [m].
+    Args:
+        target: the surface, up to its end; where parts lie one above the other, the uppermost.
+        positions: (n, 3) of the nodes, on the surface or next to it [m].
+        anchor: point of the plan from which the triangles are laid [m].
+        rotate: angle of their sides [rad].
+        spacing: smallest distance of two neighbouring rods [m].
     """
     step = _step(target, spacing)
     if isinstance(target, Freeform):
@@ -152,11 +148,10 @@ def surface_triangles(
 ) -> tuple[Floats, Ints]:
     """A surface up to its end in triangles: corners (k, 3) [m], and faces (m, 3), upwards.
 
-    Parameters
-    ----------
-    anchor : point of the plan that is a corner, where it lies inside [m].
-    rotate : angle of the sides [rad].
-    step : their length in plan [m].
+    Args:
+        anchor: point of the plan that is a corner, where it lies inside [m].
+        rotate: angle of the sides [rad].
+        step: their length in plan [m].
     """
     reach = 2.5 * target.size + float(np.hypot(*(np.array(anchor) - target.summit)))
     count = int(np.ceil(reach / step))
@@ -182,9 +177,8 @@ def surface_triangles(
 def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
     """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end.
 
-    Parameters
-    ----------
-    step : longest side [m].
+    Args:
+        step: longest side [m].
     """
     points, faces = _divided(target, target.surface.vertices, target.surface.faces, longest=step)
     inside = target.margin(points) >= -_ON_THE_EDGE * target.size

@@ -26,10 +26,9 @@ class Freedom:
     A direction of zero length is blocked: it stays among the unknowns, where a solver puts 1 on the diagonal, so that
     nodes that touch and leave at each step of a motion need no new pattern of the matrix.
 
-    Parameters
-    ----------
-    directions : (n, 3, 3); `directions[i, k]` is the k-th free direction of block i, orthonormal.
-    count : (n,) number of free directions, 0 to 3.
+    Args:
+        directions: (n, 3, 3); `directions[i, k]` is the k-th free direction of block i, orthonormal.
+        count: (n,) number of free directions, 0 to 3.
     """
 
     directions: Floats
@@ -48,10 +47,9 @@ class Freedom:
     def with_directions(self, blocks: Ints, *directions: tuple[float, float, float]) -> "Freedom":
         """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed).
 
-        Parameters
-        ----------
-        blocks : (k,) indices of blocks.
-        directions : orthonormal vectors, up to three.
+        Args:
+            blocks: (k,) indices of blocks.
+            directions: orthonormal vectors, up to three.
         """
         table, count = self.directions.copy() if directions else self.directions, self.count.copy()
         for k, direction in enumerate(directions):
@@ -83,36 +81,32 @@ class Freedom:
     def expand(self, q: Floats) -> Floats:
         """Displacements (n, 3) of reduced DOFs (size,).
 
-        Parameters
-        ----------
-        q : (size,) values of the reduced DOFs.
+        Args:
+            q: (size,) values of the reduced DOFs.
         """
         return np.asarray(_expand(np.ascontiguousarray(q), self.directions, self.count))
 
     def reduce(self, gradient: Floats) -> Floats:
         """Components (size,) of a gradient (n, 3) in the free directions.
 
-        Parameters
-        ----------
-        gradient : (n, 3) [N].
+        Args:
+            gradient: (n, 3) [N].
         """
         return np.asarray(_reduce(np.ascontiguousarray(gradient), self.directions, self.count, self.size))
 
     def within(self, gradient: Floats) -> Floats:
         """The part (n, 3) of a gradient that acts along the free directions.
 
-        Parameters
-        ----------
-        gradient : (n, 3) [N].
+        Args:
+            gradient: (n, 3) [N].
         """
         return self.expand(self.reduce(gradient))
 
     def reduce_diagonal(self, diagonal: Floats) -> Floats:
         """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses.
 
-        Parameters
-        ----------
-        diagonal : (n, 3) components of d.
+        Args:
+            diagonal: (n, 3) components of d.
         """
         block, k = self._slots
         return np.asarray(np.einsum("ij,ij->i", diagonal[block], self.directions[block, k] ** 2))
@@ -134,9 +128,8 @@ class Assembly:
     The pattern depends on which blocks the elements touch and on how many free directions each block has, not on the
     directions. Compressed columns, rows ascending, every diagonal present.
 
-    Parameters
-    ----------
-    indptr, indices : the pattern (CSC, upper triangle).
+    Args:
+        indptr, indices: the pattern (CSC, upper triangle).
     """
 
     indptr: Longs
@@ -152,10 +145,9 @@ class Assembly:
     def of(element_blocks: Sequence[Ints], freedom: Freedom) -> "Assembly":
         """Plan the assembly of element sets on `element_blocks`, (m, k) each, in the directions of `freedom`.
 
-        Parameters
-        ----------
-        element_blocks : of each element set, (m, k) blocks of its elements.
-        freedom : free directions of all blocks.
+        Args:
+            element_blocks: of each element set, (m, k) blocks of its elements.
+            freedom: free directions of all blocks.
         """
         widths = np.array([blocks.shape[1] for blocks in element_blocks], dtype=np.int64)
         numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
@@ -175,11 +167,10 @@ class Assembly:
     def assemble(self, hessians: Sequence[Floats], element_blocks: Sequence[Ints], freedom: Freedom) -> Floats:
         """(nnz,) values of the reduced Hessian, from the element Hessians (m, 3k, 3k) and blocks (m, k) of each set.
 
-        Parameters
-        ----------
-        hessians : of each element set, (m, 3k, 3k) element Hessians; empty: none of this set.
-        element_blocks : of each element set, (m, k) blocks of its elements.
-        freedom : free directions, as many of each block as in the plan.
+        Args:
+            hessians: of each element set, (m, 3k, 3k) element Hessians; empty: none of this set.
+            element_blocks: of each element set, (m, k) blocks of its elements.
+            freedom: free directions, as many of each block as in the plan.
         """
         data, every = np.zeros(len(self.indices)), zip(hessians, element_blocks, self._slots, strict=True)
         sets = [(hessian, blocks, slots) for hessian, blocks, slots in every if len(hessian)]
@@ -195,12 +186,11 @@ class Assembly:
     def add(self, index: int, hessian: Floats, blocks: Ints, freedom: Freedom, data: Floats) -> None:
         """Add the Hessians (m, 3k, 3k) of the element set `index`, on `blocks` (m, k), to the values `data` (nnz,).
 
-        Parameters
-        ----------
-        hessian : (m, 3k, 3k) element Hessians.
-        blocks : (m, k) blocks of the elements.
-        freedom : free directions, as many of each block as in the plan.
-        data : (nnz,) values to which theirs are added.
+        Args:
+            hessian: (m, 3k, 3k) element Hessians.
+            blocks: (m, k) blocks of the elements.
+            freedom: free directions, as many of each block as in the plan.
+            data: (nnz,) values to which theirs are added.
         """
         if len(blocks):
             every = 0, len(self._count)

@@ -34,13 +34,12 @@ PROBE = 1e-4  # of a stiffness next to a joint: its forces' change is then exact
 class EdgeProperties:
     """How a shell's energies follow from the properties of its edges. Build it with `of`.
 
-    Parameters
-    ----------
-    shell : the shell; its blocks and source frames stay as they are.
-    joint : one for all crossings, or one for each.
-    before, after : (b,) edge before and after each bend; of a clamp the last edge, twice.
-    table : (e, 5) its own properties, in the order EA, EI1, EI2, GJ, length.
-    weight : (e,) weight per length over EA of each edge, which loads its nodes [1/m]; None: rods have no weight.
+    Args:
+        shell: the shell; its blocks and source frames stay as they are.
+        joint: one for all crossings, or one for each.
+        before, after: (b,) edge before and after each bend; of a clamp the last edge, twice.
+        table: (e, 5) its own properties, in the order EA, EI1, EI2, GJ, length.
+        weight: (e,) weight per length over EA of each edge, which loads its nodes [1/m]; None: rods have no weight.
     """
 
     shell: Shell
@@ -54,10 +53,9 @@ class EdgeProperties:
     def of(shell: Shell, joint: Joint | Sequence[Joint], table: Floats) -> "EdgeProperties":
         """Of a shell whose rods share their nodes or lie in layers.
 
-        Parameters
-        ----------
-        joint : one for all its crossings, or one for each.
-        table : (e, 5) its edges' EA [N], EI1, EI2, GJ [N m2] and rest length [m].
+        Args:
+            joint: one for all its crossings, or one for each.
+            table: (e, 5) its edges' EA [N], EI1, EI2, GJ [N m2] and rest length [m].
         """
         rods = shell.mesh.edge_rods
         inner = np.flatnonzero(rods[1:] == rods[:-1])
@@ -69,9 +67,8 @@ class EdgeProperties:
     def varied(self, table: Floats) -> "EdgeProperties":
         """The shell whose edges have other properties.
 
-        Parameters
-        ----------
-        table : (e, 5) the properties of the edges.
+        Args:
+            table: (e, 5) the properties of the edges.
         """
         joints = iter(self._joints(self._at_nodes(table)))
         elements = tuple(self._with_stiffness(element, table, joints) for element in self.shell.elements)
@@ -82,18 +79,16 @@ class EdgeProperties:
     def at(self, elements: Sequence[Elements]) -> "EdgeProperties":
         """The same with other source frames.
 
-        Parameters
-        ----------
-        elements : those of the shell, with their source frames at another state.
+        Args:
+            elements: those of the shell, with their source frames at another state.
         """
         return replace(self, shell=self.shell.with_elements(tuple(elements)))
 
     def load(self, size: int) -> Floats:
         """(size, 3) weight of the edges, half at either node, downwards [N].
 
-        Parameters
-        ----------
-        size : number of blocks of the state.
+        Args:
+            size: number of blocks of the state.
         """
         result = np.zeros((size, 3))
         if self.weight is not None:
@@ -105,9 +100,8 @@ class EdgeProperties:
     def gradient_slopes(self, state: Floats) -> csr_array:
         """(3N, 5e) derivatives of the gradient, less the weight, by the logarithms of the properties [N, N m].
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad], at or near the source frames.
+        Args:
+            state: (N, 3) node positions [m] and twist angles [rad], at or near the source frames.
         """
         stretch, edges = self.shell.stretch, np.arange(len(self.table))
         total = csr_array((state.size, self.table.size))
@@ -129,10 +123,9 @@ class EdgeProperties:
     def curvature_slopes(self, state: Floats, motion: Floats) -> Floats:
         """(5e,) derivatives of v'Hv by the logarithms of the properties [J], H being the Hessian.
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad], at or near the source frames.
-        motion : (N, 3) displacements v [m, rad].
+        Args:
+            state: (N, 3) node positions [m] and twist angles [rad], at or near the source frames.
+            motion: (N, 3) displacements v [m, rad].
         """
         stretch, result = self.shell.stretch, np.zeros(self.table.shape)
         for part, by_edge in self._parts():

@@ -35,11 +35,10 @@ _ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
 class RodStrains:
     """Strains of a rod; its b bends are those of the inner nodes in turn, then those of the clamped ends.
 
-    Parameters
-    ----------
-    axial : (edges,) [-].
-    curvature : (b, 2) towards m1 and m2, per unit length [1/m].
-    twist : (b,) per unit length [rad/m].
+    Args:
+        axial: (edges,) [-].
+        curvature: (b, 2) towards m1 and m2, per unit length [1/m].
+        twist: (b,) per unit length [rad/m].
     """
 
     axial: Floats
@@ -57,17 +56,16 @@ class ElasticRod:
     frame is transported from its source, at first the rest shape, to a state by the smallest rotation; `refreshed`
     moves the source and is called after each accepted step.
 
-    Parameters
-    ----------
-    rest : (n, 3) rest positions of the nodes [m].
-    closed : a ring; its last edge leads back to the first node.
-    elements : bending and twist: `BendTwist`; where the rod is isotropic and naturally straight
-        `IsotropicBendTwist`, or `IsotropicBend` if it has no twist angles.
-    mass : (N, 3) lumped mass of each block's components: of a node [kg]; of a twist angle the rotary inertia
-        [kg m2] in component 0, else 0. Ghosts have none.
-    bend_lengths : (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
-    clamp_tangents : (c, 3) unit tangents along the rod there at rest.
-    free_spin : the energy does not change when the rod spins about itself together with its ends.
+    Args:
+        rest: (n, 3) rest positions of the nodes [m].
+        closed: a ring; its last edge leads back to the first node.
+        elements: bending and twist: `BendTwist`; where the rod is isotropic and naturally straight
+            `IsotropicBendTwist`, or `IsotropicBend` if it has no twist angles.
+        mass: (N, 3) lumped mass of each block's components: of a node [kg]; of a twist angle the rotary inertia
+            [kg m2] in component 0, else 0. Ghosts have none.
+        bend_lengths: (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
+        clamp_tangents: (c, 3) unit tangents along the rod there at rest.
+        free_spin: the energy does not change when the rod spins about itself together with its ends.
     """
 
     rest: Floats
@@ -98,26 +96,24 @@ class ElasticRod:
     ) -> "ElasticRod":
         """A rod through given nodes, whose edges have their rest lengths there.
 
-        Parameters
-        ----------
-        rest : (n, 3) nodes [m].
-        rod : the same for all edges, one for each, or a function of the arc length [m] of the edge's middle. Between
-            two edges the compliances of their halves add up.
-        closed : a ring: a last edge leads back to the first node.
-        natural : "straight"; "rest", free of stress at rest, frames included; or (b, 2) curvatures towards m1
-            and m2 per unit length [1/m] at the inner nodes (of a ring: at all nodes), or (2,) for all.
-        natural_twist : per unit length [rad/m], (b,) or one for all; added to that of the rest shape if natural.
-        twist : give the rod twist angles. An open, isotropic, naturally straight and untwisted rod does not need them
-            as long as nothing holds or loads its frames (it may spin in its clamps): it bends in the same way, at
-            less cost.
-        director : first material director m1, (3,) of the first edge, transported along without twist, or (edges, 3);
-            its part across the edge is used. By default z, or x where the rod starts within 25 degrees of z.
-        clamped : ends that are clamped, ("start", "end"), or the tangent along the rod at each as it is at rest,
-            {"start": (1, 0, 0)}; by default that of the two edges next to the end, to second order.
+        Args:
+            rest: (n, 3) nodes [m].
+            rod: the same for all edges, one for each, or a function of the arc length [m] of the edge's middle. Between
+                two edges the compliances of their halves add up.
+            closed: a ring: a last edge leads back to the first node.
+            natural: "straight"; "rest", free of stress at rest, frames included; or (b, 2) curvatures towards m1
+                and m2 per unit length [1/m] at the inner nodes (of a ring: at all nodes), or (2,) for all.
+            natural_twist: per unit length [rad/m], (b,) or one for all; added to that of the rest shape if natural.
+            twist: give the rod twist angles. An open, isotropic, naturally straight and untwisted rod does not need
+                them as long as nothing holds or loads its frames (it may spin in its clamps): it bends in the same way,
+                at less cost.
+            director: first material director m1, (3,) of the first edge, transported along without twist, or (edges,
+                3); its part across the edge is used. By default z, or x where the rod starts within 25 degrees of z.
+            clamped: ends that are clamped, ("start", "end"), or the tangent along the rod at each as it is at rest,
+                {"start": (1, 0, 0)}; by default that of the two edges next to the end, to second order.
 
-        Raises
-        ------
-        InputError : an argument is of the wrong kind or shape, or they exclude each other.
+        Raises:
+            InputError: an argument is of the wrong kind or shape, or they exclude each other.
         """
         closed, twist = flag("closed", closed), flag("twist", twist)
         line = RodLine.of(rest, closed=closed, clamped=clamped)
@@ -220,15 +216,13 @@ class ElasticRod:
     ) -> Floats:
         """(N, 3) state of the rod.
 
-        Parameters
-        ----------
-        positions : (n, 3) of the nodes [m]; by default those at rest.
-        angles : (edges,) twist angles [rad]; by default 0.
-        tangents : of the clamps, along the rod; by default those at rest. Their twist angles are 0.
+        Args:
+            positions: (n, 3) of the nodes [m]; by default those at rest.
+            angles: (edges,) twist angles [rad]; by default 0.
+            tangents: of the clamps, along the rod; by default those at rest. Their twist angles are 0.
 
-        Raises
-        ------
-        InputError : an array has another shape; the rod has no twist angles; a tangent is for an end not clamped.
+        Raises:
+            InputError: an array has another shape; the rod has no twist angles; a tangent is for an end not clamped.
         """
         for end in tangents or {}:
             if end not in self.clamps:
@@ -250,10 +244,9 @@ class ElasticRod:
     def ghost_position(self, end: End, position: Floats, tangent: Floats) -> Floats:
         """(3,) position of the ghost node of a clamp [m].
 
-        Parameters
-        ----------
-        position : (3,) of the end [m].
-        tangent : (3,) unit tangent along the rod there.
+        Args:
+            position: (3,) of the end [m].
+            tangent: (3,) unit tangent along the rod there.
         """
         edge = 0 if end == "start" else self.edge_count - 1
         return np.asarray(position + (-1 if end == "start" else 1) * self.stretch.rest_lengths[edge] * tangent)
@@ -294,18 +287,16 @@ class ElasticRod:
     def hessian(self, state: State, freedom: Freedom | None = None) -> csc_matrix:
         """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's.
 
-        Parameters
-        ----------
-        freedom : free directions of the blocks.
+        Args:
+            freedom: free directions of the blocks.
         """
         return self._potential.matrix(state, self.freedom() if freedom is None else freedom)
 
     def weight(self, gravity: ArrayLike) -> Floats:
         """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2].
 
-        Parameters
-        ----------
-        gravity : (3,) acceleration [m/s2].
+        Args:
+            gravity: (3,) acceleration [m/s2].
         """
         load = np.zeros_like(self.mass)
         load[self.nodes] = self.mass[self.nodes] * vector("gravity", gravity)
@@ -327,10 +318,9 @@ def _bend_twist(
 ) -> BendTwist:
     """Bending and twist with the natural strains that are asked for.
 
-    Parameters
-    ----------
-    directors : (edges, 3) first material directors at rest.
-    twist_rate : (b,) natural twist per length [rad/m].
+    Args:
+        directors: (edges, 3) first material directors at rest.
+        twist_rate: (b,) natural twist per length [rad/m].
     """
     state, frames = bends.rest_state(line, directors)
     elements = (IsotropicBendTwist if isotropic else BendTwist).starting_at(

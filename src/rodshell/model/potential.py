@@ -53,9 +53,8 @@ class Potential:
     def product(self, state: Floats, motion: Floats) -> Floats:
         """(N, 3) product of the Hessian with displacements.
 
-        Parameters
-        ----------
-        motion : (N, 3) displacements [m, rad].
+        Args:
+            motion: (N, 3) displacements [m, rad].
         """
         result = np.zeros_like(motion)
         for of_set, blocks in zip(self.hessians(state), self.blocks, strict=True):  # summed by rows: fewer digits lost
@@ -83,10 +82,9 @@ def room_for(sets: Sequence[Ints]) -> list[Floats]:
 def product(hessians: Sequence[Floats], sets: Sequence[Ints], motion: Floats) -> Floats:
     """(N, 3) product of a sum of element Hessians with displacements.
 
-    Parameters
-    ----------
-    hessians, sets : of each set, (m, 3k, 3k) and its blocks (m, k).
-    motion : (N, 3) displacements [m, rad].
+    Args:
+        hessians, sets: of each set, (m, 3k, 3k) and its blocks (m, k).
+        motion: (N, 3) displacements [m, rad].
     """
     result = np.zeros_like(motion)
     for of_set, blocks in zip(hessians, sets, strict=True):

@@ -25,14 +25,13 @@ _FOLDED = -1 + 1e-9  # cosine of a turn that has no curvature
 class RodLine:
     """Nodes in a row and what follows from them. Build it with `of`.
 
-    Parameters
-    ----------
-    nodes : (n, 3) [m].
-    closed : a ring: the last edge leads back to the first node.
-    edges : (e, 2) nodes of each edge.
-    tangents : (e, 3) unit tangents of the edges.
-    lengths : (e,) of the edges [m].
-    clamps : (3,) unit tangent along the rod at each clamped end.
+    Args:
+        nodes: (n, 3) [m].
+        closed: a ring: the last edge leads back to the first node.
+        edges: (e, 2) nodes of each edge.
+        tangents: (e, 3) unit tangents of the edges.
+        lengths: (e,) of the edges [m].
+        clamps: (3,) unit tangent along the rod at each clamped end.
     """
 
     nodes: Floats
@@ -48,17 +47,15 @@ class RodLine:
     def of(rest: ArrayLike, *, closed: bool, clamped: Clamps) -> "RodLine":
         """The line through nodes, clamped at some ends.
 
-        Parameters
-        ----------
-        rest : (n, 3) nodes of the unloaded rod [m].
-        closed : a ring: the last edge leads back to the first node.
-        clamped : "start" and "end" as far as they are clamped, or these with a tangent (3,) along the rod; without, the
-            tangent is extrapolated from the last two edges.
+        Args:
+            rest: (n, 3) nodes of the unloaded rod [m].
+            closed: a ring: the last edge leads back to the first node.
+            clamped: "start" and "end" as far as they are clamped, or these with a tangent (3,) along the rod; without,
+                the tangent is extrapolated from the last two edges.
 
-        Raises
-        ------
-        InputError : there are fewer than 3 nodes, an edge has no length, the rod folds back on itself, or a clamp is
-            not an end or points against the rod.
+        Raises:
+            InputError: there are fewer than 3 nodes, an edge has no length, the rod folds back on itself, or a clamp is
+                not an end or points against the rod.
         """
         count = _points(rest)
         nodes = finite("the positions of a rod's nodes", rest, count, 3).copy()
@@ -79,13 +76,11 @@ class RodLine:
     def rods(self, rod: Rods) -> list[Rod]:
         """The rod of each edge: the same for all, one for each, or a function of the arc length of its middle [m].
 
-        Parameters
-        ----------
-        rod : one rod, a sequence of them, or a function.
+        Args:
+            rod: one rod, a sequence of them, or a function.
 
-        Raises
-        ------
-        InputError : they are not rods, or not as many as there are edges.
+        Raises:
+            InputError: they are not rods, or not as many as there are edges.
         """
         count = len(self.lengths)
         if isinstance(rod, Rod):
@@ -103,10 +98,9 @@ class RodLine:
     def directors(self, director: ArrayLike | None) -> Floats:
         """(e, 3) first material directors of the edges.
 
-        Parameters
-        ----------
-        director : (3,) of the first edge, transported along the rod without twist; (e, 3) of each edge; None: z, or x
-            where the rod starts within 25 degrees of z.
+        Args:
+            director: (3,) of the first edge, transported along the rod without twist; (e, 3) of each edge; None: z, or
+                x where the rod starts within 25 degrees of z.
         """
         if director is None:
             director = (0.0, 0.0, 1.0) if abs(self.tangents[0, 2]) < 0.9 else (1.0, 0.0, 0.0)
@@ -127,9 +121,8 @@ class RodLine:
     def end_director(self, directors: Floats, end: End) -> Floats:
         """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges.
 
-        Parameters
-        ----------
-        directors : (e, 3) first material directors of the edges.
+        Args:
+            directors: (e, 3) first material directors of the edges.
         """
         order = slice(0, 2) if end == "start" else slice(-1, -3, -1)
         (d0, d1), (t0, t1), (l0, l1) = directors[order], self.tangents[order], self.lengths[order]
@@ -141,9 +134,8 @@ class RodLine:
     def mass(self, size: int, rods: list[Rod], angles: slice) -> Floats:
         """(size, 3) lumped mass of each block: half of each edge's at either node [kg]; rotary inertia [kg m2].
 
-        Parameters
-        ----------
-        angles : blocks of the twist angles, or empty.
+        Args:
+            angles: blocks of the twist angles, or empty.
         """
         mass = np.zeros((size, 3))
         half = 0.5 * self.lengths * [rod.mass_per_length for rod in rods]
@@ -158,14 +150,13 @@ class RodLine:
 class RodBends:
     """The bends of a rod: at its inner nodes in turn, then at its clamps. Build them with `of`.
 
-    Parameters
-    ----------
-    size : number of blocks of the rod.
-    angles : blocks of the edges' twist angles.
-    blocks : (b, 5) as of `BendTwist`; without twist angles the numbers of angles mean nothing.
-    lengths : (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
-    stiffness : (b, 3) EI1, EI2 and GJ over that length [N m].
-    like : (b,) the inner node whose natural strains it shares, counted from the first.
+    Args:
+        size: number of blocks of the rod.
+        angles: blocks of the edges' twist angles.
+        blocks: (b, 5) as of `BendTwist`; without twist angles the numbers of angles mean nothing.
+        lengths: (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
+        stiffness: (b, 3) EI1, EI2 and GJ over that length [N m].
+        like: (b,) the inner node whose natural strains it shares, counted from the first.
     """
 
     size: int
@@ -181,11 +172,10 @@ class RodBends:
     def of(line: RodLine, stiffness: Floats, twist: bool) -> "RodBends":
         """The bends of a line.
 
-        Parameters
-        ----------
-        stiffness : (e, 3) EI1, EI2 and GJ of the edges [N m2]; the compliances of the half edges on either side of a
-            node add up.
-        twist : the rod has twist angles.
+        Args:
+            stiffness: (e, 3) EI1, EI2 and GJ of the edges [N m2]; the compliances of the half edges on either side of a
+                node add up.
+            twist: the rod has twist angles.
         """
         n, (middles, edges) = len(line.nodes), line.inner_bends()
         angles = slice(n, n + (len(line.edges) if twist else 0))
@@ -208,9 +198,8 @@ class RodBends:
     def rest_state(self, line: RodLine, directors: Floats) -> tuple[Floats, Floats]:
         """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges.
 
-        Parameters
-        ----------
-        directors : (e, 3) first material directors of its edges.
+        Args:
+            directors: (e, 3) first material directors of its edges.
         """
         state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))
         state[: len(line.nodes)], frames[self.angles] = line.nodes, directors

@@ -57,24 +57,23 @@ COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
 class Shell:
     """The assembled shell. Build it with `of`.
 
-    Parameters
-    ----------
-    mesh : its nodes and edges, rods sharing their nodes at joints.
-    coupling : how rods that meet at a joint are tied.
-    node_count : number of the rods' nodes: the mesh's, or more where rods do not share them.
-    within : energies of single rods and linkers: bending, and twist where needed.
-    between : energies between rods and linkers: joints and ties.
-    ends : (2m,) block of each rod end, start and end of each rod in turn.
-    ghosts : (2m,) block of the ghost node past each end, or empty if the ends are pinned.
-    angles : number of twist angles, or 0.
-    spinning : (s,) block of one twist angle of each rod that could otherwise spin about itself.
-    like : (N,) the block of the shared form that each block copies: with shared DOFs the block itself.
-    edge_mass : (e,) mass of each edge [kg].
-    edge_inertia : (e,) moment of inertia of each edge about its tangent [kg m2].
-    joint_mass : (c,) mass of each crossing's joint [kg].
-    springs : energies of the supports, which act on the rods' ends.
-    slides : orthonormal directions along which rod ends may move, by the number of the end; others are held.
-    turns : (g, 2, 2) how each flat grid, from which frames are transported, is turned in its plane, of rows x, y.
+    Args:
+        mesh: its nodes and edges, rods sharing their nodes at joints.
+        coupling: how rods that meet at a joint are tied.
+        node_count: number of the rods' nodes: the mesh's, or more where rods do not share them.
+        within: energies of single rods and linkers: bending, and twist where needed.
+        between: energies between rods and linkers: joints and ties.
+        ends: (2m,) block of each rod end, start and end of each rod in turn.
+        ghosts: (2m,) block of the ghost node past each end, or empty if the ends are pinned.
+        angles: number of twist angles, or 0.
+        spinning: (s,) block of one twist angle of each rod that could otherwise spin about itself.
+        like: (N,) the block of the shared form that each block copies: with shared DOFs the block itself.
+        edge_mass: (e,) mass of each edge [kg].
+        edge_inertia: (e,) moment of inertia of each edge about its tangent [kg m2].
+        joint_mass: (c,) mass of each crossing's joint [kg].
+        springs: energies of the supports, which act on the rods' ends.
+        slides: orthonormal directions along which rod ends may move, by the number of the end; others are held.
+        turns: (g, 2, 2) how each flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
 
     mesh: GridMesh
@@ -113,23 +112,22 @@ class Shell:
     ) -> "Shell":
         """Assemble a mesh.
 
-        Parameters
-        ----------
-        mesh : if joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
-        rod : the same for all, or one for each rod of the grid; where a rod of the grid has a profile, its section
-            changes along it. Linkers without a rod of their own have the unchanged section.
-        clamped : each rod continues to a ghost node past its end that holds its direction there. The end's Voronoi
-            length is half its last edge, so that the clamp acts exactly at the end (second order). A rod may spin in
-            its clamp.
-        joint : the same for all, or one for each crossing of the grid; None: ball joints.
-        coupling : None: shared DOFs. Eccentric joints are tied by springs with any coupling.
-        twist : give the rods twist angles; None: if any energy depends on them.
-        isotropic : False: give all rods frames, as one of them needs in a larger shell; None: if these rods need them.
+        Args:
+            mesh: if joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
+            rod: the same for all, or one for each rod of the grid; where a rod of the grid has a profile, its section
+                changes along it. Linkers without a rod of their own have the unchanged section.
+            clamped: each rod continues to a ghost node past its end that holds its direction there. The end's Voronoi
+                length is half its last edge, so that the clamp acts exactly at the end (second order). A rod may spin
+                in its clamp.
+            joint: the same for all, or one for each crossing of the grid; None: ball joints.
+            coupling: None: shared DOFs. Eccentric joints are tied by springs with any coupling.
+            twist: give the rods twist angles; None: if any energy depends on them.
+            isotropic: False: give all rods frames, as one of them needs in a larger shell; None: if these rods need
+                them.
 
-        Raises
-        ------
-        InputError : an argument is of the wrong kind; rods or joints are not as many as those of the grid; joints
-            exclude each other; `twist` is False although an energy depends on twist angles.
+        Raises:
+            InputError: an argument is of the wrong kind; rods or joints are not as many as those of the grid; joints
+                exclude each other; `twist` is False although an energy depends on twist angles.
         """
         instance("mesh", mesh, GridMesh)
         require_joint(joint)
@@ -203,12 +201,11 @@ class Shell:
     def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
         """(N, 3) state of the shell.
 
-        Parameters
-        ----------
-        positions : (n, 3) of the mesh's nodes [m].
-        tangents : (2m, 3) outward unit tangents at the rod ends, which clamped ends need.
-        normals : (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
-            None: the directors are those of the flat grid, moved by the smallest rotation.
+        Args:
+            positions: (n, 3) of the mesh's nodes [m].
+            tangents: (2m, 3) outward unit tangents at the rod ends, which clamped ends need.
+            normals: (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
+                None: the directors are those of the flat grid, moved by the smallest rotation.
         """
         shared = np.zeros((int(self.like.max()) + 1, 3))
         shared[: len(positions)] = positions
@@ -240,9 +237,8 @@ class Shell:
     def with_elements(self, elements: tuple[Elements, ...]) -> "Shell":
         """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere.
 
-        Parameters
-        ----------
-        elements : those within rods and linkers, those between them, those of supports.
+        Args:
+            elements: those within rods and linkers, those between them, those of supports.
         """
         first, last = len(self.within), len(self.within) + len(self.between)
         return replace(self, within=elements[:first], between=elements[first:last], springs=elements[last:])
@@ -259,9 +255,8 @@ class Shell:
         """The same shell of flat grids that are turned in their plane, so that no edge of a shell that lies the other
         way round has to be turned right round from there.
 
-        Parameters
-        ----------
-        turns : (g, 2, 2) of each grid, of rows x, y.
+        Args:
+            turns: (g, 2, 2) of each grid, of rows x, y.
         """
         of_grids = [turns[self.grid_of[element.blocks[:, 0]]] for element in self.elements]
         frames = self.with_elements(tuple(map(turned, self.elements, of_grids)))
@@ -270,9 +265,8 @@ class Shell:
     def with_frames_of(self, elements: tuple[Elements, ...]) -> "Shell":
         """The same shell with the source frames of another one, so that twist angles mean the same in both.
 
-        Parameters
-        ----------
-        elements : of a shell on the same mesh with other stiffnesses, in the same order.
+        Args:
+            elements: of a shell on the same mesh with other stiffnesses, in the same order.
         """
         return self.with_elements(tuple(map(with_frames, self.elements, elements)))
 
@@ -295,10 +289,9 @@ class Shell:
     def turn_edges(self, state: Floats, turns: Floats) -> None:
         """Add `turns` (e,) [rad] to the twist angles in `state` of the rods' edges and their copies.
 
-        Parameters
-        ----------
-        state : (N, 3), which is changed.
-        turns : (e,) of the mesh's edges [rad].
+        Args:
+            state: (N, 3), which is changed.
+            turns: (e,) of the mesh's edges [rad].
         """
         first = self.mesh.node_count + len(self.ghosts)
         turning = np.flatnonzero((self.like >= first) & (self.like < first + len(turns)))

@@ -26,11 +26,10 @@ def with_apron(
     Pieces of a line become one rod where the net continues between them. Lines that are crossed only there become
     virtual rods. A rod keeps its end where the net ends.
 
-    Parameters
-    ----------
-    rods : each from end to end of the target.
-    lines : offsets of the lines of the lattice, see `ChebyshevNet` [m].
-    clearance : distance of the first joint past an end from that end, at least [m].
+    Args:
+        rods: each from end to end of the target.
+        lines: offsets of the lines of the lattice, see `ChebyshevNet` [m].
+        clearance: distance of the first joint past an end from that end, at least [m].
     """
     u, v = lines
     rows, columns = np.searchsorted(net.u, u - 1e-12), np.searchsorted(net.v, v - 1e-12)
@@ -53,17 +52,15 @@ def with_apron(
 class _Family:
     """The lines of one family, and its rods on them. A stretch of a line ends where the net has no node.
 
-    Parameters
-    ----------
-    name : "u" or "v".
-    stations : (n,) where the lines are crossed [m].
-    offsets : (m,) of the lines [m].
-    live : (m, n) where the net has nodes.
-    clearance : see `with_apron` [m].
+    Args:
+        name: "u" or "v".
+        stations: (n,) where the lines are crossed [m].
+        offsets: (m,) of the lines [m].
+        live: (m, n) where the net has nodes.
+        clearance: see `with_apron` [m].
 
-    Attributes
-    ----------
-    joints : (m, n) the nodes of all rods, and of `RINGS` more past their ends.
+    Attributes:
+        joints: (m, n) the nodes of all rods, and of `RINGS` more past their ends.
     """
 
     def __init__(

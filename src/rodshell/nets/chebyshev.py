@@ -40,18 +40,17 @@ _AT_JOINT = 1e-5  # edges: a rod that ends this near a joint ends at it, since r
 class ChebyshevNet:
     """The net of a layout on a target.
 
-    Parameters
-    ----------
-    rods : rods and virtual rods, each from end to end of the target: the footprint G0.
-    lines : offsets of all lines of the lattice near the target [m]: `lines[0]` (nu,) are the u of the lines of family
-        v, `lines[1]` (nv,) the v of those of family u.
-    net : the finer march, from which positions are taken.
-    error_estimate : largest |G0(fine) - G0(coarse)| / 3 over all ends of rods that are longer than two spacings: the
-        error before extrapolation [m].
-    min_angle : smallest angle between the families on the target [rad].
-    min_angle_at : x, y, z of the point where it is [m].
-    dropped : rods of the layout that are not in `rods`, with the reason.
-    pieces : of each rod of the layout that is on the target in several pieces, the names of those in `rods`.
+    Args:
+        rods: rods and virtual rods, each from end to end of the target: the footprint G0.
+        lines: offsets of all lines of the lattice near the target [m]: `lines[0]` (nu,) are the u of the lines of
+            family v, `lines[1]` (nv,) the v of those of family u.
+        net: the finer march, from which positions are taken.
+        error_estimate: largest |G0(fine) - G0(coarse)| / 3 over all ends of rods that are longer than two spacings: the
+            error before extrapolation [m].
+        min_angle: smallest angle between the families on the target [rad].
+        min_angle_at: x, y, z of the point where it is [m].
+        dropped: rods of the layout that are not in `rods`, with the reason.
+        pieces: of each rod of the layout that is on the target in several pieces, the names of those in `rods`.
     """
 
     target: Target
@@ -69,14 +68,12 @@ class ChebyshevNet:
     def positions(self, rod: FlatRod, s: Floats) -> Floats:
         """Interpolate the net along a rod, by local cubics.
 
-        Parameters
-        ----------
-        rod : one of `rods`, or a piece of one.
-        s : (n,) material coordinates [m].
+        Args:
+            rod: one of `rods`, or a piece of one.
+            s: (n,) material coordinates [m].
 
-        Returns
-        -------
-        (n, 3) points [m].
+        Returns:
+            (n, 3) points [m].
         """
         return self._along((rod,), np.zeros(1, dtype=np.intp), s, np.arange(len(s)), len(s))
 
@@ -109,19 +106,17 @@ def chebyshev_net(
 ) -> ChebyshevNet:
     """March the net of `layout` over `target` and cut it at the target's end.
 
-    Parameters
-    ----------
-    anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
-    warm_start : a similar net, from which this one is computed faster; the result is the same to round-off.
-    eccentricity : distance of the rods' centre lines at their joints [m]. Rods of family u are half of it below the
-        target and those of family v half of it above, each on the parallel surface there: a rod's material length is
-        that of its own line, so that the flat grid is the layout's straight lattice, and its ends are over the
-        target's end, along the normal.
+    Args:
+        anchor: x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+        warm_start: a similar net, from which this one is computed faster; the result is the same to round-off.
+        eccentricity: distance of the rods' centre lines at their joints [m]. Rods of family u are half of it below the
+            target and those of family v half of it above, each on the parallel surface there: a rod's material length
+            is that of its own line, so that the flat grid is the layout's straight lattice, and its ends are over the
+            target's end, along the normal.
 
-    Raises
-    ------
-    NetLimitError : the crossing angle falls below 10 degrees or the march fails inside the target; names the place.
-    InputError : the anchor is outside the target, the spacing is too large, or a rod is too short to reach the end.
+    Raises:
+        NetLimitError: the crossing angle falls below 10 degrees or the march fails inside the target; names the place.
+        InputError: the anchor is outside the target, the spacing is too large, or a rod is too short to reach the end.
     """
     instance("target", target, Target)
     instance("layout", layout, GridLayout)
@@ -235,9 +230,8 @@ def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
 def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
     """Smallest angle between the families over the inside nodes [rad], from central differences, and its place.
 
-    Raises
-    ------
-    NetLimitError : a node next to an inside one is missing.
+    Raises:
+        NetLimitError: a node next to an inside one is missing.
     """
     i, j, angle, whole = _sharpest(net.points, net.inside)
     if not whole:

@@ -32,11 +32,10 @@ TOLERANCE = 1e-7  # of the step: Newton doubles the digits, so that a change bel
 class Net:
     """Nodes of a net on a surface.
 
-    Parameters
-    ----------
-    u, v : (nu,), (nv,) ascending material coordinates of the net's lines, both containing 0 [m].
-    points : (nu, nv, 3) positions [m]; NaN where the march found none.
-    heights : of the rods of families u and v above the surface, along its normal [m].
+    Args:
+        u, v: (nu,), (nv,) ascending material coordinates of the net's lines, both containing 0 [m].
+        points: (nu, nv, 3) positions [m]; NaN where the march found none.
+        heights: of the rods of families u and v above the surface, along its normal [m].
     """
 
     u: Floats
@@ -57,10 +56,9 @@ class Net:
 class Axes(NamedTuple):
     """Where the axes of a net cross.
 
-    Parameters
-    ----------
-    anchor : (3,) point of the surface [m].
-    tangents : (4, 3) unit tangents there, towards +u, -u, +v and -v.
+    Args:
+        anchor: (3,) point of the surface [m].
+        tangents: (4, 3) unit tangents there, towards +u, -u, +v and -v.
     """
 
     anchor: Floats
@@ -72,11 +70,10 @@ def march(
 ) -> Net:
     """March the net from its two axes.
 
-    Parameters
-    ----------
-    u, v : ascending material coordinates of the lines, both containing 0 [m].
-    anchor, heading : see `axes`.
-    heights : see `Net`.
+    Args:
+        u, v: ascending material coordinates of the lines, both containing 0 [m].
+        anchor, heading: see `axes`.
+        heights: see `Net`.
     """
     points = np.full((len(u), len(v), 3), np.nan)
     net = Net(u, v, points, heights=heights)
@@ -88,10 +85,9 @@ def march(
 def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERANCE) -> None:
     """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
 
-    Parameters
-    ----------
-    net : whose points on the axes are set.
-    tolerance : see `geodesics`.
+    Args:
+        net: whose points on the axes are set.
+        tolerance: see `geodesics`.
     """
     i0, j0 = net.origin
     anchor, tangents = start
@@ -113,11 +109,10 @@ def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERA
 def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
     """The axes through a point of a surface.
 
-    Parameters
-    ----------
-    anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
-        parts in the tangent plane are used.
+    Args:
+        anchor: (3,) point of the surface where the axes cross [m].
+        heading: (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
+            parts in the tangent plane are used.
     """
     normal = target.level(anchor[None])[1][0]
     along = heading - (heading @ normal / (normal @ normal))[..., None] * normal
@@ -129,9 +124,8 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
 class Layer:
     """The surface parallel to a target, with what a march needs of it.
 
-    Parameters
-    ----------
-    height : of the layer above it, along its normals [m].
+    Args:
+        height: of the layer above it, along its normals [m].
     """
 
     target: Target
@@ -166,16 +160,15 @@ def geodesics(
     The next chord lies in the plane of the last chord's direction and the surface normal at the node, so that
     the curve has no geodesic curvature.
 
-    Parameters
-    ----------
-    start : (k, 3) points of the surface [m].
-    direction : (k, 3) unit tangents there.
-    steps : k arrays of chord lengths [m].
-    tolerance : of Newton's last change of a chord, relative to its length; the error that is left is about its square.
+    Args:
+        start: (k, 3) points of the surface [m].
+        direction: (k, 3) unit tangents there.
+        steps: k arrays of chord lengths [m].
+        tolerance: of Newton's last change of a chord, relative to its length; the error that is left is about its
+            square.
 
-    Returns
-    -------
-    k arrays (len(steps), 3) of points; NaN from where a chord finds no surface.
+    Returns:
+        k arrays (len(steps), 3) of points; NaN from where a chord finds no surface.
     """
     count = len(steps)
     chords = np.zeros((max((len(s) for s in steps), default=0), count))
@@ -269,10 +262,9 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
 
     If only the axes are known, these are on one anti-diagonal after the other.
 
-    Parameters
-    ----------
-    wanted : (nu, nv) nodes to find; default all.
-    tolerance : of Newton's last change of a node, relative to the step; the error that is left is about its square.
+    Args:
+        wanted: (nu, nv) nodes to find; default all.
+        tolerance: of Newton's last change of a node, relative to the step; the error that is left is about its square.
     """
     tried = np.zeros(net.points.shape[:2], dtype=bool) if wanted is None else ~wanted
     diagonal = 2
@@ -379,12 +371,11 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
 
     `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers.
 
-    Parameters
-    ----------
-    x, y : vectors from A and from B to P [m].
-    by_x, by_y : gradients of x^2/2 and y^2/2 by P [m].
-    g : gradient of f at P.
-    from_a, from_b : wanted lengths of x and y [m].
+    Args:
+        x, y: vectors from A and from B to P [m].
+        by_x, by_y: gradients of x^2/2 and y^2/2 by P [m].
+        g: gradient of f at P.
+        from_a, from_b: wanted lengths of x and y [m].
     """
     inverse = inverse_of(by_x, by_y, g)
     return solution(inverse, past(x, from_a), past(y, from_b), level), inverse[3]
@@ -426,14 +417,13 @@ def sine_of(volume, g, from_a, from_b):  # type: ignore[no-untyped-def]
 def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers.
 
-    Parameters
-    ----------
-    p : the point P of the surface [m].
-    a, b : points A and B of their layers [m].
-    g : gradient of f at P.
-    hessian : (3, 3) second derivatives of f at P.
-    heights : (2,) h_u and h_v, of the layers above the surface [m].
-    from_a, from_b : wanted lengths of x and y [m].
+    Args:
+        p: the point P of the surface [m].
+        a, b: points A and B of their layers [m].
+        g: gradient of f at P.
+        hessian: (3, 3) second derivatives of f at P.
+        heights: (2,) h_u and h_v, of the layers above the surface [m].
+        from_a, from_b: wanted lengths of x and y [m].
     """
     steep = np.sqrt(dot(g, g))
     n = (g[0] / steep, g[1] / steep, g[2] / steep)

@@ -19,10 +19,9 @@ MOST_STEPS = 100  # of false position; 10 are usual
 class Cuts(NamedTuple):
     """The parts of lines that are on the target, line by line and along each.
 
-    Parameters
-    ----------
-    line : (k,) index of the line of each part, ascending.
-    ends : (k, 2) material coordinates of its ends [m].
+    Args:
+        line: (k,) index of the line of each part, ascending.
+        ends: (k, 2) material coordinates of its ends [m].
     """
 
     line: Ints
@@ -39,9 +38,8 @@ def inside_nodes(target: Target, net: Net) -> Bools:
 
     If the anchor is in an opening, they are connected with the first inside nodes along the axes.
 
-    Returns
-    -------
-    (nu, nv) booleans.
+    Returns:
+        (nu, nv) booleans.
     """
     region = _region(target, net)
     runs, reached = _runs(region), np.zeros_like(region)
@@ -142,11 +140,10 @@ def _set_inside(asked, margin, inside):  # type: ignore[no-untyped-def]
 class Lines(NamedTuple):
     """Lines of one family of a net.
 
-    Parameters
-    ----------
-    s : (n,) material coordinates of the nodes along them [m].
-    points : (m, n, 3) nodes of each line [m]; NaN where there is none.
-    inside : (m, n) which nodes are inside the target's end.
+    Args:
+        s: (n,) material coordinates of the nodes along them [m].
+        points: (m, n, 3) nodes of each line [m]; NaN where there is none.
+        inside: (m, n) which nodes are inside the target's end.
     """
 
     s: Floats
@@ -157,14 +154,12 @@ class Lines(NamedTuple):
 def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> list[Cuts]:
     """Cut lines of nets at the target's end, to fourth order between nodes.
 
-    Parameters
-    ----------
-    sets : lines of one family of one net each.
-    depth : pieces that are nowhere further inside than this only graze the end and are ignored [m].
+    Args:
+        sets: lines of one family of one net each.
+        depth: pieces that are nowhere further inside than this only graze the end and are ignored [m].
 
-    Returns
-    -------
-    For each set the pieces of its lines; none of a line without inside nodes.
+    Returns:
+        For each set the pieces of its lines; none of a line without inside nodes.
     """
     runs = _deep(target, sets, [_runs(lines.inside) for lines in sets], depth)
     count = 2 * sum(len(run) for run in runs)
@@ -239,10 +234,9 @@ def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: 
     By false position (Illinois): an end of the bracket that does not move twice is weighted by half in the next step.
     A root that was found is not evaluated again.
 
-    Parameters
-    ----------
-    knots, points : (n, 4), (n, 4, 3) places of the nodes on their line [m], and the nodes [m].
-    outer, inner : (n,) places outside and inside the end [m].
+    Args:
+        knots, points: (n, 4), (n, 4, 3) places of the nodes on their line [m], and the nodes [m].
+        outer, inner: (n,) places outside and inside the end [m].
     """
     below = np.minimum(target.margin(lagrange(knots, points, outer)), 0.0)
     above = target.margin(lagrange(knots, points, inner))
@@ -299,14 +293,12 @@ def extrapolated(coarse: Cuts, fine: Cuts, lines: int, step: float) -> tuple[Cut
     marches may find different pieces. An end that only the finer march finds is kept; its error is at most about half
     the gap or piece that the other march does not find, or the distance to its nearest end.
 
-    Parameters
-    ----------
-    coarse, fine : cuts of the lines from the two marches.
-    step : distance within which ends are matched [m].
+    Args:
+        coarse, fine: cuts of the lines from the two marches.
+        step: distance within which ends are matched [m].
 
-    Returns
-    -------
-    The cuts, and for each line a bound (lines,) of the finer march's error [m].
+    Returns:
+        The cuts, and for each line a bound (lines,) of the finer march's error [m].
     """
     ends, errors = fine.ends.copy(), np.zeros(lines)
     _extrapolate(coarse.line, coarse.ends, fine.line, fine.ends, step, ends, errors)

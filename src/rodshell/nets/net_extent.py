@@ -35,9 +35,8 @@ _FEWEST_STEPS = 6  # from each line to the next
 class Covering(Net):
     """A net that covers a target: its points are known inside the target's end, and some way past it.
 
-    Parameters
-    ----------
-    inside : (nu, nv) nodes inside the target's end, see `inside_nodes`.
+    Args:
+        inside: (nu, nv) nodes inside the target's end, see `inside_nodes`.
     """
 
     inside: Bools
@@ -45,13 +44,11 @@ class Covering(Net):
     def reach(self, past: int) -> Floats:
         """How far the inside nodes reach towards -u, +u, -v and +v.
 
-        Parameters
-        ----------
-        past : number of nodes that are added each way.
+        Args:
+            past: number of nodes that are added each way.
 
-        Returns
-        -------
-        (4,) [m].
+        Returns:
+            (4,) [m].
         """
         result = list[float]()
         for s, touched in ((self.u, self.inside.any(axis=1)), (self.v, self.inside.any(axis=0))):
@@ -77,14 +74,13 @@ def march_covering(
 
     Where the target ends is taken from a net in longer steps; where that was wrong, the march is continued.
 
-    Parameters
-    ----------
-    u, v : (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
-    margin : (2,) along u and v [m].
-    near : the net in longer steps.
-    coarser : the same net in yet longer steps, see `march_near`.
-    heights : see `Net`.
-    converged : see `march_near`.
+    Args:
+        u, v: (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
+        margin: (2,) along u and v [m].
+        near: the net in longer steps.
+        coarser: the same net in yet longer steps, see `march_near`.
+        heights: see `Net`.
+        converged: see `march_near`.
     """
     wanted = wanted_nodes(near, 1, u, v, margin)
     net = march_near(target, u, v, start, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged)
@@ -98,16 +94,14 @@ def march_covering(
 def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
     """Nodes inside the target's end or within a margin of it, and all between these and the axes.
 
-    Parameters
-    ----------
-    near : a net in longer steps; if it has no inside nodes, all nodes are wanted.
-    past : the end may be so many of its nodes past the inside ones.
-    u, v : (nu,), (nv,) material coordinates of the lines [m].
-    margin : (2,) along u and v [m].
+    Args:
+        near: a net in longer steps; if it has no inside nodes, all nodes are wanted.
+        past: the end may be so many of its nodes past the inside ones.
+        u, v: (nu,), (nv,) material coordinates of the lines [m].
+        margin: (2,) along u and v [m].
 
-    Returns
-    -------
-    (nu, nv) booleans.
+    Returns:
+        (nu, nv) booleans.
     """
     wanted = np.zeros((len(u), len(v)), dtype=bool)
     _want_nodes(near, past, u, v, margin, wanted)
@@ -160,11 +154,10 @@ def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # 
 class LatticeLines:
     """The lines of the lattice that can touch a target.
 
-    Parameters
-    ----------
-    u : offsets of the lines of family v, which cross the u axis [m].
-    v : offsets of the lines of family u [m].
-    nodes : the u and the v of all nodes of the finer march [m].
+    Args:
+        u: offsets of the lines of family v, which cross the u axis [m].
+        v: offsets of the lines of family u [m].
+        nodes: the u and the v of all nodes of the finer march [m].
     """
 
     u: Floats
@@ -182,19 +175,16 @@ def find_lines(
 ) -> tuple[LatticeLines, Covering]:
     """Find the lattice lines that can touch the target, and `MARGIN` spacings more.
 
-    Parameters
-    ----------
-    near : a net that may be similar, or None.
-    parts : steps of the march per spacing.
-    heights : see `Net`.
+    Args:
+        near: a net that may be similar, or None.
+        parts: steps of the march per spacing.
+        heights: see `Net`.
 
-    Returns
-    -------
-    The lines, and the march that found them.
+    Returns:
+        The lines, and the march that found them.
 
-    Raises
-    ------
-    InputError : there would be too many lines or nodes, or none inside the target.
+    Raises:
+        InputError: there would be too many lines or nodes, or none inside the target.
     """
     step, margin = _across(layout) / parts, MARGIN * _across(layout)
     spare = np.repeat(margin, 2)
@@ -267,12 +257,11 @@ def march_lines(
 ) -> Covering:
     """March the net of lines at some of its nodes.
 
-    Parameters
-    ----------
-    lines : see `find_lines`.
-    every : 1 for all nodes, 2 for every second node.
-    near : one or two nets in longer steps, the finer first.
-    heights : see `Net`.
+    Args:
+        lines: see `find_lines`.
+        every: 1 for all nodes, 2 for every second node.
+        near: one or two nets in longer steps, the finer first.
+        heights: see `Net`.
     """
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
     return march_covering(target, u, v, start, MARGIN * _across(layout), *near, heights=heights)

@@ -53,12 +53,11 @@ def march_near(
 ) -> Net:
     """March a net as `march` does, starting from a similar net; a bad guess costs time, not accuracy.
 
-    Parameters
-    ----------
-    target, u, v, heights : see `march`.
-    coarser : the same net as `near` in longer steps, from which the start is extrapolated.
-    wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
-    converged : the last motion of nodes, relative to the target's size; the error that is left is its third power.
+    Args:
+        target, u, v, heights: see `march`.
+        coarser: the same net as `near` in longer steps, from which the start is extrapolated.
+        wanted: (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
+        converged: the last motion of nodes, relative to the target's size; the error that is left is its third power.
     """
     guess = near if coarser is None else _extrapolated(near, coarser, u, v)
     net = Net(u, v, interpolated(guess, u, v), heights=heights)
@@ -97,13 +96,11 @@ def _add_change(near, coarser, share):  # type: ignore[no-untyped-def]
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
     """Interpolate a net by local cubics both ways, which also extrapolate a little past its last nodes.
 
-    Parameters
-    ----------
-    u, v : (nu,), (nv,) material coordinates wanted [m].
+    Args:
+        u, v: (nu,), (nv,) material coordinates wanted [m].
 
-    Returns
-    -------
-    (nu, nv, 3) points [m]; NaN further away.
+    Returns:
+        (nu, nv, 3) points [m]; NaN further away.
     """
     i0, j0 = net.origin
     return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))

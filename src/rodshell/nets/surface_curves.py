@@ -43,9 +43,8 @@ def geodesic(target: Target, x: Floats, tangents: Floats) -> tuple[Floats, Float
 def asymptotic(target: Target, x: Floats, tangents: Floats) -> tuple[Floats, Floats]:
     """The `Law` of curves without normal curvature: of both directions the one nearest to the last.
 
-    Raises
-    ------
-    NetLimitError : there is none, since K >= 0; names the place.
+    Raises:
+        NetLimitError: there is none, since K >= 0; names the place.
     """
     _, gradient, hessian = target.implicit(x)
     normal = unit(gradient)
@@ -68,12 +67,11 @@ def asymptotic(target: Target, x: Floats, tangents: Floats) -> tuple[Floats, Flo
 class SurfaceCurves:
     """Curves on a target by arc length, with s = 0 at their seeds, as quintics between knots at multiples of a step.
 
-    Parameters
-    ----------
-    step : between knots [m].
-    begin : (m + 1,) where the knots of each curve begin.
-    before : (m,) knots of each curve before its seed.
-    points, tangents : (k, 3) of the knots, the tangents of length 1.
+    Args:
+        step: between knots [m].
+        begin: (m + 1,) where the knots of each curve begin.
+        before: (m,) knots of each curve before its seed.
+        points, tangents: (k, 3) of the knots, the tangents of length 1.
     """
 
     target: Target
@@ -92,10 +90,9 @@ class SurfaceCurves:
     def at(self, curve: Ints, s: Floats) -> tuple[Floats, Floats]:
         """Points (n, 3) [m] and unit tangents (n, 3) of curves.
 
-        Parameters
-        ----------
-        curve : (n,) indices of curves.
-        s : (n,) arc lengths on them [m].
+        Args:
+            curve: (n,) indices of curves.
+            s: (n,) arc lengths on them [m].
         """
         place = s / self.step + self.before[curve]
         last = self.begin[curve + 1] - self.begin[curve] - 2
@@ -159,9 +156,8 @@ class SurfaceCurves:
     def crossings(self, family: Ints) -> Crossings:
         """Where curves of different families cross, up to their last knots.
 
-        Parameters
-        ----------
-        family : (m,) of each curve.
+        Args:
+            family: (m,) of each curve.
         """
         curve = np.repeat(np.arange(len(self)), np.diff(self.begin))
         s = self.step * (np.arange(len(self.points)) - (self.begin[:-1] + self.before)[curve])
@@ -194,15 +190,13 @@ class SurfaceCurves:
 def trace(target: Target, law: Law, seeds: Floats, tangents: Floats) -> SurfaceCurves:
     """Follow curves both ways from their seeds to the end of the target, all at once.
 
-    Parameters
-    ----------
-    law : of the curves, `geodesic` or `asymptotic`.
-    seeds : (m, 3) points of the target inside its end [m].
-    tangents : (m, 3) unit tangents there.
+    Args:
+        law: of the curves, `geodesic` or `asymptotic`.
+        seeds: (m, 3) points of the target inside its end [m].
+        tangents: (m, 3) unit tangents there.
 
-    Raises
-    ------
-    NetLimitError : a curve does not reach the end, or cannot be continued; names the place.
+    Raises:
+        NetLimitError: a curve does not reach the end, or cannot be continued; names the place.
     """
     step, count = STEP * target.size, len(seeds)
     x, t = np.tile(seeds, (2, 1)), np.vstack([tangents, -tangents])

@@ -18,11 +18,10 @@ from rodshell.targets import Target
 class SurfaceNet:
     """Rods along curves of a target, joined where rods of different families cross.
 
-    Parameters
-    ----------
-    curves : of the rods, from past an end of the target to past another.
-    family : (m,) of each rod, from 0.
-    crossings : of the rods, with the arc lengths of `curves`.
+    Args:
+        curves: of the rods, from past an end of the target to past another.
+        family: (m,) of each rod, from 0.
+        crossings: of the rods, with the arc lengths of `curves`.
     """
 
     lattice: SurfaceLattice
@@ -47,15 +46,14 @@ class SurfaceNet:
 def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float, float] | None = None) -> SurfaceNet:
     """March the rods of a lattice over a target.
 
-    Parameters
-    ----------
-    anchor : x, y of the point of the target from which the rods are set out [m]; default: the target's highest point.
+    Args:
+        anchor: x, y of the point of the target from which the rods are set out [m]; default: the target's highest
+            point.
 
-    Raises
-    ------
-    NetLimitError : a curve does not reach the end of the target, or there is none where it is not a saddle; names the
-        place.
-    InputError : the anchor is outside the target.
+    Raises:
+        NetLimitError: a curve does not reach the end of the target, or there is none where it is not a saddle; names
+            the place.
+        InputError: the anchor is outside the target.
     """
     place = target.lift(np.array([anchor if anchor is not None else target.summit]))
     if not target.covers(place)[0]:

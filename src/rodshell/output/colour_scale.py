@@ -34,12 +34,11 @@ FINEST = 1e-3  # mm; smaller gaps are drawn like none
 class Scale:
     """What colours a shell's rods.
 
-    Parameters
-    ----------
-    values : (k,) at each entry of `rod_nodes`, in the unit that the caption names.
-    low, high : values at both ends of the map.
-    colours : control points of the map, evenly spaced, "#rrggbb".
-    caption : what the values are, with their unit.
+    Args:
+        values: (k,) at each entry of `rod_nodes`, in the unit that the caption names.
+        low, high: values at both ends of the map.
+        colours: control points of the map, evenly spaced, "#rrggbb".
+        caption: what the values are, with their unit.
     """
 
     values: Floats
@@ -62,12 +61,11 @@ class Scale:
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
     """The scale of a shape, the same for all shapes of an archive; None where its rods have the colours of families.
 
-    Parameters
-    ----------
-    archive : the result that the shape belongs to.
-    shape : the one whose rods are coloured.
-    colour : "stress"; "curvature"; "force", along the rods; or "gap": signed distance to the target, or height where
-        there is no target.
+    Args:
+        archive: the result that the shape belongs to.
+        shape: the one whose rods are coloured.
+        colour: "stress"; "curvature"; "force", along the rods; or "gap": signed distance to the target, or height where
+            there is no target.
     """
     nodes = archive.states["rod_nodes"]
     if colour == "stress":
@@ -88,10 +86,9 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
 def gap_scale(gaps: Floats, largest: float) -> Scale:
     """The scale of signed distances to the target.
 
-    Parameters
-    ----------
-    gaps : (k,) at each entry of `rod_nodes` [m].
-    largest : of all shapes that have the scale [mm].
+    Args:
+        gaps: (k,) at each entry of `rod_nodes` [m].
+        largest: of all shapes that have the scale [mm].
     """
     factor, unit = length_unit(largest)
     limit = _rounded_up(max(largest, FINEST) / factor)
@@ -101,10 +98,9 @@ def gap_scale(gaps: Floats, largest: float) -> Scale:
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
     """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too.
 
-    Parameters
-    ----------
-    archive : the result that the shape belongs to.
-    shape : one whose gaps are known.
+    Args:
+        archive: the result that the shape belongs to.
+        shape: one whose gaps are known.
     """
     assert shape.gap is not None
     points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
@@ -189,11 +185,10 @@ def _rounded_up(largest: float) -> float:
 def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
     """Draw the map with ticks and caption.
 
-    Parameters
-    ----------
-    scale : the map, its range and its caption.
-    right : x at which the bar ends [drawing units].
-    y : baseline of the numbers [drawing units].
+    Args:
+        scale: the map, its range and its caption.
+        right: x at which the bar ends [drawing units].
+        y: baseline of the numbers [drawing units].
     """
     length = 200.0
     left, step = right - length, length / BINS
@@ -211,10 +206,9 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
 def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
     """Colours "#rrggbb" in a map of evenly spaced control points.
 
-    Parameters
-    ----------
-    points : colours "#rrggbb" of the control points.
-    shares : (k,) places in the map, from 0 (its first point) to 1 (its last).
+    Args:
+        points: colours "#rrggbb" of the control points.
+        shares: (k,) places in the map, from 0 (its first point) to 1 (its last).
     """
     table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
     at = np.linspace(0.0, 1.0, len(points))
@@ -226,10 +220,9 @@ def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
 def mixed(colour: str, other: str, share: float) -> str:
     """A mixture of two colours, as "#rrggbb".
 
-    Parameters
-    ----------
-    colour, other : the two colours, "#rrggbb".
-    share : of the other colour, 0 to 1.
+    Args:
+        colour, other: the two colours, "#rrggbb".
+        share: of the other colour, 0 to 1.
     """
     pairs = ((int(colour[k : k + 2], 16), int(other[k : k + 2], 16)) for k in (1, 3, 5))
     return "#" + "".join(f"{round(a + share * (b - a)):02x}" for a, b in pairs)
@@ -252,9 +245,8 @@ class TrialLike(Protocol):
 def search_svg(title: str, trials: tuple[TrialLike, ...], best: TrialLike) -> str:
     """Values in cells, dark the smallest; what failed stays empty.
 
-    Parameters
-    ----------
-    best : the one to be framed.
+    Args:
+        best: the one to be framed.
     """
     anchors = list(dict.fromkeys(trial.anchor for trial in trials))
     headings = list(dict.fromkeys(trial.heading for trial in trials))

@@ -35,12 +35,11 @@ CAPITAL = 0.729  # height of a capital over the text size
 class Layer:
     """How a layer looks.
 
-    Parameters
-    ----------
-    colour : "#rrggbb".
-    pen : width of its lines [mm of paper].
-    number : of the colour in AutoCAD's table.
-    dash : lengths of a dash and of the gap after it [mm of paper]; empty: lines are solid.
+    Args:
+        colour: "#rrggbb".
+        pen: width of its lines [mm of paper].
+        number: of the colour in AutoCAD's table.
+        dash: lengths of a dash and of the gap after it [mm of paper]; empty: lines are solid.
     """
 
     colour: str
@@ -64,12 +63,11 @@ FORBIDDEN = '<>/\\":;?*|=`,'  # in a layer's name [DXF reference]
 class Pen(NamedTuple):
     """How a path or mark looks that does not look like its layer.
 
-    Parameters
-    ----------
-    colour : of the line, "#rrggbb".
-    width : of the line [mm]; 0: there is none.
-    dash : lengths of dashes and gaps in turn [mm].
-    fill : colour of the inside; "": it is not filled.
+    Args:
+        colour: of the line, "#rrggbb".
+        width: of the line [mm]; 0: there is none.
+        dash: lengths of dashes and gaps in turn [mm].
+        fill: colour of the inside; "": it is not filled.
     """
 
     colour: str
@@ -81,12 +79,11 @@ class Pen(NamedTuple):
 class Path(NamedTuple):
     """A polyline.
 
-    Parameters
-    ----------
-    points : (k, 2) [mm], or (k, 3) in space, which only DXF shows.
-    layer : a key of `LAYERS`.
-    pen : None: that of the layer.
-    name : the rod that it stands for; note : shown where the pointer is, in SVG.
+    Args:
+        points: (k, 2) [mm], or (k, 3) in space, which only DXF shows.
+        layer: a key of `LAYERS`.
+        pen: None: that of the layer.
+        name: the rod that it stands for; note : shown where the pointer is, in SVG.
     """
 
     points: Floats
@@ -104,11 +101,10 @@ class Path(NamedTuple):
 class Mark(NamedTuple):
     """A circle.
 
-    Parameters
-    ----------
-    at : (2,) its middle [mm].
-    radius : [mm].
-    layer, pen, note : as of `Path`.
+    Args:
+        at: (2,) its middle [mm].
+        radius: [mm].
+        layer, pen, note: as of `Path`.
     """
 
     at: Floats
@@ -121,13 +117,12 @@ class Mark(NamedTuple):
 class Text(NamedTuple):
     """One line of text.
 
-    Parameters
-    ----------
-    at : (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
-    size : of the font [mm].
-    angle : of the baseline against x [rad].
-    colour : "": that of the layer.
-    halo : colour of a rim that sets it off against lines behind it; "": none. PDF and DXF have none.
+    Args:
+        at: (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
+        size: of the font [mm].
+        angle: of the baseline against x [rad].
+        colour: "": that of the layer.
+        halo: colour of a rim that sets it off against lines behind it; "": none. PDF and DXF have none.
     """
 
     text: str
@@ -152,11 +147,10 @@ BACK: dict[_Anchor, float] = {"start": 0.0, "middle": -0.5, "end": -1.0}  # wher
 def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[T, T]]:
     """x and y of the four corners of a text's room, or of many: of numbers, or of arrays (t,).
 
-    Parameters
-    ----------
-    x, y : where its baseline starts, is centred or ends.
-    c, s : cosine and sine of the angle of its baseline.
-    back : where it begins, see `BACK`.
+    Args:
+        x, y: where its baseline starts, is centred or ends.
+        c, s: cosine and sine of the angle of its baseline.
+        back: where it begins, see `BACK`.
     """
     width = LETTER * size * letters
     left = back * width
@@ -168,10 +162,9 @@ def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[
 class Drawing:
     """A drawing.
 
-    Parameters
-    ----------
-    text : usual size of its texts [mm]; pens are as wide as on paper with texts of the size TEXT.
-    left_out : what found no room, in words.
+    Args:
+        text: usual size of its texts [mm]; pens are as wide as on paper with texts of the size TEXT.
+        left_out: what found no room, in words.
     """
 
     name: str
@@ -228,10 +221,9 @@ class Drawing:
     def placed(self, scale: float, shift: Floats) -> "Drawing":
         """The drawing scaled about the origin, with its pens and texts, then shifted. Paths in space are left out.
 
-        Parameters
-        ----------
-        scale : new lengths over old ones.
-        shift : (2,) [mm].
+        Args:
+            scale: new lengths over old ones.
+            shift: (2,) [mm].
         """
         paths = [path for path in self.paths if path.flat]
         used = {id(pen): pen for pen in (*(path.pen for path in paths), *(mark.pen for mark in self.marks))}
@@ -260,9 +252,8 @@ class Drawing:
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
         """The part within a rectangle; marks and texts that cross its border, and paths in space, are left out.
 
-        Parameters
-        ----------
-        low, high : (2,) lower left and upper right corner of the rectangle [mm].
+        Args:
+            low, high: (2,) lower left and upper right corner of the rectangle [mm].
         """
         flat = [path for path in self.paths if path.flat]
         extents = self._extents
@@ -299,46 +290,42 @@ class Pencil:
     def line(self, points: Iterable[Iterable[float]], layer: str, **look: object) -> None:
         """Add a polyline.
 
-        Parameters
-        ----------
-        points : (k, 2), or (k, 3) in space [mm].
-        layer : a key of `LAYERS`.
-        look : further fields of `Path`, such as its pen.
+        Args:
+            points: (k, 2), or (k, 3) in space [mm].
+            layer: a key of `LAYERS`.
+            look: further fields of `Path`, such as its pen.
         """
         self.paths.append(Path(np.array(points, dtype=float), layer, **look))  # type: ignore[arg-type]
 
     def mark(self, at: Iterable[float], radius: float, layer: str, **look: object) -> None:
         """Add a circle.
 
-        Parameters
-        ----------
-        at : (2,) its middle [mm].
-        radius : [mm].
-        layer : a key of `LAYERS`.
-        look : further fields of `Mark`, such as its pen.
+        Args:
+            at: (2,) its middle [mm].
+            radius: [mm].
+            layer: a key of `LAYERS`.
+            look: further fields of `Mark`, such as its pen.
         """
         self.marks.append(Mark(np.array(at, dtype=float), radius, layer, **look))  # type: ignore[arg-type]
 
     def write(self, text: str, at: Iterable[float], size: float, layer: str, **look: object) -> None:
         """Add a line of text.
 
-        Parameters
-        ----------
-        at : (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
-        size : of the font [mm].
-        layer : a key of `LAYERS`.
-        look : further fields of `Text`, such as its anchor.
+        Args:
+            at: (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
+            size: of the font [mm].
+            layer: a key of `LAYERS`.
+            look: further fields of `Text`, such as its anchor.
         """
         self.texts.append(Text(text, np.array(at, dtype=float), size, layer, **look))  # type: ignore[arg-type]
 
     def leave_out(self, count: int, of: int, what: str) -> None:
         """Record that texts found no room.
 
-        Parameters
-        ----------
-        count : number of texts that were left out; nothing is recorded for 0.
-        of : number of all such texts.
-        what : what the texts are, in words.
+        Args:
+            count: number of texts that were left out; nothing is recorded for 0.
+            of: number of all such texts.
+            what: what the texts are, in words.
         """
         if count:
             self.left_out.append(f"{'all' if count == of > 1 else count} of {of} {what}")
@@ -346,10 +333,9 @@ class Pencil:
     def done(self, name: str, title: str, text: float) -> Drawing:
         """The drawing of all that was added.
 
-        Parameters
-        ----------
-        title : of the drawing, in words.
-        text : usual size of its texts [mm].
+        Args:
+            title: of the drawing, in words.
+            text: usual size of its texts [mm].
         """
         return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts), tuple(self.left_out))
 
@@ -370,9 +356,8 @@ def _moved(groups: Sequence[Floats], scale: float, shift: Floats) -> list[Floats
 def within(box: Floats, low: Floats, high: Floats) -> bool:
     """Whether all points (k, 2) lie in a rectangle.
 
-    Parameters
-    ----------
-    box : (k, 2) points; low, high : (2,) lower left and upper right corner of the rectangle.
+    Args:
+        box: (k, 2) points; low, high : (2,) lower left and upper right corner of the rectangle.
     """
     (left, bottom), (right, top) = low.tolist(), high.tolist()
     return all(left <= x <= right and bottom <= y <= top for x, y in box.tolist())

@@ -27,10 +27,9 @@ _STYLES = {False: ("SANS", "arial.ttf"), True: ("SANS-BOLD", "arialbd.ttf")}  # 
 def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str:
     """The text of a DXF file: a LINE, LWPOLYLINE or 3D POLYLINE for each path, a CIRCLE a mark, a TEXT a text.
 
-    Parameters
-    ----------
-    drawing : at 1:1 [mm].
-    names : for some layers the name that they take in the file (see `layer_names`).
+    Args:
+        drawing: at 1:1 [mm].
+        names: for some layers the name that they take in the file (see `layer_names`).
     """
     document = ezdxf.new("R2010", units=ezdxf.units.MM)
     layers = layer_names(names or {})
@@ -48,9 +47,8 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
 def layer_names(names: Mapping[str, str]) -> dict[str, str]:
     """The name of each layer in a file: without characters that DXF forbids, and unique in upper and lower case.
 
-    Parameters
-    ----------
-    names : the wished names of some layers, by those of `LAYERS`.
+    Args:
+        names: the wished names of some layers, by those of `LAYERS`.
     """
     shown, taken = dict[str, str](), {"0", "DEFPOINTS"}  # which every file has
     for layer in LAYERS:

@@ -35,17 +35,15 @@ def save(
 ) -> Path:
     """Write the whole result folder, replacing an older result's files and no others; returns its absolute path.
 
-    Parameters
-    ----------
-    kinds : of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: all but 3dm.
-    force : also replace files that rodshell did not write, or that were changed since, where it has to write.
-    progress : called for each kind of files; where it raises OutOfTimeError the archive is written and the kinds that
-        are left are not, with a warning that names them.
+    Args:
+        kinds: of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: all but 3dm.
+        force: also replace files that rodshell did not write, or that were changed since, where it has to write.
+        progress: called for each kind of files; where it raises OutOfTimeError the archive is written and the kinds
+            that are left are not, with a warning that names them.
 
-    Raises
-    ------
-    InputError : an unknown kind, or a form in place of its archive. ForeignFileError : such files are there, and
-        `force` is False. OutputError : the folder cannot be written.
+    Raises:
+        InputError: an unknown kind, or a form in place of its archive. ForeignFileError : such files are there, and
+            `force` is False. OutputError : the folder cannot be written.
     """
     _require_archive(archive)
     flag("force", force)
@@ -84,14 +82,12 @@ def export(
 ) -> list[str]:
     """Write files of some kinds into `folder`, all of them or none; returns their names.
 
-    Parameters
-    ----------
-    kinds : as of `save`, without the archive.
-    force, progress : as of `save`.
+    Args:
+        kinds: as of `save`, without the archive.
+        force, progress: as of `save`.
 
-    Raises
-    ------
-    InputError : as of `save`, or a kind needs a package that is not installed. OutputError : as of `save`.
+    Raises:
+        InputError: as of `save`, or a kind needs a package that is not installed. OutputError : as of `save`.
     """
     _require_archive(archive)
     flag("force", force)
@@ -135,13 +131,11 @@ class Content:
 def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
     """Names in the result's folder and contents of the files of some kinds; default: all but 3dm.
 
-    Parameters
-    ----------
-    kinds : of files, keys of `KINDS`; default: all but 3dm.
+    Args:
+        kinds: of files, keys of `KINDS`; default: all but 3dm.
 
-    Raises
-    ------
-    InputError : an unknown kind, or one that needs a package that is not installed.
+    Raises:
+        InputError: an unknown kind, or one that needs a package that is not installed.
     """
     content = Content(archive)
     for kind in DEFAULT if kinds is None else kinds:
@@ -151,9 +145,8 @@ def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
 def reserved(kinds: Iterable[str] | None = None) -> list[str]:
     """Patterns (of `Path.glob`) of every name that `files_of` may give for some kinds, whatever the archive.
 
-    Parameters
-    ----------
-    kinds : see `KINDS`; default: all but 3dm.
+    Args:
+        kinds: see `KINDS`; default: all but 3dm.
     """
     return [name for kind in (DEFAULT if kinds is None else kinds) for name in NAMES[kind]]
 
@@ -161,9 +154,8 @@ def reserved(kinds: Iterable[str] | None = None) -> list[str]:
 def read_kinds(words: str) -> list[str]:
     """The kinds named in "dxf, csv".
 
-    Parameters
-    ----------
-    words : in any case, with commas.
+    Args:
+        words: in any case, with commas.
     """
     kinds = [word.strip().lower() for word in words.split(",") if word.strip()]
     return [_known(word) for word in kinds or [words]]
@@ -172,13 +164,11 @@ def read_kinds(words: str) -> list[str]:
 def wanted_kinds(kinds: object) -> list[str] | None:
     """The kinds of files that are wanted, None for the default ones.
 
-    Parameters
-    ----------
-    kinds : one text, as of `read_kinds`, or several kinds, maybe none.
+    Args:
+        kinds: one text, as of `read_kinds`, or several kinds, maybe none.
 
-    Raises
-    ------
-    InputError : an unknown kind.
+    Raises:
+        InputError: an unknown kind.
     """
     if kinds is None:
         return None

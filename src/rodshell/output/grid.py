@@ -26,11 +26,10 @@ STRAIGHT = 1e-6  # of a rod's length, which it leaves its chord by: it is straig
 class GridRod:
     """One rod of a result, with its geometry.
 
-    Parameters
-    ----------
-    record : what the result knows of it.
-    course : (k, 2) x, y of points along it in the flat state [m]: its two ends, or more where it bends there.
-    nodes : (k,) its nodes in the states, from start to end; empty if the states do not hold them.
+    Args:
+        record: what the result knows of it.
+        course: (k, 2) x, y of points along it in the flat state [m]: its two ends, or more where it bends there.
+        nodes: (k,) its nodes in the states, from start to end; empty if the states do not hold them.
     """
 
     record: Rod
@@ -144,9 +143,8 @@ def joints_of(rods: list[GridRod]) -> list[GridJoint]:
 def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
     """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods.
 
-    Parameters
-    ----------
-    positions : (n, 3) nodes of a shape [m].
+    Args:
+        positions: (n, 3) nodes of a shape [m].
     """
     return {name: positions[nodes].mean(axis=0) for name, nodes in _joint_nodes(archive).items()}
 
@@ -154,9 +152,8 @@ def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
 def outlines_of(rods: list[GridRod]) -> list[Ints]:
     """Rod ends along each outline of the flat grid, see `outlines`.
 
-    Parameters
-    ----------
-    rods : those that are drawn; the ends of rod k are 2 k and 2 k + 1.
+    Args:
+        rods: those that are drawn; the ends of rod k are 2 k and 2 k + 1.
     """
     return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
 
@@ -207,13 +204,12 @@ def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
 class Shape:
     """One shape of the grid.
 
-    Parameters
-    ----------
-    name : "flat", "draped", "popped_pinned", "popped_clamped", or "stage_1", ... of the deployment.
-    positions : (n, 3) [m].
-    gap : (n,) signed distances to the target [m], where known.
-    stress : (k,) [Pa], curvature : (k,) [1/m] and force : (k,) normal forces [N], tension positive, at each entry of
-        `rod_nodes`, where known.
+    Args:
+        name: "flat", "draped", "popped_pinned", "popped_clamped", or "stage_1", ... of the deployment.
+        positions: (n, 3) [m].
+        gap: (n,) signed distances to the target [m], where known.
+        stress: (k,) [Pa], curvature : (k,) [1/m] and force : (k,) normal forces [N], tension positive, at each entry of
+            `rod_nodes`, where known.
     """
 
     name: str
@@ -245,9 +241,8 @@ def lies_flat(archive: Archive) -> bool:
 def caption_of(archive: Archive, state: str) -> str:
     """What a state shows, in words.
 
-    Parameters
-    ----------
-    state : "flat", or one in space.
+    Args:
+        state: "flat", or one in space.
     """
     if archive.is_lost(state):
         return f"Not popped up, {state.removeprefix(POPPED)} ends: where the computation stopped"
@@ -264,13 +259,11 @@ def supported(state: str, *more: str) -> str:
 def shape_of(archive: Archive, name: str) -> Shape:
     """A shape by its name.
 
-    Parameters
-    ----------
-    name : one of `shape_names`.
+    Args:
+        name: one of `shape_names`.
 
-    Raises
-    ------
-    OutputError : the archive has no such shape.
+    Raises:
+        OutputError: the archive has no such shape.
     """
     known, states = shape_names(archive), archive.states
     if name not in known:
@@ -291,9 +284,8 @@ def deployed_shape(archive: Archive, name: str) -> Shape:
     """A shape as the deployment passes it: the flat grid not in the axes of its drawings, but where it is laid out on
     site before its ends move.
 
-    Parameters
-    ----------
-    name : one of `shape_names`.
+    Args:
+        name: one of `shape_names`.
     """
     shape, final = shape_of(archive, name), archive.final
     if not shape.flat or final is None:
@@ -305,9 +297,8 @@ def deployed_shape(archive: Archive, name: str) -> Shape:
 def laid_out(flat: Floats, final: Floats, ends: Ints) -> Floats:
     """The flat grid (n, 3), moved in its plane to below a shape (n, 3): where its deployment begins.
 
-    Parameters
-    ----------
-    ends : (e,) nodes of the rod ends, which come as near as they can to where they end.
+    Args:
+        ends: (e,) nodes of the rod ends, which come as near as they can to where they end.
     """
     goals = final[ends]
     return PlanarMotion.onto(flat[ends], goals).moved(flat, float(goals[:, 2].min()))
@@ -321,14 +312,12 @@ def outlines(rods: Floats) -> list[Ints]:
 
     Grids that do not touch each other have one outline each. No end is in two outlines, and none has fewer than three.
 
-    Parameters
-    ----------
-    rods : (m, 2, 2) the two ends of each straight rod [m].
+    Args:
+        rods: (m, 2, 2) the two ends of each straight rod [m].
 
-    Returns
-    -------
-    For each outline the ends (k,) along it, 2 r for the start of rod r and 2 r + 1 for its end: counterclockwise around
-    a grid, clockwise around an opening. Outlines with most ends come first.
+    Returns:
+        For each outline the ends (k,) along it, 2 r for the start of rod r and 2 r + 1 for its end: counterclockwise
+        around a grid, clockwise around an opening. Outlines with most ends come first.
     """
     if not len(rods):
         return []

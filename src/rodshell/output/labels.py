@@ -23,12 +23,11 @@ THIN = 0.1  # what a line takes, over the size of its text
 class Label(NamedTuple):
     """A rod's label at one of its ends.
 
-    Parameters
-    ----------
-    centre : (2,) middle of the text.
-    angle : of the text against x [rad].
-    end : (2,) the rod's end that it belongs to.
-    moved : whether it stands so far off that it needs a line to its rod.
+    Args:
+        centre: (2,) middle of the text.
+        angle: of the text against x [rad].
+        end: (2,) the rod's end that it belongs to.
+        moved: whether it stands so far off that it needs a line to its rod.
     """
 
     text: str
@@ -124,12 +123,11 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
 
     A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
 
-    Parameters
-    ----------
-    texts : the label of each rod.
-    rods : (m, 2, 2) both ends of each rod.
-    size : of the text, in the unit of `rods`.
-    at : (m, 2) whether an end is to have one; default: all.
+    Args:
+        texts: the label of each rod.
+        rods: (m, 2, 2) both ends of each rod.
+        size: of the text, in the unit of `rods`.
+        at: (m, 2) whether an end is to have one; default: all.
     """
     placed: list[Label] = []
     room, labelled = Room(4 * size), np.zeros(len(rods), dtype=bool)
@@ -156,12 +154,11 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
 
     The text covers none of the lines (m, 2, 2) either, the line to it may cross them.
 
-    Parameters
-    ----------
-    end : (2,) the rod's end that it belongs to.
-    way : (2,) to the side that is tried first.
-    size : of the text, in the unit of `end`.
-    lines : (m, 2, 2) lines that the text must not cover.
+    Args:
+        end: (2,) the rod's end that it belongs to.
+        way: (2,) to the side that is tried first.
+        size: of the text, in the unit of `end`.
+        lines: (m, 2, 2) lines that the text must not cover.
     """
     first = float(np.arctan2(way[1], way[0]))
     half = 0.5 * size * np.array([LETTER * len(text), LINE])
@@ -179,10 +176,9 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
 def take(label: Label, size: float, room: Room) -> None:
     """Take the label's room, and that of the line to it.
 
-    Parameters
-    ----------
-    size : of its text, in the unit of its coordinates.
-    room : in which its box is taken.
+    Args:
+        size: of its text, in the unit of its coordinates.
+        room: in which its box is taken.
     """
     room.take(label.box(size))
     if label.moved:
@@ -192,9 +188,8 @@ def take(label: Label, size: float, room: Room) -> None:
 def _fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
     """Whether a label and the line to it find room; the label must cover none of the lines.
 
-    Parameters
-    ----------
-    size : of the text; room : what is taken; lines : (m, 2, 2), all in the unit of the label.
+    Args:
+        size: of the text; room : what is taken; lines : (m, 2, 2), all in the unit of the label.
     """
     box = label.box(size)
     return (
@@ -207,10 +202,9 @@ def _fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
 def _off_its_mark(line: Floats, size: float) -> Floats:
     """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is.
 
-    Parameters
-    ----------
-    line : (2, 2) from the mark to the label.
-    size : of the text, in the unit of the line; half of it is left out at the mark.
+    Args:
+        line: (2, 2) from the mark to the label.
+        size: of the text, in the unit of the line; half of it is left out at the mark.
     """
     (ax, ay), (bx, by) = line.tolist()
     share = min(0.5 * size / max(hypot(bx - ax, by - ay), 1e-12), 0.9)
@@ -220,10 +214,9 @@ def _off_its_mark(line: Floats, size: float) -> Floats:
 def thin(line: Floats, width: float) -> Floats:
     """(4, 2) corners of the room of a line (2, 2).
 
-    Parameters
-    ----------
-    line : (2, 2) its two ends.
-    width : of the room, in the unit of the line.
+    Args:
+        line: (2, 2) its two ends.
+        width: of the room, in the unit of the line.
     """
     (ax, ay), (bx, by) = line.tolist()
     half = 0.5 * width / max(hypot(bx - ax, by - ay), 1e-12)
@@ -236,9 +229,8 @@ def spread(positions: ArrayLike, gap: float) -> Floats:
 
     Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
 
-    Parameters
-    ----------
-    positions : (k,) positions on a line; gap : least distance of neighbours.
+    Args:
+        positions: (k,) positions on a line; gap : least distance of neighbours.
     """
     asked = np.asarray(positions, dtype=float)
     order = np.argsort(asked, kind="stable")
@@ -306,9 +298,8 @@ def outward(points: Floats) -> Floats:
 
     At each place across the chord of its neighbours, so that points that nearly coincide do not turn it.
 
-    Parameters
-    ----------
-    points : (k, 2) along an outline, in their order.
+    Args:
+        points: (k, 2) along an outline, in their order.
     """
     along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     return _unit(np.column_stack([along[:, 1], -along[:, 0]]))
@@ -324,9 +315,8 @@ def callouts(
     still finds no room on its line is put anywhere near its place; it is left out if there is no room, or if there are
     more than MANY such names.
 
-    Parameters
-    ----------
-    away : (k, 2) unit vectors from each place to the side where its name is to stand.
+    Args:
+        away: (k, 2) unit vectors from each place to the side where its name is to stand.
     """
     best: _Tried | None = None
     for size, gap in ((text * share, gap) for gap in GAPS for share in _CALLOUT_SIZES):

@@ -36,9 +36,8 @@ COLOURS = {"CUT": (34, 40, 47), "MARK": (179, 55, 44), "FINAL": (31, 95, 139), "
 def obj_text(archive: Archive, state: str) -> str:
     """All nodes [m], then one object with one polyline for each rod.
 
-    Parameters
-    ----------
-    state : "draped", "popped_pinned" or "popped_clamped".
+    Args:
+        state: "draped", "popped_pinned" or "popped_clamped".
     """
     nodes = archive.states[state]
     text = f"# rodshell, {state}, metres\n"
@@ -52,9 +51,8 @@ def obj_text(archive: Archive, state: str) -> str:
 def vtp_text(archive: Archive, name: str) -> str:
     """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`.
 
-    Parameters
-    ----------
-    name : of a shape, see `shape_names`.
+    Args:
+        name: of a shape, see `shape_names`.
     """
     shape = deployed_shape(archive, name)
     rods = [(k, rod.nodes) for k, rod in enumerate(rods_of(archive)) if len(rod.nodes) > 1]
@@ -112,9 +110,8 @@ def _vtk_file(kind: str, body: str) -> str:
 def compas_json(archive: Archive, state: str) -> str:
     """A state of the shell; the graph's nodes are joints, its edges the rods between them.
 
-    Parameters
-    ----------
-    state : "draped", "popped_pinned" or "popped_clamped".
+    Args:
+        state: "draped", "popped_pinned" or "popped_clamped".
     """
     positions, rods = archive.states[state], rods_of(archive)
     joint_positions = joint_places(archive, positions)
@@ -154,9 +151,8 @@ def compas_json(archive: Archive, state: str) -> str:
 def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
     """The whole model.
 
-    Raises
-    ------
-    InputError : rhino3dm is not installed.
+    Raises:
+        InputError: rhino3dm is not installed.
     """
     try:
         import rhino3dm as r
@@ -216,9 +212,8 @@ FLOAT, INDEX, VERTICES, ELEMENTS = 5126, 5125, 34962, 34963  # glTF's numbers fo
 def glb_bytes(archive: Archive, state: str) -> bytes:
     """One node, mesh and name for each rod.
 
-    Parameters
-    ----------
-    state : "draped", "popped_pinned" or "popped_clamped".
+    Args:
+        state: "draped", "popped_pinned" or "popped_clamped".
     """
     shape, rods = shape_of(archive, state), [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
     section = archive.results.rod.section if archive.results.rod else None
@@ -247,10 +242,9 @@ def section_outline(section: Section | None, size: float) -> Floats:
 
     Up is m1, the normal of the grid: a rectangle's width and an ellipse's a lie there.
 
-    Parameters
-    ----------
-    section : of the rods; None: not known.
-    size : of the shell [m], for the thickness of a section without a shape.
+    Args:
+        section: of the rods; None: not known.
+        size: of the shell [m], for the thickness of a section without a shape.
     """
     section = section or Section()
     if section.kind == "rectangle" and section.height is not None and section.width is not None:
@@ -265,9 +259,8 @@ def section_outline(section: Section | None, size: float) -> Floats:
 def widths_along(along: Stiffness, flat: Floats) -> Floats:
     """(k, 2) widths across and up of a rod's section at its nodes, over those of the unchanged one.
 
-    Parameters
-    ----------
-    flat : (k, 3) its nodes in the flat grid [m].
+    Args:
+        flat: (k, 3) its nodes in the flat grid [m].
     """
     stations = np.linalg.norm(flat - flat[0], axis=1)
     factors = np.interp(stations, along.at, along.factors)
@@ -282,10 +275,9 @@ def swept(curve: Floats, outline: Floats, widths: Floats | None = None) -> tuple
 
     The frame has no twist and begins as upright as possible. The ends are open.
 
-    Parameters
-    ----------
-    curve : (k, 3) nodes [m]; outline : (s, 2) corners across and up [m].
-    widths : (k, 2) by which these are multiplied at each node; None: by 1.
+    Args:
+        curve: (k, 3) nodes [m]; outline : (s, 2) corners across and up [m].
+        widths: (k, 2) by which these are multiplied at each node; None: by 1.
     """
     edges = unit(np.diff(curve, axis=0))
     up = np.array([0.0, 0.0, 1.0]) if abs(edges[0, 2]) < 0.9 else np.array([1.0, 0.0, 0.0])

@@ -19,10 +19,9 @@ if TYPE_CHECKING:
 class OutputOptions(CheckOptions):
     """What is checked, made and drawn.
 
-    Parameters
-    ----------
-    rod_chosen : which of the rod's "material" and "section" the program chose to fit the target.
-    strength_of : the preset material that the strengths are of, where they were not given.
+    Args:
+        rod_chosen: which of the rod's "material" and "section" the program chose to fit the target.
+        strength_of: the preset material that the strengths are of, where they were not given.
     """
 
     fabrication: Fabrication = field(default_factory=Fabrication)
@@ -53,9 +52,8 @@ class OutputOptions(CheckOptions):
 
         A strength that is given alone, such as a reduced one, has a shear strength in the preset's proportion.
 
-        Parameters
-        ----------
-        rod : section and material of every rod.
+        Args:
+            rod: section and material of every rod.
         """
         material = rod.material
         if material is None or material.bending_strength is None:
@@ -74,14 +72,12 @@ class OutputOptions(CheckOptions):
     def limits(self, rod: Rod, asked: "Strength") -> "Limits":
         """What rods are judged by, with loads and without.
 
-        Parameters
-        ----------
-        rod : section and material of every rod.
-        asked : what was given for it.
+        Args:
+            rod: section and material of every rod.
+            asked: what was given for it.
 
-        Raises
-        ------
-        InputError : a service class is given, and nothing depends on it.
+        Raises:
+            InputError: a service class is given, and nothing depends on it.
         """
         judged_by = self.judged_by(rod)
         return Limits.of(
@@ -92,9 +88,8 @@ class OutputOptions(CheckOptions):
     def require_known_stress(self, rod: Rod, joint: Joint) -> None:
         """InputError where a strength is given and the stress that it stands against cannot be known.
 
-        Parameters
-        ----------
-        rod : section and material of every rod.
+        Args:
+            rod: section and material of every rod.
         """
         if self.strength is not None:
             require_known_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)

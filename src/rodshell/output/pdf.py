@@ -39,15 +39,13 @@ _MOST_NAMED = 10  # characters without a glyph that a warning shows
 def drawings_pdf(sheets: Sequence[Drawing], paper: tuple[float, float], title: str) -> bytes:
     """A PDF file with each drawing on a page of its own, and a bookmark for each.
 
-    Parameters
-    ----------
-    sheets : in mm of paper, their origin at the lower left corner of the page.
-    paper : width and height of the pages [mm].
-    title : of the file, which readers show.
+    Args:
+        sheets: in mm of paper, their origin at the lower left corner of the page.
+        paper: width and height of the pages [mm].
+        title: of the file, which readers show.
 
-    Warns
-    -----
-    OutputWarning : characters that the typeface has no glyph for; they are drawn as boxes.
+    Warns:
+        OutputWarning: characters that the typeface has no glyph for; they are drawn as boxes.
     """
     _register_fonts()
     _warn_of_missing_glyphs(text.text for sheet in sheets for text in sheet.texts)
@@ -101,10 +99,9 @@ def _register_fonts() -> None:
 def text_width(text: str, size: float, *, bold: bool = False) -> float:
     """Width of a line of text, in the unit of its `size`.
 
-    Parameters
-    ----------
-    size : of the font; the width has the same unit.
-    bold : whether the font is bold.
+    Args:
+        size: of the font; the width has the same unit.
+        bold: whether the font is bold.
     """
     _register_fonts()
     return float(stringWidth(text, SANS[bold], size))

@@ -39,11 +39,10 @@ TOWARDS = np.array([_CE * _C, _CE * _S, _SE])
 class View:
     """A box in space [m] drawn `width` units wide.
 
-    Parameters
-    ----------
-    low, high : (3,) corners of the box [m].
-    shift : (2,) added to the projected coordinates, so that the box's upper left corner is (0, 0).
-    size : (2,) width and height of the drawn box.
+    Args:
+        low, high: (3,) corners of the box [m].
+        shift: (2,) added to the projected coordinates, so that the box's upper left corner is (0, 0).
+        size: (2,) width and height of the drawn box.
     """
 
     low: Floats
@@ -56,10 +55,9 @@ class View:
     def of(points: Floats, width: float) -> "View":
         """The view of all points (n, 3) [m] and of the ground below them.
 
-        Parameters
-        ----------
-        points : (n, 3) all that is to be seen [m].
-        width : of the picture [drawing units].
+        Args:
+            points: (n, 3) all that is to be seen [m].
+            width: of the picture [drawing units].
         """
         low, high = bounds(points)
         corners = np.array([[x, y, low[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
@@ -86,9 +84,8 @@ class View:
 def ground_axes(pencil: Pencil, view: View, colour: str, text: float) -> None:
     """The box's ground with millimetre ticks on its front edges, and the height on the left.
 
-    Parameters
-    ----------
-    view : of the box; colour : of lines and numbers; text : size of the numbers [drawing units].
+    Args:
+        view: of the box; colour : of lines and numbers; text : size of the numbers [drawing units].
     """
     (x0, y0, z0), (x1, y1, z1) = view.low, view.high
     thin, pale = Pen(colour, 0.8), Pen(mixed(colour, "#ffffff", 0.55), 0.8)
@@ -139,11 +136,10 @@ FADE = 0.42  # share of paper in the colour of the farthest rods
 class Pieces:
     """Parts of rods between two drawn nodes, rod by rod.
 
-    Parameters
-    ----------
-    drawn : (d,) entries of `rod_nodes` that are drawn.
-    first : (s,) at which of them each piece begins; it ends at the next.
-    rod : (s,) index of its rod.
+    Args:
+        drawn: (d,) entries of `rod_nodes` that are drawn.
+        first: (s,) at which of them each piece begins; it ends at the next.
+        rod: (s,) index of its rod.
     """
 
     drawn: Ints
@@ -156,13 +152,11 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 
     All final shapes share one view, as the stages of the deployment do, and all shapes one colour scale.
 
-    Parameters
-    ----------
-    colour : of the rods: "gap" to the target (without a target: height), or "stress".
+    Args:
+        colour: of the rods: "gap" to the target (without a target: height), or "stress".
 
-    Raises
-    ------
-    OutputError : the archive has no such state.
+    Raises:
+        OutputError: the archive has no such state.
     """
     return picture_document(picture(archive, state, colour))
 
@@ -170,9 +164,8 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
     """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format.
 
-    Parameters
-    ----------
-    state, colour : as of `picture_svg`.
+    Args:
+        state, colour: as of `picture_svg`.
     """
     kept = _pictures(archive)
     if (state, colour) not in kept:
@@ -215,9 +208,8 @@ MODE = 0.06  # of the shell's width: the largest displacement of a mode as it is
 def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
     """A mode, drawn as displacements of the shell over the shell as it stands.
 
-    Parameters
-    ----------
-    state : name of the mode's array (n, 3).
+    Args:
+        state: name of the mode's array (n, 3).
     """
     shape, pencil = shape_of(archive, POPPED + ends), Pencil()
     motion = archive.states[state]
@@ -233,9 +225,8 @@ def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
 def deployment_picture(archive: Archive) -> Drawing:
     """The way from flat to popped up in FRAMES shapes side by side, coloured as of `picture`.
 
-    Parameters
-    ----------
-    archive : one that holds stages of a deployment.
+    Args:
+        archive: one that holds stages of a deployment.
     """
     known = shape_names(archive)
     names = [name for name in known if name.startswith(STAGE) or name in ("flat", archive.deployed)]
@@ -308,12 +299,11 @@ def _pieces(archive: Archive, length: float) -> Pieces:
 class _Rods:
     """The rods of a picture, layer by layer.
 
-    Parameters
-    ----------
-    plane : (d, 2) the drawn nodes.
-    halos, lines : by layer, the farthest first: indices in the palette, and drawn nodes of polylines.
-    fade : share of paper in the farthest colours.
-    pen : width of the rods in the middle [drawing units].
+    Args:
+        plane: (d, 2) the drawn nodes.
+        halos, lines: by layer, the farthest first: indices in the palette, and drawn nodes of polylines.
+        fade: share of paper in the farthest colours.
+        pen: width of the rods in the middle [drawing units].
     """
 
     plane: Floats

@@ -20,10 +20,9 @@ _HALO = 2.0  # width of a text's halo, in drawing units
 def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
     """A PNG file of a drawing.
 
-    Parameters
-    ----------
-    drawing : paths and level texts; dashes, marks and angles of texts, which pictures do not have, are not drawn.
-    width : of the image [pixels].
+    Args:
+        drawing: paths and level texts; dashes, marks and angles of texts, which pictures do not have, are not drawn.
+        width: of the image [pixels].
     """
     low, high = drawing.box()
     across, up = (high - low).tolist()

@@ -62,9 +62,8 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
 
     Bending is that of the final shape; in columns named `pop_up` it is the worst of all shapes of the deployment.
 
-    Parameters
-    ----------
-    brief : only the columns that have room on a sheet.
+    Args:
+        brief: only the columns that have room on a sheet.
     """
     final, mm = archive.final, rounding_of(archive.results).mm
     columns: list[tuple[str, bool, Callable[[GridRod], str]]] = [
@@ -160,9 +159,8 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
 
     The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines.
 
-    Parameters
-    ----------
-    brief : only the columns that have room on a sheet.
+    Args:
+        brief: only the columns that have room on a sheet.
     """
     columns, rows = _all_of_joints(archive)
     kept = [k for k, name in enumerate(columns) if not (brief and name in _NOT_BRIEF)]
@@ -224,9 +222,8 @@ def _joint_loads(archive: Archive, final: str | None) -> dict[tuple[str, str], d
 def supports_table(archive: Archive, *, brief: bool = False) -> Table:
     """One row a rod end: its place on the final boundary, its outward direction, and its reactions.
 
-    Parameters
-    ----------
-    brief : only the columns that have room on a sheet, and directions only where they are known.
+    Args:
+        brief: only the columns that have room on a sheet, and directions only where they are known.
     """
     results, mm = archive.results, rounding_of(archive.results).mm
     columns = ["id", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"tangent_{a}" for a in "xyz")]
@@ -275,9 +272,8 @@ def bracing_table(archive: Archive, *, brief: bool = False) -> Table:
     """One row a diagonal: its length flat and in the final shape, of cables also free of stress; where loads were
     checked its axial force under each combination, tension positive, and which leave it slack.
 
-    Parameters
-    ----------
-    brief : only the columns that have room on a sheet.
+    Args:
+        brief: only the columns that have room on a sheet.
     """
     results, mm = archive.results, rounding_of(archive.results).mm
     braces = results.fabrication.bracing if results.fabrication else ()
@@ -444,9 +440,8 @@ FORMULA = re.compile(rf'(^[\s"]*|[;,][\s"]*(?!{NUMBER}\s*(?:[;,]|$)))(?=[{re.esc
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
     """Rows as CSV; a number stays as it is, a text that a spreadsheet would run gets an apostrophe.
 
-    Parameters
-    ----------
-    rows : cells; numbers are written by `str`.
+    Args:
+        rows: cells; numbers are written by `str`.
     """
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows([[safe_cell(str(cell)) for cell in row] for row in rows])
@@ -456,9 +451,8 @@ def csv_text(rows: Iterable[Sequence[object]]) -> str:
 def safe_cell(cell: str) -> str:
     """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons.
 
-    Parameters
-    ----------
-    cell : a number or a text.
+    Args:
+        cell: a number or a text.
     """
     if RUN.isdisjoint(cell):
         return printable(cell)

@@ -19,9 +19,8 @@ SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sa
 def number(value: float, digits: int = 2) -> str:
     """A number with at most `digits` decimals, without zeros at its end: "2.5", "-0.01", "0".
 
-    Parameters
-    ----------
-    digits : most decimals that are shown.
+    Args:
+        digits: most decimals that are shown.
     """
     text = f"{value:.{digits}f}"
     if "." in text:
@@ -32,10 +31,9 @@ def number(value: float, digits: int = 2) -> str:
 def tag(name: str, *children: str, **attributes: Any) -> str:
     """An element.
 
-    Parameters
-    ----------
-    name : such as "path".
-    attributes : "-" is written "_"; a "_" at the end, which Python's own words need, is dropped: `class_`.
+    Args:
+        name: such as "path".
+        attributes: "-" is written "_"; a "_" at the end, which Python's own words need, is dropped: `class_`.
     """
     words = [name]
     for key, value in attributes.items():
@@ -54,10 +52,9 @@ def _attribute(key: str) -> str:
 def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:
     """One line of text.
 
-    Parameters
-    ----------
-    x, y : where its baseline begins [units of the view box], y down.
-    size : of the font [units].
+    Args:
+        x, y: where its baseline begins [units of the view box], y down.
+        size: of the font [units].
     """
     return tag("text", escape(text), x=x, y=y, font_size=size, **attributes)
 
@@ -65,10 +62,9 @@ def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:
 def document(view: tuple[float, float, float, float], *children: str, unit: str = "") -> str:
     """A complete SVG file.
 
-    Parameters
-    ----------
-    view : x, y, width and height of the view box.
-    unit : of the file's size, which is that of the view box: "mm", or "" for pixels.
+    Args:
+        view: x, y, width and height of the view box.
+        unit: of the file's size, which is that of the view box: "mm", or "" for pixels.
     """
     x, y, width, height = (number(value, 3) for value in view)
     body = "\n".join(child for child in children if child)
@@ -87,9 +83,8 @@ def inline(svg: str) -> str:
 def drawing_svg(drawing: Drawing) -> str:
     """An SVG file at true scale, a unit a millimetre; neighbours of one layer and pen are one path or group.
 
-    Parameters
-    ----------
-    drawing : y up; paths in space are not drawn.
+    Args:
+        drawing: y up; paths in space are not drawn.
     """
     margin = 2 * drawing.text
     low, high = drawing.box()

@@ -59,13 +59,12 @@ _WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
 class DrapeRun:
     """One case by one method.
 
-    Parameters
-    ----------
-    case, method : what was draped, and how.
-    seconds : time of drape and trim.
-    ends : (m, 2) start and end of each rod at the target's end [m]: those of G0; for the bound drape, whose G0 is that
-        of the net, those of the draped rods.
-    net : (m, 2) those of the exact net [m].
+    Args:
+        case, method: what was draped, and how.
+        seconds: time of drape and trim.
+        ends: (m, 2) start and end of each rod at the target's end [m]: those of G0; for the bound drape, whose G0 is
+            that of the net, those of the draped rods.
+        net: (m, 2) those of the exact net [m].
     """
 
     case: Case
@@ -125,11 +124,10 @@ def drape_all(
 ) -> tuple[DrapeRun, ...]:
     """Every case by every method, the falls with the settings `fall`.
 
-    Parameters
-    ----------
-    progress : is called at each iteration.
-    fall : settings of the paper's method.
-    methods : by which each case is draped.
+    Args:
+        progress: is called at each iteration.
+        fall: settings of the paper's method.
+        methods: by which each case is draped.
     """
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
@@ -176,9 +174,8 @@ def _panels(run: DrapeRun) -> list[list[str]]:
 def _differences_svg(drapes: Sequence[DrapeRun]) -> str:
     """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm.
 
-    Parameters
-    ----------
-    drapes : case by case, each by every method.
+    Args:
+        drapes: case by case, each by every method.
     """
     panels = []
     for name in dict.fromkeys(run.case.label for run in drapes if run.draped.converged):
@@ -245,10 +242,9 @@ def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:
 class DrapeFigure(Figure):
     """Every case by every method.
 
-    Parameters
-    ----------
-    name : of the figure, such as "fig6".
-    drapes : case by case, each by every method.
+    Args:
+        name: of the figure, such as "fig6".
+        drapes: case by case, each by every method.
     """
 
     name: str

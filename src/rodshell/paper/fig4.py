@@ -50,13 +50,12 @@ _STATIC_STEPS = 60  # of such a revolution
 class Run:
     """A demonstration.
 
-    Parameters
-    ----------
-    step : of the time stepping [s]; None for statics.
-    times : (k,) [s]; of statics those at which the motion reaches each equilibrium.
-    angles : (k,) by which rod 2 has turned about the axis of the motion [rad].
-    nodes : (k, 2, 5, 3) of rod 1 and rod 2 [m].
-    twists : (k, 4) twist angles of rod 1 [rad].
+    Args:
+        step: of the time stepping [s]; None for statics.
+        times: (k,) [s]; of statics those at which the motion reaches each equilibrium.
+        angles: (k,) by which rod 2 has turned about the axis of the motion [rad].
+        nodes: (k, 2, 5, 3) of rod 1 and rod 2 [m].
+        twists: (k, 4) twist angles of rod 1 [rad].
     """
 
     demonstration: Demonstration
@@ -115,10 +114,9 @@ def run_in_time(
 ) -> Run:
     """The motion from rest.
 
-    Parameters
-    ----------
-    until : end of the motion [s].
-    step : of the record [s]; with explicit ties the time step divides it until it is stable.
+    Args:
+        until: end of the motion [s].
+        step: of the record [s]; with explicit ties the time step divides it until it is stable.
     """
     shell = _shell(joint, coupling)
     motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE))
@@ -133,9 +131,8 @@ def run_in_time(
 def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, *, until: float = 2 * pi / RATE) -> Run:
     """The equilibria along the motion, which is so slow that each step is one; the joint must hold both rods.
 
-    Parameters
-    ----------
-    until : end of the motion [s].
+    Args:
+        until: end of the motion [s].
     """
     shell = _shell(joint, coupling)
     motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE / SLOW))
@@ -274,10 +271,9 @@ def _angles(runs: Sequence[Run]) -> list[Sequence[object]]:
 def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
     """All runs, over so many revolutions (`turns`).
 
-    Parameters
-    ----------
-    progress : is called before each run.
-    turns : revolutions of rod 1 [-].
+    Args:
+        progress: is called before each run.
+        turns: revolutions of rod 1 [-].
     """
     until = turns * 2 * np.pi / RATE
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
@@ -343,9 +339,8 @@ def _animation_svg(runs: Sequence[Run]) -> str:
 def _lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
     """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows.
 
-    Parameters
-    ----------
-    until : end of the time axis [s].
+    Args:
+        until: end of the time axis [s].
     """
     shown = [run for run in runs if run.step is not None and run.follows]
     looks = dict(zip(dict.fromkeys(run.name for run in shown), _LOOKS, strict=False))

@@ -52,15 +52,15 @@ _SIGNS = {
 class Timing:
     """One run.
 
-    Parameters
-    ----------
-    method : "explicit", "implicit", "shared" in time, or "ours".
-    step : time step [s], 0 for ours.
-    edge : length of the edges [m].
-    seconds : processor time of the drape, for ours with trim and map back.
-    steps : taken; those refused and repeated in halves count among the factorisations.
-    in_lapack, in_own : time of the steps per factorisation, in bare solves by LAPACK and by our band; 0 without a band.
-    step_in_lapack : time of a step with all its iterations and corrections for contact, in bare solves by LAPACK.
+    Args:
+        method: "explicit", "implicit", "shared" in time, or "ours".
+        step: time step [s], 0 for ours.
+        edge: length of the edges [m].
+        seconds: processor time of the drape, for ours with trim and map back.
+        steps: taken; those refused and repeated in halves count among the factorisations.
+        in_lapack, in_own: time of the steps per factorisation, in bare solves by LAPACK and by our band; 0 without a
+            band.
+        step_in_lapack: time of a step with all its iterations and corrections for contact, in bare solves by LAPACK.
     """
 
     target: str
@@ -139,10 +139,9 @@ class Fig8(Figure):
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float = FALLING) -> Fig8:
     """Time everything, falls of `falling` seconds; the first run of each kind, which compiles, does not count.
 
-    Parameters
-    ----------
-    progress : is called at each time step.
-    falling : simulated time of each fall [s].
+    Args:
+        progress: is called at each time step.
+        falling: simulated time of each fall [s].
     """
     couplings: tuple[Coupling, ...] = (ExplicitPenalty(C1=C1), SharedDofs(), ImplicitPenalty())
     for coupling in couplings:
@@ -188,12 +187,11 @@ def _timed_fall(
 ) -> Timing:
     """A fall in the paper's scheme, of `falling` seconds with the time step `step` [s]; without its bare solves.
 
-    Parameters
-    ----------
-    step : time step [s].
-    falling : simulated time [s].
-    progress : is called at each time step.
-    counted : whether explicit ties are counted in bare solves.
+    Args:
+        step: time step [s].
+        falling: simulated time [s].
+        progress: is called at each time step.
+        counted: whether explicit ties are counted in bare solves.
     """
     bare = BareSolves(case, coupling, step) if counted and isinstance(coupling, ExplicitPenalty) else None
 
@@ -253,14 +251,12 @@ class BareSolves:
     solves once; it starts from the band, nothing is summed. It is done by LAPACK (`scipy.linalg.solveh_banded`, all
     rods in one call, which is faster than a call for each) and by our `solve.banded`, on one thread.
 
-    Parameters
-    ----------
-    case, coupling : the grid and its ties.
-    step : time step [s] of the matrix.
+    Args:
+        case, coupling: the grid and its ties.
+        step: time step [s] of the matrix.
 
-    Attributes
-    ----------
-    spent : processor time of all of them [s].
+    Attributes:
+        spent: processor time of all of them [s].
     """
 
     def __init__(self, case: Case, coupling: ExplicitPenalty, step: float) -> None:

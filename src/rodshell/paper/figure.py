@@ -31,11 +31,10 @@ EDGE = 0.015  # [m]; the paper's "8000 DOFs" are this mesh, its stated 5 mm have
 class Case:
     """A target and a grid.
 
-    Parameters
-    ----------
-    label : its letter in the paper's figure.
-    rods : number of rods of the two families.
-    spacing, edge : of the rods, and length of their edges [m].
+    Args:
+        label: its letter in the paper's figure.
+        rods: number of rods of the two families.
+        spacing, edge: of the rods, and length of their edges [m].
     """
 
     label: str
@@ -75,9 +74,8 @@ FAR = 0.22  # opacity of what lies behind
 def rows_of_panels(rows: list[tuple[str, list[tuple[str, list[str]]]]]) -> str:
     """A drawing of rows of panels.
 
-    Parameters
-    ----------
-    rows : each a title and panels, each panel a caption and its marks.
+    Args:
+        rows: each a title and panels, each panel a caption and its marks.
     """
     across = max(len(panels) for _, panels in rows)
     width, height = across * PANEL + (across + 1) * GAP, len(rows) * (PANEL + HEAD) + GAP
@@ -116,11 +114,10 @@ def _from_aside(points: Floats) -> Floats:
 def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool = True) -> list[str]:
     """A grid on or above its target in the axonometric view.
 
-    Parameters
-    ----------
-    target : drawn as a filled body.
-    positions : (n, 3) of its nodes [m].
-    hides : draw the rods on the body's far side pale.
+    Args:
+        target: drawn as a filled body.
+        positions: (n, 3) of its nodes [m].
+        hides: draw the rods on the body's far side pale.
     """
     body = _body(target)
     to_panel = PanelScale(_from_aside(np.vstack([body, positions])))
@@ -134,10 +131,9 @@ def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool =
 def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attributes: Any) -> Iterator[str]:
     """Every rod by its nodes' points `at` (n, 2); pale where a node of an edge is not `near` (n,).
 
-    Parameters
-    ----------
-    at : (n, 2) points of its nodes in the drawing.
-    near : (n,) bool, nodes in front; None: all.
+    Args:
+        at: (n, 2) points of its nodes in the drawing.
+        near: (n,) bool, nodes in front; None: all.
     """
     for k, rod in enumerate(mesh.grid.rods):
         nodes = mesh.nodes_of(k)
@@ -154,10 +150,9 @@ def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attribute
 def dots(at: Floats, colour: str, radius: float = 2.2) -> Iterator[str]:
     """Dots at the points `at` (n, 2).
 
-    Parameters
-    ----------
-    at : (n, 2) points in the drawing.
-    radius : [drawing units].
+    Args:
+        at: (n, 2) points in the drawing.
+        radius: [drawing units].
     """
     for x, y in at.tolist():
         yield tag("circle", cx=x, cy=y, r=radius, fill=colour)
@@ -166,9 +161,8 @@ def dots(at: Floats, colour: str, radius: float = 2.2) -> Iterator[str]:
 def closed(at: Floats, colour: str, **attributes: Any) -> str:
     """A closed curve through the points `at` (n, 2), in the order of their angle about their middle.
 
-    Parameters
-    ----------
-    at : (n, 2) points in the drawing.
+    Args:
+        at: (n, 2) points in the drawing.
     """
     apart = at - at.mean(axis=0)
     order = np.argsort(np.arctan2(apart[:, 1], apart[:, 0]))
@@ -294,10 +288,9 @@ VERSION = 1  # of the keys of a figure's result.json
 class Figure(ABC):
     """A figure or a study of the paper, computed.
 
-    Attributes
-    ----------
-    name : such as "fig6".
-    columns : heads of the table's columns.
+    Attributes:
+        name: such as "fig6".
+        columns: heads of the table's columns.
     """
 
     name: str
@@ -349,9 +342,8 @@ class Figure(ABC):
     def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
         """Write the figure's files to `folder`.
 
-        Raises
-        ------
-        OutputError : it cannot be written, or files that rodshell did not write would have to be replaced.
+        Raises:
+            OutputError: it cannot be written, or files that rodshell did not write would have to be replaced.
         """
         tables = {"table": [self.columns, *self.rows()], **self.tables()}
         files = {"result.json": json.dumps(self.result(), indent=1) + "\n", "table.txt": self.summary() + "\n"}

@@ -36,11 +36,10 @@ COLUMNS = (
 class Comparison:
     """One target by both methods.
 
-    Parameters
-    ----------
-    direct : agreement of the direct method, pinned.
-    best : agreement of the genetic algorithm's best, popped up again; None if it is not stable.
-    apart : (2m,) distance between the rod ends of the two G0 [m].
+    Args:
+        direct: agreement of the direct method, pinned.
+        best: agreement of the genetic algorithm's best, popped up again; None if it is not stable.
+        apart: (2m,) distance between the rod ends of the two G0 [m].
     """
 
     case: Case
@@ -154,18 +153,16 @@ def make(
 ) -> Genetic:
     """Compare both methods, with the searches that come with the package, or with new ones.
 
-    Parameters
-    ----------
-    seed : of searches that are run, or continued, now; None: those of the package.
-    jobs : number of processes of new searches.
-    generations : largest number of generations of new searches.
-    target : name of the only target; None: all.
-    folder : of the values of new searches.
+    Args:
+        seed: of searches that are run, or continued, now; None: those of the package.
+        jobs: number of processes of new searches.
+        generations: largest number of generations of new searches.
+        target: name of the only target; None: all.
+        folder: of the values of new searches.
 
-    Raises
-    ------
-    InputError : jobs or generations without a seed; an unknown target; pymoo is needed and not installed; a file of
-        values is broken or of a different search.
+    Raises:
+        InputError: jobs or generations without a seed; an unknown target; pymoo is needed and not installed; a file of
+            values is broken or of a different search.
     """
     if seed is None and (jobs is not None or generations is not None):
         raise InputError("jobs and generations belong to a new search: give its seed, too")
@@ -190,9 +187,8 @@ def find(
 ) -> History:  # fmt: skip
     """A whole search (see `search`), whose values are written to `folder`.
 
-    Parameters
-    ----------
-    seed, jobs, population, most, progress : see `search`.
+    Args:
+        seed, jobs, population, most, progress: see `search`.
     """
     times = []
     for _ in range(REPEATS):

@@ -50,15 +50,14 @@ class Design:
     G is given, from the direct result, and the rod ends are pinned on it. The unknown is G0, one coordinate for each
     rod end along its rod. Nothing else of the direct result enters: neither its G0 nor its draped shape.
 
-    Parameters
-    ----------
-    lines : the flat grid's rods, whose lines count, not their ends.
-    boundary : G, without a draped state.
-    orbit : (2m,) index of the variable of each rod end, start and end of each rod in turn: the same for all ends that
-        the symmetry of target and grid takes into each other.
-    lower, upper : (n,) bounds of the variables, which are distances along the rod from its middle [m]: from a rod
-        that is straight in plan to the longest convex arch over its chord that is no higher than the target there,
-        since a convex curve is no longer than its chord and twice its height.
+    Args:
+        lines: the flat grid's rods, whose lines count, not their ends.
+        boundary: G, without a draped state.
+        orbit: (2m,) index of the variable of each rod end, start and end of each rod in turn: the same for all ends
+            that the symmetry of target and grid takes into each other.
+        lower, upper: (n,) bounds of the variables, which are distances along the rod from its middle [m]: from a rod
+            that is straight in plan to the longest convex arch over its chord that is no higher than the target there,
+            since a convex curve is no longer than its chord and twice its height.
     """
 
     target: Target
@@ -106,9 +105,8 @@ class Design:
         None if a rod has too few joints, or after `patience` iterations. Always from flat: a shell has other stable
         states than the one that it reaches from there.
 
-        Parameters
-        ----------
-        variables : (n,) distances of the rod ends from the middle of their rods [m].
+        Args:
+            variables: (n,) distances of the rod ends from the middle of their rods [m].
         """
         footprint = self.footprint(variables)
         if footprint.mesh.grid.joint_counts().min() < FEWEST_JOINTS:
@@ -136,9 +134,8 @@ class Design:
         distance of the target's size: a rod with fewer than three joints, no stable state with the ends on G, or none
         within `PATIENCE` iterations.
 
-        Parameters
-        ----------
-        variables : (n,) distances of the rod ends from the middle of their rods [m].
+        Args:
+            variables: (n,) distances of the rod ends from the middle of their rods [m].
         """
         popped = self.pop_up(variables, patience=PATIENCE)
         if popped is None or not popped.report.stable:
@@ -150,9 +147,8 @@ class Design:
 
         Along each side of each family the share of the bounds is a parabola of Bernstein form with random coefficients.
 
-        Parameters
-        ----------
-        roughness : share of the bounds that is random at every end [-].
+        Args:
+            roughness: share of the bounds that is random at every end [-].
         """
         sides = np.array([[f"{line.family}-", f"{line.family}+"] for line in self.lines]).ravel()
         offsets = np.repeat([line.offset for line in self.lines], 2)
@@ -228,17 +224,15 @@ def search(
 
     By differential evolution, see `AskTell.differential_evolution`.
 
-    Parameters
-    ----------
-    file : of all values, written after each generation and when interrupted; the search continues from it.
-    jobs : number of processes; the result does not depend on it.
-    most : generations after which a search that has not converged ends.
-    progress : is called after each value.
+    Args:
+        file: of all values, written after each generation and when interrupted; the search continues from it.
+        jobs: number of processes; the result does not depend on it.
+        most: generations after which a search that has not converged ends.
+        progress: is called after each value.
 
-    Raises
-    ------
-    InputError : pymoo is not installed; the file is broken or of a different search.
-    OutputError : the file cannot be written.
+    Raises:
+        InputError: pymoo is not installed; the file is broken or of a different search.
+        OutputError: the file cannot be written.
     """
     algorithm, stored, generations = _algorithm(design, seed, population), StoredValues.read(file), list[Generation]()
     stage = f"{design.target.name}, generation 1"

@@ -54,14 +54,13 @@ LEAST = 1e-5  # [mm]: smaller changes are not drawn
 class Line:
     """One run.
 
-    Parameters
-    ----------
-    value : its value, with its unit.
-    factor : its value over that of the base case.
-    change_rms, change_max : change of G0's rod ends against the base case [m]; NaN without a G0.
-    off_net : rms distance of G0's rod ends from those of the exact net [m]; NaN without a G0.
-    strain : largest axial strain of the draped grid [-].
-    rests : its state of rest, in a word or two.
+    Args:
+        value: its value, with its unit.
+        factor: its value over that of the base case.
+        change_rms, change_max: change of G0's rod ends against the base case [m]; NaN without a G0.
+        off_net: rms distance of G0's rod ends from those of the exact net [m]; NaN without a G0.
+        strain: largest axial strain of the draped grid [-].
+        rests: its state of rest, in a word or two.
     """
 
     changed: str
@@ -118,9 +117,8 @@ def make(progress: Progress) -> Studies:
 def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Line]:
     """E, r, g, EA and EI by gravity statics.
 
-    Parameters
-    ----------
-    progress : is called before each drape.
+    Args:
+        progress: is called before each drape.
     """
     base = drape(layout, ROD, TARGET, method=Gravity())
     for changed, (powers, given) in _PARAMETERS.items():
@@ -134,10 +132,9 @@ def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Lin
 def of_height(progress: Progress, *, factors: tuple[float, ...] = HEIGHTS) -> Iterator[Line]:
     """H, by falls.
 
-    Parameters
-    ----------
-    progress : is called before each fall.
-    factors : heights over the paper's [-].
+    Args:
+        progress: is called before each fall.
+        factors: heights over the paper's [-].
     """
     base = _fallen(Fall(drag=DRAG))
     for factor in factors:

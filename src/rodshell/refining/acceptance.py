@@ -42,16 +42,16 @@ class _Asked:
 class Refined:
     """A form before and after it was refined.
 
-    Parameters
-    ----------
-    vary : names of the families that were varied.
-    ends : how the rods' ends were held.
-    before, after : the same object where nothing was accepted; else the second has these ends alone.
-    gates : by name, whether the design passes: the one that was accepted, else the best that was refused.
-    refused : why the best design was refused, beginning with the gate's name, or why there is none; "" if accepted.
-    stopped : when and where the search was out of time, or "".
-    design : values of the variables of the design that was accepted; of a form in patches none.
-    loaded : gaps before and after of the shell that carries its own weight, where it was refined for that; else none.
+    Args:
+        vary: names of the families that were varied.
+        ends: how the rods' ends were held.
+        before, after: the same object where nothing was accepted; else the second has these ends alone.
+        gates: by name, whether the design passes: the one that was accepted, else the best that was refused.
+        refused: why the best design was refused, beginning with the gate's name, or why there is none; "" if accepted.
+        stopped: when and where the search was out of time, or "".
+        design: values of the variables of the design that was accepted; of a form in patches none.
+        loaded: gaps before and after of the shell that carries its own weight, where it was refined for that; else
+            none.
     """
 
     vary: tuple[str, ...]
@@ -101,19 +101,18 @@ def refined(
 ) -> Refined:  # fmt: skip
     """Refine a form, patch by patch.
 
-    Parameters
-    ----------
-    ends : the only end condition of the refined form; None: the first asked for.
-    under_weight : factor on its own weight with which the shell is brought to the target, in place of the unloaded one.
-    dead_loads : (n, 3) further fixed loads on the nodes with which it is brought there [N]; of a form in one piece.
-    span_error : largest error of each span between two joints as it is built [m]; None: 0.05 % of the target's size.
-    start : `Refined.design` of an earlier refinement, from which to continue.
-    progress : called as progress(stage, detail, residual). An OutOfTimeError that it raises ends the search, and the
-        gates are tried without it. A KeyboardInterrupt is raised again with a text that says where the search was.
+    Args:
+        ends: the only end condition of the refined form; None: the first asked for.
+        under_weight: factor on its own weight with which the shell is brought to the target, in place of the unloaded
+            one.
+        dead_loads: (n, 3) further fixed loads on the nodes with which it is brought there [N]; of a form in one piece.
+        span_error: largest error of each span between two joints as it is built [m]; None: 0.05 % of the target's size.
+        start: `Refined.design` of an earlier refinement, from which to continue.
+        progress: called as progress(stage, detail, residual). An OutOfTimeError that it raises ends the search, and the
+            gates are tried without it. A KeyboardInterrupt is raised again with a text that says where the search was.
 
-    Raises
-    ------
-    InputError : the form has no target, or no pop-up with these ends; `start` does not fit.
+    Raises:
+        InputError: the form has no target, or no pop-up with these ends; `start` does not fit.
     """
     asked = _Asked(under_weight, dead_loads, span_error)
     end = stages.ends[0] if ends is None else ends

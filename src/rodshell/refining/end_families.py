@@ -27,11 +27,10 @@ CORRECTIONS = 4  # of a support's place
 class Directions:
     """Two tangents of angles for each clamp: how much it is tilted out of the surface, and turned within it.
 
-    Parameters
-    ----------
-    axes : (2, 2m, 3) unit vectors across the clamp's direction: out of the surface, and within it.
-    box : of the variables, the tilts and turns of each end in turn [-].
-    image : where an operation maps the variables.
+    Args:
+        axes: (2, 2m, 3) unit vectors across the clamp's direction: out of the surface, and within it.
+        box: of the variables, the tilts and turns of each end in turn [-].
+        image: where an operation maps the variables.
     """
 
     structure: Structure
@@ -45,9 +44,8 @@ class Directions:
     def tangents(self, values: Floats) -> Floats:
         """(2m, 3) directions of the clamps.
 
-        Parameters
-        ----------
-        values : (4m,) of the variables.
+        Args:
+            values: (4m,) of the variables.
         """
         first = self.structure.popped.boundary.tangents
         tilt, turn = values.reshape(-1, 2).T[:, :, None] * self.axes
@@ -56,9 +54,8 @@ class Directions:
     def change(self, values: Floats) -> Change:
         """What a design does.
 
-        Parameters
-        ----------
-        values : (4m,) the design [-].
+        Args:
+            values: (4m,) the design [-].
         """
         structure = self.structure
         first, now = structure.popped.boundary.tangents, self.tangents(values)
@@ -76,9 +73,8 @@ class Directions:
     def applied(self, grid: Grid, values: Floats) -> Grid:
         """The grid with these clamps.
 
-        Parameters
-        ----------
-        values : (4m,) the design [-].
+        Args:
+            values: (4m,) the design [-].
         """
         return replace(grid, boundary=replace(grid.boundary, tangents=self.tangents(values)))
 
@@ -92,9 +88,8 @@ class Clamps:
     def on(self, structure: Structure) -> Directions:
         """How much each clamp is tilted and turned.
 
-        Raises
-        ------
-        InputError : its ends are pinned.
+        Raises:
+            InputError: its ends are pinned.
         """
         if not len(structure.popped.shell.ghosts):
             raise InputError(f"the directions of clamps can only vary with ends = {shown(CLAMPED.name)}")
@@ -116,11 +111,10 @@ class Clamps:
 class Slides:
     """How far each rod end is moved along the target's end, with its clamp; on the target it stays as near to its end.
 
-    Parameters
-    ----------
-    along, inwards : (2m, 3) unit vectors in the surface, along its end and across it.
-    box : of the variables [m].
-    image : where an operation maps the variables.
+    Args:
+        along, inwards: (2m, 3) unit vectors in the surface, along its end and across it.
+        box: of the variables [m].
+        image: where an operation maps the variables.
     """
 
     structure: Structure
@@ -138,18 +132,16 @@ class Slides:
         Each end goes along a straight line, and from there back to the surface and to its distance from the end. What
         that does to an end that is not moved at all is taken away: so no variable has an effect at zero.
 
-        Parameters
-        ----------
-        values : (2m,) of the variables [m].
+        Args:
+            values: (2m,) of the variables [m].
         """
         return np.asarray(self._placed(values) - self._placed(0.0 * values))
 
     def change(self, values: Floats) -> Change:
         """What a design does.
 
-        Parameters
-        ----------
-        values : (2m,) the design [m].
+        Args:
+            values: (2m,) the design [m].
         """
         structure, count = self.structure, len(values)
         held = len(structure.held)
@@ -166,9 +158,8 @@ class Slides:
     def applied(self, grid: Grid, values: Floats) -> Grid:
         """The grid with these supports.
 
-        Parameters
-        ----------
-        values : (2m,) the design [m].
+        Args:
+            values: (2m,) the design [m].
         """
         return replace(grid, boundary=replace(grid.boundary, points=grid.boundary.points + self.moved(values)))
 

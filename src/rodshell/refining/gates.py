@@ -49,11 +49,10 @@ FITS = 20  # steps of the fit of rods in a plane
 class Gates:
     """Which gates a design passes.
 
-    Parameters
-    ----------
-    passed : by name, in the order of `GATES`; a gate that was not reached is not among them.
-    reason : why the first one refuses it, beginning with the gate's name; "" where none does.
-    factorizations : that all of them took.
+    Args:
+        passed: by name, in the order of `GATES`; a gate that was not reached is not among them.
+        reason: why the first one refuses it, beginning with the gate's name; "" where none does.
+        factorizations: that all of them took.
     """
 
     passed: dict[str, bool]
@@ -71,12 +70,11 @@ def gates(
 ) -> Gates:
     """Try a design at every gate.
 
-    Parameters
-    ----------
-    form : the design, popped up with one end condition.
-    all_of_them : try the others too after a gate has refused it.
-    span_error : largest error of each span as it is built [m]; None: `SPAN_ERROR` of the target's size.
-    progress : called as progress(stage, detail, residual).
+    Args:
+        form: the design, popped up with one end condition.
+        all_of_them: try the others too after a gate has refused it.
+        span_error: largest error of each span as it is built [m]; None: `SPAN_ERROR` of the target's size.
+        progress: called as progress(stage, detail, residual).
     """
     passed, first, factorizations = dict[str, bool](), "", 0
     for name in GATES:
@@ -142,15 +140,13 @@ def _tolerance(form: Stages, span_error: float | None, progress: Progress) -> tu
 def worst_with_errors(form: Stages, span_error: float, progress: Progress = silent) -> tuple[float | None, int]:
     """The largest rms gap of the shell built with errors, over the target's size, and the factorisations that it took.
 
-    Parameters
-    ----------
-    form : the design, popped up with one end condition.
-    span_error : largest error of each span's length [m].
-    progress : called as progress(stage, detail, residual).
+    Args:
+        form: the design, popped up with one end condition.
+        span_error: largest error of each span's length [m].
+        progress: called as progress(stage, detail, residual).
 
-    Returns
-    -------
-    None in place of the gap where one of them has no stable state nearby.
+    Returns:
+        None in place of the gap where one of them has no stable state nearby.
     """
     worst, made = 0.0, 0
     for sample, popped in enumerate(with_errors(form, span_error=span_error), start=1):
@@ -191,11 +187,10 @@ def with_errors(form: Stages, samples: int = SAMPLES, *, span_error: float | Non
     It is solved from the state that is foreseen to first order. Where that does not lead to a stable equilibrium, the
     errors grow in steps, and a shell that loses its stability on the way slides to the stable state next to it.
 
-    Parameters
-    ----------
-    form : the design, popped up with one end condition.
-    samples : of a random generator with the seeds 0, 1, ...
-    span_error : largest error of each span's length [m]; None: `SPAN_ERROR` of the target's size.
+    Args:
+        form: the design, popped up with one end condition.
+        samples: of a random generator with the seeds 0, 1, ...
+        span_error: largest error of each span's length [m]; None: `SPAN_ERROR` of the target's size.
     """
     popped = _popped(form)
     mesh, shell, found = popped.shell.mesh, popped.shell, popped.equilibrium
@@ -259,9 +254,8 @@ def misfit(mesh: GridMesh) -> float:
 
     Each rod is turned and moved until the sum of the squares of all distances is smallest.
 
-    Parameters
-    ----------
-    mesh : the rods, with the distances of their joints along them.
+    Args:
+        mesh: the rods, with the distances of their joints along them.
     """
     rods, at = mesh.grid.crossings.rods, _joint_stations(mesh)
     lines = mesh.grid.rods

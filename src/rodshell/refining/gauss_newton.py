@@ -27,12 +27,11 @@ FIRM, _LEAST_RADIUS = 0.1, 1e-3  # radius that must not bound a step which says 
 class Step:
     """One evaluation: for progress and records.
 
-    Parameters
-    ----------
-    rms : relative gap, or None where no equilibrium was found.
-    lowest : lowest eigenvalue over that before, or None.
-    accepted : whether the design became the new one.
-    values : (n,) of the variables.
+    Args:
+        rms: relative gap, or None where no equilibrium was found.
+        lowest: lowest eigenvalue over that before, or None.
+        accepted: whether the design became the new one.
+        values: (n,) of the variables.
     """
 
     number: int
@@ -47,11 +46,10 @@ class Step:
 class Found:
     """Where the search ended.
 
-    Parameters
-    ----------
-    accepted : the designs that were accepted, the best last.
-    converged : whether no step is foreseen to gain more.
-    stopped : when and where the search was out of time, or "".
+    Args:
+        accepted: the designs that were accepted, the best last.
+        converged: whether no step is foreseen to gain more.
+        stopped: when and where the search was out of time, or "".
     """
 
     accepted: tuple[Point, ...]
@@ -74,13 +72,12 @@ def gauss_newton(
 ) -> Found:
     """Make a sum of squares small.
 
-    Parameters
-    ----------
-    first : the design to start from.
-    allows : limits that a design must keep to be accepted.
-    lowest_before : eigenvalue to which those of the steps are related; None: they are not computed.
-    radius : first trust radius, in scales of the variables.
-    progress : called after each evaluation; an OutOfTimeError that it raises ends the search with what was found.
+    Args:
+        first: the design to start from.
+        allows: limits that a design must keep to be accepted.
+        lowest_before: eigenvalue to which those of the steps are related; None: they are not computed.
+        radius: first trust radius, in scales of the variables.
+        progress: called after each evaluation; an OutOfTimeError that it raises ends the search with what was found.
     """
     box = variables.box
     here, accepted, steps, factorizations = first, [first], list[Step](), 1

@@ -26,12 +26,11 @@ FIRST = 0.05  # of the usual span: the change that counts as one
 class Stations:
     """Variables that move points along rods.
 
-    Parameters
-    ----------
-    shifts : (k, n) displacement of every rod node along its rod by each variable [-].
-    box : of the variables [m].
-    image : where an operation maps the variables.
-    across : (m, n) growth of the rods' offsets by each variable [-].
+    Args:
+        shifts: (k, n) displacement of every rod node along its rod by each variable [-].
+        box: of the variables [m].
+        image: where an operation maps the variables.
+        across: (m, n) growth of the rods' offsets by each variable [-].
     """
 
     structure: Structure
@@ -46,9 +45,8 @@ class Stations:
     def change(self, values: Floats) -> Change:
         """What a design does.
 
-        Parameters
-        ----------
-        values : (n,) the design [m].
+        Args:
+            values: (n,) the design [m].
         """
         mesh, held = self.structure.mesh, len(self.structure.held)
         before, after = _edge_entries(mesh)
@@ -59,9 +57,8 @@ class Stations:
     def applied(self, grid: Grid, values: Floats) -> Grid:
         """The grid with these points moved.
 
-        Parameters
-        ----------
-        values : (n,) the design [m].
+        Args:
+            values: (n,) the design [m].
         """
         return replace(grid, mesh=_restationed(grid.mesh, self.shifts @ values, self.across @ values))
 
@@ -97,9 +94,8 @@ class Offsets:
     def on(self, structure: Structure) -> Stations:
         """The growth of each rod's offset.
 
-        Raises
-        ------
-        InputError : rods are not of two orthogonal families.
+        Raises:
+            InputError: rods are not of two orthogonal families.
         """
         mesh, rods = structure.mesh, structure.mesh.grid.rods
         if any(rod.family == "free" for rod in rods):
@@ -164,9 +160,8 @@ def usual_span(mesh: GridMesh) -> float:
 def between(mesh: GridMesh, points: Ints) -> csr_array:
     """(k, k) displacements of all rod nodes by those of some, linear between these.
 
-    Parameters
-    ----------
-    points : entries of `rod_nodes`, ascending, with the ends of all rods among them.
+    Args:
+        points: entries of `rod_nodes`, ascending, with the ends of all rods among them.
     """
     every, s = np.arange(len(mesh.rod_nodes)), mesh.stations
     after = np.searchsorted(points, every)
@@ -180,10 +175,9 @@ def between(mesh: GridMesh, points: Ints) -> csr_array:
 def _restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
     """A mesh whose nodes are moved along their rods, and whose rods are moved across themselves.
 
-    Parameters
-    ----------
-    along : (k,) displacement of every rod node along its rod [m].
-    across : (m,) growth of the rods' offsets [m].
+    Args:
+        along: (k,) displacement of every rod node along its rod [m].
+        across: (m,) growth of the rods' offsets [m].
     """
     stations = mesh.stations + along
     ends = stations[np.column_stack([mesh.rod_start, mesh.rod_stop - 1])]

@@ -32,11 +32,10 @@ LARGEST = 1e3  # times a load: factors above are not looked for
 class Deflection:
     """No node is displaced by more than a limit under a load, to first order.
 
-    Parameters
-    ----------
-    load : (n, 3) on the nodes of the mesh [N].
-    most : largest displacement [m].
-    weight : of an excess of one at every node, over a gap of the target's size [-].
+    Args:
+        load: (n, 3) on the nodes of the mesh [N].
+        most: largest displacement [m].
+        weight: of an excess of one at every node, over a gap of the target's size [-].
     """
 
     load: Floats
@@ -65,11 +64,10 @@ class Deflection:
 class LoadFactor:
     """The lowest linear buckling factor of a load stays above a limit.
 
-    Parameters
-    ----------
-    load : (n, 3) on the nodes of the mesh [N].
-    least : smallest factor [-].
-    weight : of a factor of half the limit, over a gap of the target's size [-].
+    Args:
+        load: (n, 3) on the nodes of the mesh [N].
+        least: smallest factor [-].
+        weight: of a factor of half the limit, over a gap of the target's size [-].
     """
 
     load: Floats

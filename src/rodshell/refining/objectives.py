@@ -21,18 +21,16 @@ class Objective(Protocol):
     def residuals(self, here: Point) -> Floats:
         """(q,) residuals [-].
 
-        Parameters
-        ----------
-        here : a design and its equilibrium.
+        Args:
+            here: a design and its equilibrium.
         """
         ...
 
     def slopes(self, here: Point) -> Floats:
         """(q, n) slopes of the residuals by the variables.
 
-        Parameters
-        ----------
-        here : a design and its equilibrium.
+        Args:
+            here: a design and its equilibrium.
         """
         ...
 
@@ -43,10 +41,9 @@ class Gap:
 
     The residuals g (|g|/G)^(p/2 - 1) / sqrt(q) have the sum of squares G^2: with p = 2 the mean square.
 
-    Parameters
-    ----------
-    power : p, 2 or more; large ones count the largest gaps.
-    weight : of each point (q, 3) of the rods [m] in the mean, from its coordinates; None: the same for all.
+    Args:
+        power: p, 2 or more; large ones count the largest gaps.
+        weight: of each point (q, 3) of the rods [m] in the mean, from its coordinates; None: the same for all.
     """
 
     power: float = 2.0
@@ -85,10 +82,9 @@ class Gap:
 class Prestress:
     """Compression of spans over a share of their Euler loads.
 
-    Parameters
-    ----------
-    most : share of the Euler load from which it counts [-].
-    weight : of an excess of one Euler load in every span, over a gap of the target's size [-].
+    Args:
+        most: share of the Euler load from which it counts [-].
+        weight: of an excess of one Euler load in every span, over a gap of the target's size [-].
     """
 
     most: float = 0.3
@@ -122,11 +118,10 @@ class Prestress:
 class LowestEigenvalue:
     """The lowest modes stay above a share of the lowest one before.
 
-    Parameters
-    ----------
-    least : share of the lowest eigenvalue before [-].
-    margin : the limit is approached from so much above it [-].
-    weight : of an eigenvalue of zero, over a gap of the target's size [-].
+    Args:
+        least: share of the lowest eigenvalue before [-].
+        margin: the limit is approached from so much above it [-].
+        weight: of an eigenvalue of zero, over a gap of the target's size [-].
     """
 
     least: float
@@ -156,10 +151,9 @@ class LowestEigenvalue:
 def residuals(objectives: Sequence[Objective], here: Point) -> Floats:
     """(q,) residuals of all objectives.
 
-    Parameters
-    ----------
-    objectives : what is to be made small.
-    here : a design and its equilibrium.
+    Args:
+        objectives: what is to be made small.
+        here: a design and its equilibrium.
     """
     return np.concatenate([objective.residuals(here) for objective in objectives])
 
@@ -167,8 +161,7 @@ def residuals(objectives: Sequence[Objective], here: Point) -> Floats:
 def slopes(objectives: Sequence[Objective], here: Point) -> Floats:
     """(q, n) derivatives of the residuals of all objectives; parameters as of `residuals`.
 
-    Parameters
-    ----------
-    objectives, here : as of `residuals`.
+    Args:
+        objectives, here: as of `residuals`.
     """
     return np.concatenate([objective.slopes(here) for objective in objectives])

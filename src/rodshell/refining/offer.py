@@ -33,11 +33,10 @@ WORTH = 0.8  # of the gap before: a larger one after is a small gain
 class Offer:
     """What a refinement would gain.
 
-    Parameters
-    ----------
-    before, after : root mean square of the gap over the target's size, as the form is and with double laths.
-    shares : smallest and largest share of a rod's length that is then double, patch by patch.
-    others : the gap with the form's other ends, as it is.
+    Args:
+        before, after: root mean square of the gap over the target's size, as the form is and with double laths.
+        shares: smallest and largest share of a rod's length that is then double, patch by patch.
+        others: the gap with the form's other ends, as it is.
     """
 
     ends: Ends
@@ -77,14 +76,12 @@ class Offer:
 def offer(stages: Stages, *, progress: Progress = silent) -> Offer | None:
     """What double laths would gain, for pinned ends if the form has them.
 
-    Parameters
-    ----------
-    progress : called as progress(stage, detail, residual).
+    Args:
+        progress: called as progress(stage, detail, residual).
 
-    Returns
-    -------
-    None where the form has no target, no stable shell, or rods whose sections change along them; where no design of a
-    patch is stable; or where the time was over.
+    Returns:
+        None where the form has no target, no stable shell, or rods whose sections change along them; where no design of
+        a patch is stable; or where the time was over.
     """
     if stages.status != "converged" or not stages.agreement:
         return None

@@ -49,9 +49,8 @@ Progress = Callable[[Step], None]
 class Candidate:
     """One design on the way.
 
-    Parameters
-    ----------
-    point : its equilibrium on the mesh of the search.
+    Args:
+        point: its equilibrium on the mesh of the search.
     """
 
     point: Point
@@ -62,14 +61,13 @@ class Candidate:
 class Refinement:
     """A shell before and after.
 
-    Parameters
-    ----------
-    before, after : the stages, with the popped-up shell of these ends alone.
-    designs : those that were accepted on the way, the last best; the first is the shell before.
-    converged : whether no further step would gain much.
-    stopped : when and where the search was out of time, or "".
-    loaded : gaps before and after under the loads, where it was refined under loads; else None.
-    as_found : whether its stiffnesses are built as they were found, see `built`.
+    Args:
+        before, after: the stages, with the popped-up shell of these ends alone.
+        designs: those that were accepted on the way, the last best; the first is the shell before.
+        converged: whether no further step would gain much.
+        stopped: when and where the search was out of time, or "".
+        loaded: gaps before and after under the loads, where it was refined under loads; else None.
+        as_found: whether its stiffnesses are built as they were found, see `built`.
     """
 
     vary: tuple[str, ...]
@@ -115,24 +113,23 @@ def refine(
 ) -> Refinement:
     """Bring a popped-up shell nearer to its target.
 
-    Parameters
-    ----------
-    stages : of one shell, with a stable pop-up.
-    vary : what is varied: names of `FAMILIES`, or families with settings of their own.
-    ends : how the rods' ends are held; None: as first asked for.
-    objectives : what is made small; None: the mean square of the gap and, where not only stiffness varies, compression.
-    least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
-    under_weight : factor on its own weight with which the shell is brought to the target, such as 1.0; unloaded it then
-        stands above.
-    dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
-    start : values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
-    most_evaluations : designs that are tried; None: 60, or 30 on either side where no stiffness varies.
-    progress : called after each; an OutOfTimeError that it raises ends the search with what was found.
+    Args:
+        stages: of one shell, with a stable pop-up.
+        vary: what is varied: names of `FAMILIES`, or families with settings of their own.
+        ends: how the rods' ends are held; None: as first asked for.
+        objectives: what is made small; None: the mean square of the gap and, where not only stiffness varies,
+            compression.
+        least_eigenvalue: share of the lowest eigenvalue before below which no design is accepted [-].
+        under_weight: factor on its own weight with which the shell is brought to the target, such as 1.0; unloaded it
+            then stands above.
+        dead_loads: (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
+        start: values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
+        most_evaluations: designs that are tried; None: 60, or 30 on either side where no stiffness varies.
+        progress: called after each; an OutOfTimeError that it raises ends the search with what was found.
 
-    Raises
-    ------
-    InputError : no such family; the shell has no target, no pop-up with these ends, or is not stable.
-    ConvergenceError : it falls under the loads, or has no stable equilibrium with the design to start from.
+    Raises:
+        InputError: no such family; the shell has no target, no pop-up with these ends, or is not stable.
+        ConvergenceError: it falls under the loads, or has no stable equilibrium with the design to start from.
     """
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
@@ -203,14 +200,12 @@ def _cost(goals: Sequence[Objective], here: Point) -> float:
 def between(refinement: Refinement, low: Candidate, high: Candidate, share: float) -> tuple[Candidate | None, int]:
     """A design on the way from one to another.
 
-    Parameters
-    ----------
-    share : of the way [-].
+    Args:
+        share: of the way [-].
 
-    Returns
-    -------
-    The design, or None where it has no stable equilibrium near the first, or is of sizes in stock; and the
-    factorisations that it took.
+    Returns:
+        The design, or None where it has no stable equilibrium near the first, or is of sizes in stock; and the
+        factorisations that it took.
     """
     variables, here = refinement.variables, low.point
     if any(sizes is not None for sizes in variables.stock):
@@ -228,9 +223,8 @@ def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
     A common factor on all stiffnesses changes no unloaded shape, unless joints are springs. It is chosen such that the
     thickest place has the section itself, or more where the lowest eigenvalue would else be lower than before.
 
-    Parameters
-    ----------
-    as_found : leave that factor as it is, since limits under loads decide on it.
+    Args:
+        as_found: leave that factor as it is, since limits under loads decide on it.
     """
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
@@ -247,9 +241,8 @@ def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
 def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:
     """The families that are meant.
 
-    Raises
-    ------
-    InputError : an unknown name, none, or one twice.
+    Raises:
+        InputError: an unknown name, none, or one twice.
     """
     given = vary if isinstance(vary, Sequence) and not isinstance(vary, str) else (vary,)
     families = tuple(
@@ -267,9 +260,8 @@ def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family
 def structure_of(stages: Stages, ends: Ends) -> Structure:
     """The shell that is refined.
 
-    Raises
-    ------
-    InputError : it has no target, no pop-up with these ends, or is not stable.
+    Raises:
+        InputError: it has no target, no pop-up with these ends, or is not stable.
     """
     if stages.from_table:
         raise InputError("a table of rods has no target to come nearer to: refine the form of a target")
@@ -287,14 +279,12 @@ def structure_of(stages: Stages, ends: Ends) -> Structure:
 def first_point(structure: Structure, variables: Design, start: Sequence[float] | None = None) -> tuple[Point, int]:
     """The design to start from, and the factorisations that it took.
 
-    Parameters
-    ----------
-    start : other values than those without effect.
+    Args:
+        start: other values than those without effect.
 
-    Raises
-    ------
-    InputError : `start` is not as long as there are variables.
-    ConvergenceError : it has no stable equilibrium near the shell's own; the shell falls under the loads.
+    Raises:
+        InputError: `start` is not as long as there are variables.
+        ConvergenceError: it has no stable equilibrium near the shell's own; the shell falls under the loads.
     """
     box = variables.box
     values = box.start
@@ -328,13 +318,11 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
 def popped_up(stages: Stages, design: Candidate, ends: Ends) -> tuple[Stages, int]:
     """The stages of a grid built to a design, and the factorisations that its pop-up took.
 
-    Parameters
-    ----------
-    design : what is built, and the equilibrium that was found for it.
+    Args:
+        design: what is built, and the equilibrium that was found for it.
 
-    Raises
-    ------
-    InputError : it has no stable equilibrium there after all.
+    Raises:
+        InputError: it has no stable equilibrium there after all.
     """
     grid, here = design.grid, design.point.equilibrium
     support = stages.popped[ends].support
@@ -360,9 +348,8 @@ def popped_up(stages: Stages, design: Candidate, ends: Ends) -> tuple[Stages, in
 def loaded_gap(stages: Stages, design: Candidate, ends: Ends) -> Agreement:
     """Distance to the target of a shell under the loads that it was refined for.
 
-    Parameters
-    ----------
-    design : of which it is built, with its loaded equilibrium.
+    Args:
+        design: of which it is built, with its loaded equilibrium.
     """
     popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
     load = np.zeros_like(popped.state)

@@ -32,11 +32,10 @@ PROBE = 1e-4  # of a number of a profile: differences are then exact to 1e-8
 class Profiles:
     """Variables that are numbers of profiles.
 
-    Parameters
-    ----------
-    variable_of : (m, r) variable that is number r of each rod's profile.
-    stock : the only values that can be built, ascending; None: all within the box.
-    common : whether adding the same to all of them multiplies every stiffness alike.
+    Args:
+        variable_of: (m, r) variable that is number r of each rod's profile.
+        stock: the only values that can be built, ascending; None: all within the box.
+        common: whether adding the same to all of them multiplies every stiffness alike.
     """
 
     structure: Structure
@@ -55,27 +54,24 @@ class Profiles:
     def applied(self, grid: Grid, values: Floats) -> Grid:
         """The grid whose rods have these profiles.
 
-        Parameters
-        ----------
-        values : (n,) the design.
+        Args:
+            values: (n,) the design.
         """
         return replace(grid, mesh=grid.mesh.with_profiles(self.of_rods(values)))
 
     def of_rods(self, values: Floats) -> tuple[Profile, ...]:
         """The profile of each rod.
 
-        Parameters
-        ----------
-        values : (n,) the design.
+        Args:
+            values: (n,) the design.
         """
         return self._profiles(values[self.variable_of])
 
     def change(self, values: Floats) -> Change:
         """What a design does.
 
-        Parameters
-        ----------
-        values : (n,) the design.
+        Args:
+            values: (n,) the design.
         """
         structure, numbers = self.structure, values[self.variable_of]
         none = Change.none(len(structure.mesh.edges), len(structure.held), len(values))
@@ -109,16 +105,14 @@ class Profiles:
 class Taper:
     """The bending stiffness changes along rods, between that of their section and a part of it.
 
-    Parameters
-    ----------
-    ratio : of the largest to the smallest EI that is allowed [-].
-    per : a profile for the whole shell, for each family, or for each rod.
-    stations : at which EI is chosen, from an end of a rod to its middle.
-    varies : what of the section is changed, see `Profile`.
+    Args:
+        ratio: of the largest to the smallest EI that is allowed [-].
+        per: a profile for the whole shell, for each family, or for each rod.
+        stations: at which EI is chosen, from an end of a rod to its middle.
+        varies: what of the section is changed, see `Profile`.
 
-    Raises
-    ------
-    InputError : the ratio is not larger than 1, or there are fewer than two stations.
+    Raises:
+        InputError: the ratio is not larger than 1, or there are fewer than two stations.
     """
 
     ratio: float = 8.0
@@ -161,9 +155,8 @@ class Taper:
 class DoubleLaths:
     """Two equal laths on each other over the middle of every rod; they slip.
 
-    Parameters
-    ----------
-    least, most : share of each rod's length that is double [-].
+    Args:
+        least, most: share of each rod's length that is double [-].
     """
 
     least: float = DOUBLE[0]
@@ -185,11 +178,10 @@ _RENARD = (0.63, 0.71, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6)  # preferred numbers
 class Sections:
     """One of several sizes in stock for each rod, which is the same from end to end.
 
-    Parameters
-    ----------
-    stock : sizes that are available, of the length of the section that varies: of a round rod its diameter [m]; None:
-        those of the rod's own size times preferred numbers from 0.63 to 1.6.
-    varies : what of the section is changed, see `Profile`.
+    Args:
+        stock: sizes that are available, of the length of the section that varies: of a round rod its diameter [m];
+            None: those of the rod's own size times preferred numbers from 0.63 to 1.6.
+        varies: what of the section is changed, see `Profile`.
     """
 
     stock: tuple[float, ...] | None = None
@@ -200,9 +192,8 @@ class Sections:
     def on(self, structure: Structure) -> Profiles:
         """The logarithm of the factor on EI of each rod.
 
-        Raises
-        ------
-        InputError : fewer than two sizes; the section has no such size.
+        Raises:
+            InputError: fewer than two sizes; the section has no such size.
         """
         given = sizes(structure.rod, self.varies, np.ones(1))
         if given is None:

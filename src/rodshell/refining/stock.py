@@ -27,15 +27,13 @@ def rounded(
 ) -> tuple[Point | None, int]:
     """The best design of sizes of stock near one that was found.
 
-    Parameters
-    ----------
-    variables : some of them with a list of values.
-    found : the design with values in between.
-    allows : limits that a design must keep.
+    Args:
+        variables: some of them with a list of values.
+        found: the design with values in between.
+        allows: limits that a design must keep.
 
-    Returns
-    -------
-    The design, or None where none near it is stable and allowed; and the number of factorisations.
+    Returns:
+        The design, or None where none near it is stable and allowed; and the number of factorisations.
     """
     stock = variables.stock
     here, made = _towards(variables, found, nearest(stock, found.values))
@@ -59,10 +57,9 @@ def rounded(
 def nearest(stock: Sequence[Floats | None], values: Floats) -> Floats:
     """(n,) the nearest values that are available.
 
-    Parameters
-    ----------
-    stock : of each variable, or None.
-    values : (n,) of the variables.
+    Args:
+        stock: of each variable, or None.
+        values: (n,) of the variables.
     """
     chosen = [
         value if list_ is None else float(list_[np.argmin(np.abs(list_ - value))])
@@ -74,11 +71,10 @@ def nearest(stock: Sequence[Floats | None], values: Floats) -> Floats:
 def repaired(stock: Sequence[Floats | None], values: Floats, r: Floats, jacobian: Floats) -> Floats:
     """(n,) values that make the sum of squares of a linear model small, each at most one in its list away.
 
-    Parameters
-    ----------
-    stock : of each variable, or None for those that stay.
-    values : (n,) now, in their lists.
-    r, jacobian : (q,) residuals and (q, n) their slopes there.
+    Args:
+        stock: of each variable, or None for those that stay.
+        values: (n,) now, in their lists.
+        r, jacobian: (q,) residuals and (q, n) their slopes there.
     """
     result, left = values.copy(), r.copy()
     open_ = {k for k, list_ in enumerate(stock) if list_ is not None}

@@ -34,12 +34,11 @@ MODES = 3  # of which the lowest may become the lowest of all
 class Structure:
     """A popped-up shell, its target, and the properties of its edges before any design.
 
-    Parameters
-    ----------
-    popped : the shell to be refined.
-    rod : section and material of its rods, which have no profiles.
-    weight : factor on the shell's own weight under which it is wanted there [-]; 0: without it.
-    dead_loads : (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
+    Args:
+        popped: the shell to be refined.
+        rod: section and material of its rods, which have no profiles.
+        weight: factor on the shell's own weight under which it is wanted there [-]; 0: without it.
+        dead_loads: (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
     """
 
     popped: PopUp
@@ -84,9 +83,8 @@ class Structure:
     def stiffness(self, mesh: GridMesh) -> Floats:
         """(e, 4) EA [N], EI1, EI2 and GJ [N m2] of the edges of a mesh.
 
-        Parameters
-        ----------
-        mesh : of the same rods, with or without profiles.
+        Args:
+            mesh: of the same rods, with or without profiles.
         """
         sections = RodSections.of(mesh, [self.rod] * len(mesh.grid.rods))
         return np.column_stack([sections.stretch, sections.edges])
@@ -146,9 +144,8 @@ class Structure:
 class Point:
     """A design and its equilibrium.
 
-    Parameters
-    ----------
-    values : (n,) of the variables: the design.
+    Args:
+        values: (n,) of the variables: the design.
     """
 
     structure: Structure
@@ -212,14 +209,12 @@ class Point:
     def tried(self, values: Floats, change: Change) -> "tuple[Point | None, int]":
         """The equilibrium of another design, from this one's by first order.
 
-        Parameters
-        ----------
-        values : (n,) the other design.
+        Args:
+            values: (n,) the other design.
 
-        Returns
-        -------
-        The point, or None where Newton's method does not lead to a stable equilibrium next to the prediction; and the
-        number of factorisations that this took.
+        Returns:
+            The point, or None where Newton's method does not lead to a stable equilibrium next to the prediction; and
+            the number of factorisations that this took.
         """
         step, here = values - self.values, self.equilibrium
         response, held = self.response, self.structure.held
@@ -240,14 +235,12 @@ class Point:
 def under_load(unloaded: Equilibrium, load: Floats) -> tuple[Equilibrium | None, int]:
     """The equilibrium under a load that grows from that of the problem, by stable equilibria.
 
-    Parameters
-    ----------
-    unloaded : a stable equilibrium, with or without a load.
-    load : (N, 3) in the end [N].
+    Args:
+        unloaded: a stable equilibrium, with or without a load.
+        load: (N, 3) in the end [N].
 
-    Returns
-    -------
-    The equilibrium, None where the shell falls before; and the number of factorisations.
+    Returns:
+        The equilibrium, None where the shell falls before; and the number of factorisations.
     """
     first = np.zeros_like(load) if unloaded.problem.load is None else unloaded.problem.load
     here, path, made = unloaded, Continuation(0.0, 1.0, 1.0, SMALLEST_STEP), 0

@@ -19,10 +19,9 @@ from rodshell.refining.symmetry import Image, Operation, symmetries, ties
 class Grid:
     """A flat grid and where its rods end: what is built.
 
-    Parameters
-    ----------
-    mesh : the flat grid, its rods with their profiles.
-    boundary : where the rods end, and in which directions.
+    Args:
+        mesh: the flat grid, its rods with their profiles.
+        boundary: where the rods end, and in which directions.
     """
 
     mesh: GridMesh
@@ -33,11 +32,10 @@ class Grid:
 class Box:
     """Values of n variables.
 
-    Parameters
-    ----------
-    start : (n,) first values.
-    lower, upper : (n,) bounds.
-    scale : (n,) change that counts as one: the first step is not longer.
+    Args:
+        start: (n,) first values.
+        lower, upper: (n,) bounds.
+        scale: (n,) change that counts as one: the first step is not longer.
     """
 
     start: Floats
@@ -55,19 +53,17 @@ class Variables(Protocol):
     def change(self, values: Floats) -> Change:
         """What a design does, with its derivatives.
 
-        Parameters
-        ----------
-        values : (n,) of the variables.
+        Args:
+            values: (n,) of the variables.
         """
         ...
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
         """The grid built to a design.
 
-        Parameters
-        ----------
-        grid : before, or with what other variables have changed.
-        values : (n,) of the variables.
+        Args:
+            grid: before, or with what other variables have changed.
+            values: (n,) of the variables.
         """
         ...
 
@@ -93,9 +89,8 @@ class Untied(Variables, Protocol):
 class Family(Protocol):
     """A kind of variables that a user chooses.
 
-    Attributes
-    ----------
-    name : as users write it.
+    Attributes:
+        name: as users write it.
     """
 
     @property
@@ -110,9 +105,8 @@ class Family(Protocol):
 class Tied:
     """Variables that are equal, or opposite, to others: those of a symmetric design.
 
-    Parameters
-    ----------
-    ties : (n, q) with one entry, 1 or -1, in each row: which of the q common values each variable has.
+    Args:
+        ties: (n, q) with one entry, 1 or -1, in each row: which of the q common values each variable has.
     """
 
     whole: Untied
@@ -162,9 +156,8 @@ class Design:
     def stiffer(self, values: Floats, logarithm: float) -> Floats:
         """Values with which every stiffness is multiplied by a common factor; unchanged where they cannot do that.
 
-        Parameters
-        ----------
-        values : (n,) of the variables.
+        Args:
+            values: (n,) of the variables.
         """
         return np.concatenate([some + logarithm * part.whole.common for part, some in self._split(values)])
 

@@ -40,9 +40,8 @@ PARTS = ".gltf"
 def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> dict[str, bytes]:
     """The contents of the files that a case names and that are to be kept with its result, by the path in the case.
 
-    Parameters
-    ----------
-    where : the place of a file by its path in the case; None for one that is not read.
+    Args:
+        where: the place of a file by its path in the case; None for one that is not read.
     """
     found, left = dict[str, bytes](), ALL_COPIES
     for name in _names(case_toml):
@@ -58,10 +57,9 @@ def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> d
 def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tuple[str, dict[str, bytes]]:
     """The case as it is kept in a result folder, its paths relative to that, and the files to be written with it.
 
-    Parameters
-    ----------
-    case_toml : with paths as they were given.
-    inputs : contents of files that are copied, by these paths.
+    Args:
+        case_toml: with paths as they were given.
+        inputs: contents of files that are copied, by these paths.
     """
     copies, new_names = dict[str, bytes](), dict[str, str]()
     for name in _names(case_toml):
@@ -76,9 +74,8 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
 def shown_case(case_toml: str, inputs: Mapping[str, bytes]) -> str:
     """The case on a page that goes to others: paths as they are kept, of files that are not copied the names alone.
 
-    Parameters
-    ----------
-    case_toml, inputs : as of `kept_case`.
+    Args:
+        case_toml, inputs: as of `kept_case`.
     """
     kept, copies = kept_case(case_toml, inputs, Path.cwd())
     return _renamed(kept, {name: Path(name).name for name in _names(kept) if name not in copies})
@@ -88,10 +85,9 @@ def opened_case(case_toml: str, folder: Path, file: Callable[[str], Path]) -> tu
     """The case of a result folder and the contents of its inputs; files that were not copied are named absolutely, and
     not read: a case may come from somebody who wants to have them in a report.
 
-    Parameters
-    ----------
-    case_toml : text of the case; folder : of the result.
-    file : the place of a file in it by its name.
+    Args:
+        case_toml: text of the case; folder : of the result.
+        file: the place of a file in it by its name.
     """
     inputs = read_inputs(case_toml, lambda name: file(name) if inside(name) and name.startswith(f"{FOLDER}/") else None)
     outside = {name: str((folder / name).absolute()) for name in _names(case_toml) if name not in inputs}
@@ -101,9 +97,8 @@ def opened_case(case_toml: str, folder: Path, file: Callable[[str], Path]) -> tu
 def input_hash(case_toml: str, inputs: Mapping[str, bytes]) -> str:
     """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are and however called.
 
-    Parameters
-    ----------
-    case_toml, inputs : as of `kept_case`; a file that is not copied counts as empty.
+    Args:
+        case_toml, inputs: as of `kept_case`; a file that is not copied counts as empty.
     """
     names = _names(case_toml)
     digest = hashlib.sha256(_renamed(case_toml, {name: str(k) for k, name in enumerate(names)}).encode())
@@ -158,15 +153,14 @@ T = TypeVar("T")
 class Archive:
     """A result as it is kept on disk.
 
-    Parameters
-    ----------
-    results : the content of result.json, SI units.
-    states : the content of states.npz: "flat", "draped", "popped_pinned", "popped_clamped" (n, 3) node
-        positions [m]; "gap_draped", "gap_pinned", "gap_clamped" (n,) signed distances to the target [m];
-        "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
-        missing.
-    case_toml : the full resolved input; empty if there was none.
-    inputs : contents of the files that it names and that are kept with the result, by their path in it.
+    Args:
+        results: the content of result.json, SI units.
+        states: the content of states.npz: "flat", "draped", "popped_pinned", "popped_clamped" (n, 3) node
+            positions [m]; "gap_draped", "gap_pinned", "gap_clamped" (n,) signed distances to the target [m];
+            "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
+            missing.
+        case_toml: the full resolved input; empty if there was none.
+        inputs: contents of the files that it names and that are kept with the result, by their path in it.
     """
 
     results: Results
@@ -234,9 +228,8 @@ class Archive:
     def is_lost(self, state: str) -> bool:
         """Whether a state is where the solve of a shell stopped before it converged.
 
-        Parameters
-        ----------
-        state : of `states`, such as "popped_pinned".
+        Args:
+            state: of `states`, such as "popped_pinned".
         """
         shells = {POPPED + ends: shell for ends, shell in self.results.pop_up.items()}
         return state in shells and shells[state].status not in (None, CONVERGED)
@@ -245,9 +238,8 @@ class Archive:
 def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
     """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods.
 
-    Parameters
-    ----------
-    make : a function of an archive alone.
+    Args:
+        make: a function of an archive alone.
     """
 
     @wraps(make)
@@ -263,9 +255,8 @@ def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
 def archive_names(archive: Archive) -> list[str]:
     """The names of the files that `put_archive` writes.
 
-    Parameters
-    ----------
-    archive : with or without a case.
+    Args:
+        archive: with or without a case.
     """
     copies = kept_case(archive.case_toml, archive.inputs, Path())[1]
     return [*(name for name in ARCHIVE if name != "case.toml" or archive.case_toml), *copies]
@@ -274,13 +265,11 @@ def archive_names(archive: Archive) -> list[str]:
 def put_archive(archive: Archive, place: ResultFolder) -> None:
     """Stage result.json, case.toml, states.npz and the copied inputs in a folder.
 
-    Parameters
-    ----------
-    place : the folder in which the files are staged.
+    Args:
+        place: the folder in which the files are staged.
 
-    Raises
-    ------
-    OutputError : the folder cannot be written.
+    Raises:
+        OutputError: the folder cannot be written.
     """
     place.put("result.json", archive.results.text())
     if archive.case_toml:
@@ -293,10 +282,9 @@ def put_archive(archive: Archive, place: ResultFolder) -> None:
 def read(folder: str | os.PathLike[str]) -> Archive:
     """The archive of a result folder, of this version of rodshell or an earlier one, every value checked.
 
-    Raises
-    ------
-    InputError : `folder` is not a path. OutputError : there is no result, or it cannot be read; the sentence names the
-        file and the key.
+    Raises:
+        InputError: `folder` is not a path. OutputError : there is no result, or it cannot be read; the sentence names
+            the file and the key.
     """
     instance("folder", folder, str | os.PathLike, "the path of a folder")
     where = file_path("folder", folder)

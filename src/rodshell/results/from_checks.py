@@ -48,15 +48,14 @@ def checked_results(
 ) -> Results:
     """The results of a form with all that was checked and made: more of each rod, and tables of the checks.
 
-    Parameters
-    ----------
-    results : of the form, before it was checked.
-    mesh : of the flat grid, its rods in the order of the results.
-    strength : of the rods' material [Pa]; None: not known.
-    limits : design strengths of the rods, by which utilisation is counted where they are known.
-    net : (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
-    shear_strength : of the rods' material [Pa]; None: not known.
-    strength_of : the preset material that the strengths are of, where they were not given.
+    Args:
+        results: of the form, before it was checked.
+        mesh: of the flat grid, its rods in the order of the results.
+        strength: of the rods' material [Pa]; None: not known.
+        limits: design strengths of the rods, by which utilisation is counted where they are known.
+        net: (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
+        shear_strength: of the rods' material [Pa]; None: not known.
+        strength_of: the preset material that the strengths are of, where they were not given.
     """
     material = results.rod.material if results.rod else None
     anisotropic = material is not None and material.shear is not None  # as timber is
@@ -88,11 +87,10 @@ def checked_results(
 def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod_chosen: Iterable[str] = ()) -> Results:
     """The results with what their drawings say, and with their verdict.
 
-    Parameters
-    ----------
-    drawings : paper, project and the like, see `Drawings`.
-    name : of the result, if not its target's.
-    rod_chosen : which of the rod's "material" and "section" were chosen to fit.
+    Args:
+        drawings: paper, project and the like, see `Drawings`.
+        name: of the result, if not its target's.
+        rod_chosen: which of the rod's "material" and "section" were chosen to fit.
     """
     found = results.changed(drawings=Drawings(**drawings), name=name or results.name)
     chosen = dict.fromkeys(rod_chosen, True)
@@ -105,10 +103,9 @@ def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod
 def checked_states(checks: Checks, stretch_stiffness: float) -> dict[str, NDArray[Any]]:
     """States of the checks: curvature, stress and normal force at each entry of `rod_nodes`, and the deployment.
 
-    Parameters
-    ----------
-    checks : of all shells; states that were not checked are left out.
-    stretch_stiffness : EA of the rods [N].
+    Args:
+        checks: of all shells; states that were not checked are left out.
+        stretch_stiffness: EA of the rods [N].
     """
     states: dict[str, NDArray[Any]] = {}
     for ends, bent in checks.bending.items():
@@ -211,9 +208,8 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
 def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Results:
     """The results of a form with those under loads.
 
-    Parameters
-    ----------
-    mesh : of the flat grid, its rods in the order of the results.
+    Args:
+        mesh: of the flat grid, its rods in the order of the results.
     """
     found = results.changed(
         loads={

@@ -68,9 +68,8 @@ States = dict[str, NDArray[Any]]
 def results_of(stages: Stages) -> Results:
     """The results of a form, before it is checked; those of patches are of one shell, with `patches` and `seams`.
 
-    Parameters
-    ----------
-    stages : of a form in one piece, in patches, or from a table of rods.
+    Args:
+        stages: of a form in one piece, in patches, or from a table of rods.
     """
     known = {
         "rod": rod_type(stages.rod),
@@ -103,9 +102,8 @@ def results_of(stages: Stages) -> Results:
 def states_of(stages: Stages) -> States:
     """The states of a form, before it is checked.
 
-    Parameters
-    ----------
-    stages : as of `results_of`.
+    Args:
+        stages: as of `results_of`.
     """
     mesh = stages.footprint.mesh
     states: States = {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
@@ -129,9 +127,8 @@ def states_of(stages: Stages) -> States:
 def with_seam_forces(results: Results, seams: Seams, checks: Checks) -> Results:
     """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces.
 
-    Parameters
-    ----------
-    checks : with the reactions of all patches, rod by rod.
+    Args:
+        checks: with the reactions of all patches, rod by rod.
     """
     row = {rod.id: k for k, rod in enumerate(results.rods)}
     forced = list[Seam]()
@@ -146,9 +143,8 @@ def with_seam_forces(results: Results, seams: Seams, checks: Checks) -> Results:
 def with_refinement(results: Results, found: "Refined") -> Results:
     """The same results, with how their form was refined; a refusal is a warning.
 
-    Parameters
-    ----------
-    results : of the form after it.
+    Args:
+        results: of the form after it.
     """
     gates: tuple[Gate, ...] = get_args(Gate)
     refused = [] if found.changed else [said("not_refined", found.ends, why=found.refused)]

@@ -29,9 +29,8 @@ RESERVE = 1.5  # times its own weight that the perfect shell carries: imperfecti
 def reserve(results: Results) -> float:
     """How many times its own weight a good shell carries: creep divides stiffness by 1 + k_def [EN 1995-1-1, 2.3.2.2].
 
-    Parameters
-    ----------
-    results : with design strengths, where k_def is known.
+    Args:
+        results: with design strengths, where k_def is known.
     """
     return RESERVE * (1.0 + ((results.strength.creep if results.strength else None) or 0.0))
 
@@ -39,9 +38,8 @@ def reserve(results: Results) -> float:
 def falling(results: Results) -> set[Ends]:
     """The end conditions with which the shell, braced if it is to be, falls under its own weight.
 
-    Parameters
-    ----------
-    results : with the checks of the self-weight.
+    Args:
+        results: with the checks of the self-weight.
     """
     ends = list(results.self_weight)
     found = _carried(results, ends)
@@ -51,11 +49,10 @@ def falling(results: Results) -> set[Ends]:
 def none_stands(results: Results, usable: Sequence[Ends], lost: Sequence[Ends]) -> list[Said]:
     """That no end condition is shown to stand, where the shell falls with some and nothing is known of the others.
 
-    Parameters
-    ----------
-    results : with the checks of the self-weight.
-    usable : with which there is a shell without another fault.
-    lost : with which the pop-up did not converge.
+    Args:
+        results: with the checks of the self-weight.
+        usable: with which there is a shell without another fault.
+        lost: with which the pop-up did not converge.
     """
     fallen, found = falling(results), _carried(results, usable)
     falls, why = [end for end in usable if end in fallen], dict.fromkeys(lost, "the pop-up did not converge")
@@ -83,9 +80,8 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], boo
     """What is said of shells that do not carry their own weight with the reserve that is asked for, or are not known
     to; and whether one of them stands.
 
-    Parameters
-    ----------
-    results : with the checks of the self-weight.
+    Args:
+        results: with the checks of the self-weight.
     """
     found, findings = _carried(results, ends), list[Said]()
     parts = _below(found, 1.0)
@@ -164,9 +160,8 @@ def _asked(results: Results) -> str:
 def is_braced(results: Results) -> bool:
     """Whether the shell has bracing under its loads; its own weight alone is checked without.
 
-    Parameters
-    ----------
-    results : with the checks under loads.
+    Args:
+        results: with the checks under loads.
     """
     return any(shell.bracing for supported in results.loads.values() for shell in supported.values())
 
@@ -196,9 +191,8 @@ def _times(weighed: SelfWeight) -> str:
 def light(results: Results, ends: list[Ends]) -> dict[Ends, float]:
     """By end condition, the factors on its own weight that a shell carries, or is known to, where they are below 1.
 
-    Parameters
-    ----------
-    results : with the checks of the self-weight.
+    Args:
+        results: with the checks of the self-weight.
     """
     return _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
 
@@ -207,9 +201,8 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, t
     """Which rods of the same material would carry the shell with the reserve, a size that is sold or in proportion, and
     the command that forms it of them.
 
-    Parameters
-    ----------
-    factors : on the weight, too low, that is carried with these ends.
+    Args:
+        factors: on the weight, too low, that is carried with these ends.
     """
     rod, kind = results.rod, (results.joint.kind if results.joint else None) or "ball"
     factors = {ends: factor for ends, factor in factors.items() if factor > 0}

@@ -173,13 +173,11 @@ class Results(Record, metaclass=_Refusing):
     def of(cls, content: Mapping[str, Any], *, source: str = "the result") -> Self:
         """Results from the plain content of a result.json of any version, every value checked.
 
-        Parameters
-        ----------
-        content : dictionaries, lists, numbers and texts; NumPy's arrays and numbers are converted.
+        Args:
+            content: dictionaries, lists, numbers and texts; NumPy's arrays and numbers are converted.
 
-        Raises
-        ------
-        InputError : not a mapping. OutputError : the content is not valid; the sentence names the key.
+        Raises:
+            InputError: not a mapping. OutputError : the content is not valid; the sentence names the key.
         """
         instance("content", content, Mapping, "a mapping, as result.json holds one")
         try:
@@ -206,9 +204,8 @@ class Results(Record, metaclass=_Refusing):
 def read_results(path: Path) -> Results:
     """The content of a result.json, every value checked.
 
-    Raises
-    ------
-    OutputError : there is no such file, or this version cannot read it; the sentence names the key.
+    Raises:
+        OutputError: there is no such file, or this version cannot read it; the sentence names the key.
     """
     if not path.exists():
         raise OutputError(f"{path.parent} holds no rodshell result: it has no {path.name}")
@@ -221,13 +218,11 @@ def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
 
     Until November 2026 the format was called gridshell-result. Version 2 renamed drape.own_ends to drape.net_deviation.
 
-    Parameters
-    ----------
-    content : of a result.json of any version.
+    Args:
+        content: of a result.json of any version.
 
-    Raises
-    ------
-    OutputError : another format, or a newer version.
+    Raises:
+        OutputError: another format, or a newer version.
     """
     content = dict(content)
     if content.get("format", FORMAT) not in (FORMAT, "gridshell-result"):
@@ -266,9 +261,8 @@ def _renamed(table: Any, old: str, new: str) -> Any:
 def contradictions(results: Results) -> Iterator[str]:
     """What the records say against each other: rods that do not exist, and counts that do not agree.
 
-    Parameters
-    ----------
-    results : whose values are each valid.
+    Args:
+        results: whose values are each valid.
     """
     ids = [rod.id for rod in results.rods]
     known = set(ids)

@@ -60,13 +60,11 @@ def packed(states: States) -> bytes:
 def read_states(path: Path, results: Results) -> dict[str, NDArray[Any]]:
     """The arrays of a states.npz.
 
-    Parameters
-    ----------
-    results : of the same folder, by which the number of rods and stages is known.
+    Args:
+        results: of the same folder, by which the number of rods and stages is known.
 
-    Raises
-    ------
-    OutputError : it is missing, not to be opened, broken, or too large, or an array is not as it should be.
+    Raises:
+        OutputError: it is missing, not to be opened, broken, or too large, or an array is not as it should be.
     """
     if not path.exists():
         raise OutputError(f"{path} is missing: run case.toml again")
@@ -123,10 +121,9 @@ def _unpacked(path: Path, content: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
 def state_faults(states: States, results: Results) -> Iterator[str]:
     """What is wrong with states: shapes that do not fit each other or the results, indices and numbers out of range.
 
-    Parameters
-    ----------
-    states : arrays by name, see `Archive`.
-    results : by which the number of rods and stages is known.
+    Args:
+        states: arrays by name, see `Archive`.
+        results: by which the number of rods and stages is known.
     """
     if not results.rods:
         yield "there are no rods in result.json"

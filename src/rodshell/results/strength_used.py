@@ -9,10 +9,9 @@ THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii o
 def bent_of(results: Results, shape: str) -> WorstBent:
     """The worst bending of a shape; one without figures where nothing is known.
 
-    Parameters
-    ----------
-    results : with or without checks of bending.
-    shape : the name of a support, or a shape of the deployment.
+    Args:
+        results: with or without checks of bending.
+        shape: the name of a support, or a shape of the deployment.
     """
     return (results.bending.shapes() if results.bending else {}).get(shape) or WorstBent()
 
@@ -20,9 +19,8 @@ def bent_of(results: Results, shape: str) -> WorstBent:
 def strength_name(results: Results, shape: str) -> str:
     """By what the utilisation of a shape is counted: design strengths, if they are known.
 
-    Parameters
-    ----------
-    shape : the name of a support, or a shape of the deployment.
+    Args:
+        shape: the name of a support, or a shape of the deployment.
     """
     preset = results.bending.strength_of if results.bending else None
     if preset is None:
@@ -40,9 +38,8 @@ def by_design_strength(results: Results) -> bool:
 def holds_while_erected(results: Results, used: float) -> bool:
     """Whether a preset's rods that use more than their design strength for erection stay below what breaks them.
 
-    Parameters
-    ----------
-    used : of the design strength for erection [-].
+    Args:
+        used: of the design strength for erection [-].
     """
     characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None
     strength, of_preset = (

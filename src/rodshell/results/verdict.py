@@ -61,9 +61,8 @@ def verdict(results: Results) -> Verdict:
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
     then the warnings.
 
-    Parameters
-    ----------
-    results : with checks; a figure that is missing counts as not checked.
+    Args:
+        results: with checks; a figure that is missing counts as not checked.
     """
     shells = results.pop_up
     faults = {ends: [*_shell_faults(results, ends)] for ends in shells}

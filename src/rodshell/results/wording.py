@@ -45,9 +45,8 @@ def rounding_of(results: Results) -> Rounding:
 
     Where no tolerance is given, the power of ten not above a ten-thousandth of the longest rod.
 
-    Parameters
-    ----------
-    results : of which the tolerance of the drawings and the lengths of the rods are used.
+    Args:
+        results: of which the tolerance of the drawings and the lengths of the rods are used.
     """
     tolerance = results.drawings.tolerance if results.drawings else None
     return rounding_to(tolerance, max((rod.length or 0.0 for rod in results.rods), default=0.0))
@@ -56,9 +55,8 @@ def rounding_of(results: Results) -> Rounding:
 def rounding_to(tolerance: float | None, longest: float) -> Rounding:
     """The rule of `rounding_of`.
 
-    Parameters
-    ----------
-    tolerance : of the drawings, or None; longest : length of the longest rod [m].
+    Args:
+        tolerance: of the drawings, or None; longest : length of the longest rod [m].
     """
     asked = 1e3 * OF_ROD * longest if tolerance is None else 0.5 * 1e3 * tolerance
     power = 10.0 ** floor(log10(max(asked, FINEST)) + 1e-9)
@@ -120,9 +118,8 @@ def shown_factor(limit: float | None) -> str:
 def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXACT) -> str:
     """A length [m] in mm with about `digits` significant digits, no finer than its rounding.
 
-    Parameters
-    ----------
-    rounding : the finest that is shown.
+    Args:
+        rounding: the finest that is shown.
     """
     if metres is None or not isfinite(metres):
         return UNKNOWN
@@ -136,9 +133,8 @@ def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXAC
 def nice_step(span: float, count: int) -> float:
     """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less.
 
-    Parameters
-    ----------
-    span : length of the interval; count : of parts.
+    Args:
+        span: length of the interval; count : of parts.
     """
     if span <= 0:
         return 1.0
@@ -149,9 +145,8 @@ def nice_step(span: float, count: int) -> float:
 def nice_ticks(low: float, high: float, count: int) -> list[float]:
     """Round numbers from `low` to `high`, `count` + 1 at most.
 
-    Parameters
-    ----------
-    low, high : ends of the interval; count : of steps at most.
+    Args:
+        low, high: ends of the interval; count : of steps at most.
     """
     step = nice_step(high - low, count)
     first, last = ceil(low / step - 1e-9), floor(high / step + 1e-9)
@@ -223,10 +218,9 @@ def small(value: float | None) -> str:
 def place(point: Sequence[float | None], rounding: Rounding = EXACT) -> str:
     """A point (3,) [m] in mm.
 
-    Parameters
-    ----------
-    point : (3,) coordinates [m]; None: not known.
-    rounding : how finely they are shown.
+    Args:
+        point: (3,) coordinates [m]; None: not known.
+        rounding: how finely they are shown.
     """
     known = [rounding.mm(x).replace("-", MINUS) for x in point if x is not None]
     return f"{', '.join(known)} mm" if len(known) == 3 else UNKNOWN
@@ -244,10 +238,9 @@ def plain(value: object) -> str:
 def case_rows(table: Record | None, rounding: Rounding = EXACT) -> list[tuple[str, str]]:
     """The entries of a table of the case, in the units of a drawing, files by their names.
 
-    Parameters
-    ----------
-    table : of the case; None has no entries.
-    rounding : how finely lengths are shown at most.
+    Args:
+        table: of the case; None has no entries.
+        rounding: how finely lengths are shown at most.
     """
     return [
         (NAMES.get(key, key.replace("_", " ")), _case_value(key, value, CASE_UNITS, rounding))

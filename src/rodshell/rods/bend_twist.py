@@ -46,17 +46,16 @@ from rodshell.validation import brief
 class BendTwist:
     """Bends and twists between consecutive edges of rods or linkers [HQK Eq 1b, 1c]. Build it with `starting_at`.
 
-    Parameters
-    ----------
-    blocks : (b, 5) node, twist angle of edge e, node, twist angle of edge f, node; e and f go from node to
-        node in this order. Elements that share an edge agree on its direction and its reference frame.
-    bend_stiffness : (b, 2) EI1 and EI2 over the Voronoi length of the rest state [N m]; EI1 resists bends
-        towards m1 (and so about m2), EI2 bends towards m2.
-    twist_stiffness : (b,) GJ over the same length [N m].
-    natural_curvature : (b, 2) curvatures (k1, k2) at rest [-].
-    natural_twist : (b,) twist at rest [rad].
-    source_tangents, source_directors : (b, 2, 3) t and d1 of e and f in their source frames.
-    source_twist : (b,) reference twist m_ref of the source frames [rad].
+    Args:
+        blocks: (b, 5) node, twist angle of edge e, node, twist angle of edge f, node; e and f go from node to
+            node in this order. Elements that share an edge agree on its direction and its reference frame.
+        bend_stiffness: (b, 2) EI1 and EI2 over the Voronoi length of the rest state [N m]; EI1 resists bends
+            towards m1 (and so about m2), EI2 bends towards m2.
+        twist_stiffness: (b,) GJ over the same length [N m].
+        natural_curvature: (b, 2) curvatures (k1, k2) at rest [-].
+        natural_twist: (b,) twist at rest [rad].
+        source_tangents, source_directors: (b, 2, 3) t and d1 of e and f in their source frames.
+        source_twist: (b,) reference twist m_ref of the source frames [rad].
     """
 
     blocks: Ints
@@ -86,12 +85,12 @@ class BendTwist:
     ) -> Self:
         """Elements whose source frames are those of `state`.
 
-        Parameters
-        ----------
-        blocks : (b, 5), see the class.
-        directors : (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for
-            all, such as z on a flat grid. Only their part perpendicular to the edge is used.
-        bend_stiffness, twist_stiffness, natural_curvature, natural_twist : see the class; broadcast over the elements.
+        Args:
+            blocks: (b, 5), see the class.
+            directors: (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for
+                all, such as z on a flat grid. Only their part perpendicular to the edge is used.
+            bend_stiffness, twist_stiffness, natural_curvature, natural_twist: see the class; broadcast over the
+                elements.
         """
         count = len(blocks)
         tangents = _tangents(state, blocks)
@@ -208,10 +207,9 @@ def frames_among(sets: Sequence[Elements]) -> BendTwist | None:
 def strain_rates(elements: BendTwist, state: State, motion: Floats) -> Floats:
     """(b, 3) derivative of the strains along a motion, by central differences.
 
-    Parameters
-    ----------
-    elements : their source frames being at, or near, the state.
-    state, motion : (N, 3) [m, rad].
+    Args:
+        elements: their source frames being at, or near, the state.
+        state, motion: (N, 3) [m, rad].
     """
     apart, moved = state[elements.blocks[:, 2:5:2]] - state[elements.blocks[:, 0:3:2]], np.abs(motion[elements.blocks])
     moved[:, ::2] /= np.linalg.norm(apart, axis=2).min(initial=np.inf)
@@ -462,13 +460,12 @@ def _bend_twist(  # type: ignore[no-untyped-def]
 def spread(hee, hef, hff, he3, he7, hf3, hf7, h33, h37, h77, h):  # type: ignore[no-untyped-def]
     """Fill the element Hessian h (15, 15), by x_0, theta_e, x_1, theta_f, x_2, from that by e, theta_e, f, theta_f.
 
-    Parameters
-    ----------
-    hee, hef, hff : (3, 3) second derivatives by the edge vectors e and e, e and f, f and f.
-    he3, he7 : (3,) by e and theta_e, and by e and theta_f.
-    hf3, hf7 : (3,) by f and theta_e, and by f and theta_f.
-    h33, h37, h77 : by theta_e twice, by both angles, and by theta_f twice.
-    h : (15, 15), filled; rows and columns of the unused components of the angles get zeros.
+    Args:
+        hee, hef, hff: (3, 3) second derivatives by the edge vectors e and e, e and f, f and f.
+        he3, he7: (3,) by e and theta_e, and by e and theta_f.
+        hf3, hf7: (3,) by f and theta_e, and by f and theta_f.
+        h33, h37, h77: by theta_e twice, by both angles, and by theta_f twice.
+        h: (15, 15), filled; rows and columns of the unused components of the angles get zeros.
     """
     for i in range(15):
         for j in (4, 5, 10, 11):

@@ -20,11 +20,10 @@ from rodshell.validation import brief
 class CableStretch:
     """Tension-only members.
 
-    Parameters
-    ----------
-    blocks : (m, 2) nodes of each cable.
-    rest_lengths : (m,) at which it becomes taut [m].
-    stiffness : (m,) EA [N].
+    Args:
+        blocks: (m, 2) nodes of each cable.
+        rest_lengths: (m,) at which it becomes taut [m].
+        stiffness: (m,) EA [N].
     """
 
     blocks: Ints

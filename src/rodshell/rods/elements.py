@@ -30,9 +30,8 @@ WORTHWHILE = 30_000  # elements from which on threads share a set
 class Elements(Protocol):
     """A sum of local energies.
 
-    Attributes
-    ----------
-    blocks : (m, k) blocks of each element.
+    Attributes:
+        blocks: (m, k) blocks of each element.
     """
 
     @property
@@ -41,11 +40,10 @@ class Elements(Protocol):
     def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], with its gradient and, where wanted, its Hessians.
 
-        Parameters
-        ----------
-        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
-        hessians : (m, 3k, 3k), filled with the element Hessians unless empty; rows and columns of the unused
-            components of a twist angle are zero.
+        Args:
+            gradient: (N, 3), to which the energy's gradient is added [N, for angles N m].
+            hessians: (m, 3k, 3k), filled with the element Hessians unless empty; rows and columns of the unused
+                components of a twist angle are zero.
         """
         ...
 
@@ -57,11 +55,10 @@ class Elements(Protocol):
 class BendElements(Elements, Protocol):
     """Bending between consecutive edges of rods, and twist where they have it.
 
-    Attributes
-    ----------
-    bend_stiffness : (b, 1) or (b, 2) EI over the Voronoi length, of both directions [N m].
-    parts : the energies of each stiffness alone, bending first.
-    moduli : for each part 0, 1 or 2: it resists with EI1, EI2 or GJ.
+    Attributes:
+        bend_stiffness: (b, 1) or (b, 2) EI over the Voronoi length, of both directions [N m].
+        parts: the energies of each stiffness alone, bending first.
+        moduli: for each part 0, 1 or 2: it resists with EI1, EI2 or GJ.
     """
 
     angle_columns: ClassVar[tuple[int, ...]]
@@ -98,11 +95,10 @@ class Stressed(Elements, Protocol):
         of (ds/de de/dx . motion) d2e/dx2, with s the internal force. The rest of the Hessian's derivative turns the
         stiffness of the material with the motion, and is wrong by far without its terms of second order.
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad], the source frames being at, or near, it.
-        motion : (N, 3) along which the internal forces change, to first order [m, rad].
-        hessians : (m, 3k, 3k), which are filled.
+        Args:
+            state: (N, 3) node positions [m] and twist angles [rad], the source frames being at, or near, it.
+            motion: (N, 3) along which the internal forces change, to first order [m, rad].
+            hessians: (m, 3k, 3k), which are filled.
         """
         ...
 
@@ -128,11 +124,10 @@ def twist_angles(sets: Sequence[Elements], count: int) -> NDArray[np.bool_]:
 def with_frames(element: Elements, like: Elements, rows: Bools | None = None, at: Bools | None = None) -> Elements:
     """An energy with the source frames of another one.
 
-    Parameters
-    ----------
-    like : an energy of the same kind; without `rows` and `at` on the same blocks.
-    rows : (l,) which elements of `like` are those of the energy; None: all.
-    at : (m,) to which elements of the energy the frames go, the others keeping theirs; None: to all.
+    Args:
+        like: an energy of the same kind; without `rows` and `at` on the same blocks.
+        rows: (l,) which elements of `like` are those of the energy; None: all.
+        at: (m,) to which elements of the energy the frames go, the others keeping theirs; None: to all.
     """
     assert is_dataclass(element)
     sources: dict[str, Any] = {}
@@ -150,9 +145,8 @@ def with_frames(element: Elements, like: Elements, rows: Bools | None = None, at
 def turned(element: Elements, turn: Floats) -> Elements:
     """An energy with its source frames turned about z.
 
-    Parameters
-    ----------
-    turn : (2, 2), of rows x, y; or (m, 2, 2), of each element.
+    Args:
+        turn: (2, 2), of rows x, y; or (m, 2, 2), of each element.
     """
     assert is_dataclass(element)
     sources: dict[str, Any] = {}
@@ -171,9 +165,8 @@ def each_gradient(elements: Elements, state: State) -> Floats:
     It is that of the same energy on an exploded state, in which no two elements share a block. An energy is linear in
     its stiffness, so this is also the derivative of the gradient by the logarithm of the element's stiffness.
 
-    Parameters
-    ----------
-    elements : m of them, with one stiffness each (see `parts` of those that have several).
+    Args:
+        elements: m of them, with one stiffness each (see `parts` of those that have several).
     """
     apart, local = _exploded(elements, state)
     gradient = np.zeros_like(local)
@@ -184,9 +177,8 @@ def each_gradient(elements: Elements, state: State) -> Floats:
 def each_curvature(elements: Elements, state: State, motion: Floats) -> Floats:
     """(m,) v'Hv of each element alone for displacements `motion` (N, 3) [J], H being its Hessian.
 
-    Parameters
-    ----------
-    motion : (N, 3) displacements v [m, rad].
+    Args:
+        motion: (N, 3) displacements v [m, rad].
     """
     m, k = elements.blocks.shape
     hessians = np.zeros((m, 3 * k, 3 * k))
@@ -204,10 +196,9 @@ def _exploded(elements: Elements, state: State) -> tuple[Elements, Floats]:
 def in_parts(elements: Elements, most: int) -> list[Elements]:
     """Elements cut into parts of at most `most`; their arrays with a row for each are those as long as `blocks`.
 
-    Parameters
-    ----------
-    elements : to be cut; those that cannot be are one part.
-    most : number of elements of a part.
+    Args:
+        elements: to be cut; those that cannot be are one part.
+        most: number of elements of a part.
     """
     count = len(elements.blocks)
     if count <= most or not is_dataclass(elements):
@@ -228,10 +219,9 @@ def evaluate_all(sets: Sequence[Elements], state: State, gradient: Floats, hessi
     Each thread has half of every set. The halves have gradients of their own, which are added in the end, so that the
     sum does not depend on the threads.
 
-    Parameters
-    ----------
-    state, gradient : (N, 3), see `Elements.evaluate`.
-    hessians : of each set, (m, 3k, 3k) or empty.
+    Args:
+        state, gradient: (N, 3), see `Elements.evaluate`.
+        hessians: of each set, (m, 3k, 3k) or empty.
     """
     if max((len(elements.blocks) for elements in sets), default=0) < WORTHWHILE:
         for elements, of_set in zip(sets, hessians, strict=True):
@@ -254,14 +244,13 @@ def evaluate_all(sets: Sequence[Elements], state: State, gradient: Floats, hessi
 class Stretch:
     """Elastic edges [HQK Eq 1a].
 
-    Parameters
-    ----------
-    blocks : (e, 2) nodes of each edge.
-    rest_lengths : (e,) [m].
-    stiffness : (e,) EA [N].
-    multipliers : (e,) N0 [N].
-    forces : (e,) axial forces [N] of the geometric stiffness in the Hessian; None takes N0 + EA eps, which
-        makes the Hessian exact. A solver that has the forces among its unknowns passes them here.
+    Args:
+        blocks: (e, 2) nodes of each edge.
+        rest_lengths: (e,) [m].
+        stiffness: (e,) EA [N].
+        multipliers: (e,) N0 [N].
+        forces: (e,) axial forces [N] of the geometric stiffness in the Hessian; None takes N0 + EA eps, which
+            makes the Hessian exact. A solver that has the forces among its unknowns passes them here.
     """
 
     blocks: Ints
@@ -276,21 +265,19 @@ class Stretch:
     def elastic(blocks: Ints, rest_lengths: Floats, stiffness: Floats) -> "Stretch":
         """The paper's elastic edges: no multipliers. Parameters as of the class.
 
-        Parameters
-        ----------
-        blocks : (e, 2) nodes of each edge.
-        rest_lengths : (e,) [m].
-        stiffness : (e,) EA [N].
+        Args:
+            blocks: (e, 2) nodes of each edge.
+            rest_lengths: (e,) [m].
+            stiffness: (e,) EA [N].
         """
         return Stretch(blocks, rest_lengths, stiffness, np.zeros(len(blocks)))
 
     def with_forces(self, forces: Floats | None, *, multipliers: Floats | None = None) -> "Stretch":
         """The same edges with other axial `forces` (e,) [N] and, if given, other `multipliers` (e,) [N].
 
-        Parameters
-        ----------
-        forces : (e,) axial forces of the geometric stiffness [N]; None: those of the strains.
-        multipliers : (e,) N0 [N]; None: unchanged.
+        Args:
+            forces: (e,) axial forces of the geometric stiffness [N]; None: those of the strains.
+            multipliers: (e,) N0 [N]; None: unchanged.
         """
         multipliers = self.multipliers if multipliers is None else multipliers
         return Stretch(self.blocks, self.rest_lengths, self.stiffness, multipliers, forces)
@@ -302,9 +289,8 @@ class Stretch:
     def elongation(self, state: State, motion: Floats) -> Floats:
         """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`.
 
-        Parameters
-        ----------
-        motion : (N, 3) displacements [m].
+        Args:
+            motion: (N, 3) displacements [m].
         """
         return np.asarray(_elongation(state, motion, self.blocks, self.rest_lengths))
 
@@ -321,10 +307,9 @@ class Stretch:
     def add_axial(self, state: State, forces: Floats, gradient: Floats) -> None:
         """Add to `gradient` (N, 3) that of edges with the axial `forces` (e,) [N].
 
-        Parameters
-        ----------
-        forces : (e,) axial forces [N].
-        gradient : (N, 3), to which theirs is added [N].
+        Args:
+            forces: (e,) axial forces [N].
+            gradient: (N, 3), to which theirs is added [N].
         """
         _add_axial(state, self.blocks, forces, gradient)
 
@@ -353,10 +338,9 @@ class Stretch:
     def axial_stiffness(self, state: State, forces: Floats, hessians: Floats) -> None:
         """Geometric stiffness of axial forces alone.
 
-        Parameters
-        ----------
-        forces : (e,) axial forces [N].
-        hessians : (e, 6, 6), which are filled [N/m].
+        Args:
+            forces: (e,) axial forces [N].
+            hessians: (e, 6, 6), which are filled [N/m].
         """
         limp = replace(self, stiffness=np.zeros_like(self.stiffness), forces=forces)
         limp.evaluate(state, np.zeros_like(state), hessians)

@@ -33,10 +33,9 @@ AT_ONCE = 64  # bends, whose numbers all stay in the processor's first cache
 class IsotropicBend:
     """Bends between consecutive edges of rods without twist angles [HQK Eq 1b].
 
-    Parameters
-    ----------
-    blocks : (b, 3) nodes: previous, middle, next.
-    stiffness : (b,) EI over the Voronoi length of the rest state [N m].
+    Args:
+        blocks: (b, 3) nodes: previous, middle, next.
+        stiffness: (b,) EI over the Voronoi length of the rest state [N m].
     """
 
     blocks: Ints

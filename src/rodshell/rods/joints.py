@@ -22,14 +22,13 @@ RestAngle = Annotated[Angle | None, "angle between the rods at rest; default: as
 class Joint:
     """What holds two rods together where they cross; a kind gives what it has in place of these values.
 
-    Attributes
-    ----------
-    name : the kind, as in a case file.
-    mass : of its bolt, coupler or clamp, at the node [kg].
-    eccentricity : distance of the two centre lines along the normal [m]; 0 where they meet.
-    shear, out_of_plane, twist, rest_angle : as of `Spring`.
-    corners, rod : number of corners of a crossing that have a linker, and of what it is; see `Linker`.
-    locks : whether it can be tightened once the shell is erected.
+    Attributes:
+        name: the kind, as in a case file.
+        mass: of its bolt, coupler or clamp, at the node [kg].
+        eccentricity: distance of the two centre lines along the normal [m]; 0 where they meet.
+        shear, out_of_plane, twist, rest_angle: as of `Spring`.
+        corners, rod: number of corners of a crossing that have a linker, and of what it is; see `Linker`.
+        locks: whether it can be tightened once the shell is erected.
     """
 
     name: ClassVar[str]
@@ -92,9 +91,9 @@ class Pin(Joint):
 class Rigid(Joint):
     """Welded or clamped: the rods keep the angle at which they were joined.
 
-    Parameters
-    ----------
-    rest_angle : angle from the first rod's direction to the second's about the normal [rad]; None: as in the flat grid.
+    Args:
+        rest_angle: angle from the first rod's direction to the second's about the normal [rad]; None: as in the flat
+            grid.
     """
 
     rest_angle: RestAngle = None
@@ -109,19 +108,17 @@ class Rigid(Joint):
 class Spring(Joint):
     """Elastic in all three rotations. The stiffnesses are those of the joint and do not depend on the mesh.
 
-    Parameters
-    ----------
-    shear : about the normal [N m/rad]; `inf` is rigid.
-    out_of_plane, twist : of a corner, about the axis in the plane across the corner's bisector, and about it
-        [N m/rad]. Where rods cross, the twist of one corner is the out-of-plane turn of the next: the four corners
-        together have the mean of both in every direction. They differ only where two rods end in one corner. The
-        bisector is that of the directions of a path around the corner, in along one rod and out along the other.
-    rest_angle : angle from the first rod's direction to the second's about the normal at rest [rad]; None: as in the
-        flat grid.
+    Args:
+        shear: about the normal [N m/rad]; `inf` is rigid.
+        out_of_plane, twist: of a corner, about the axis in the plane across the corner's bisector, and about it
+            [N m/rad]. Where rods cross, the twist of one corner is the out-of-plane turn of the next: the four corners
+            together have the mean of both in every direction. They differ only where two rods end in one corner. The
+            bisector is that of the directions of a path around the corner, in along one rod and out along the other.
+        rest_angle: angle from the first rod's direction to the second's about the normal at rest [rad]; None: as in the
+            flat grid.
 
-    Raises
-    ------
-    InputError : a value is negative; an eccentric spring without out-of-plane and twist stiffness.
+    Raises:
+        InputError: a value is negative; an eccentric spring without out-of-plane and twist stiffness.
     """
 
     shear: Annotated[Stiffness, "stiffness of the joint about its normal"] = 0.0
@@ -150,10 +147,9 @@ class Linker(Joint):
     ERRATA E10: with the paper's two linkers, in opposite corners, the joint is chiral, and its stiffness depends on
     the mesh: about the normal 8 EI over the edge length at a right angle.
 
-    Parameters
-    ----------
-    rod : section and material of the linkers; None: those of the rods.
-    corners : 2 as in the paper, or 4, which is symmetric.
+    Args:
+        rod: section and material of the linkers; None: those of the rods.
+        corners: 2 as in the paper, or 4, which is symmetric.
     """
 
     rod: Annotated[Rod | None, NoKey("joints with linkers of another rod")] = None
@@ -172,13 +168,11 @@ class Linker(Joint):
 def require_joint(joint: object) -> None:
     """Refuse a value that is neither a joint, nor a sequence of joints, nor None.
 
-    Parameters
-    ----------
-    joint : what a caller has passed.
+    Args:
+        joint: what a caller has passed.
 
-    Raises
-    ------
-    InputError : it is something else, such as the name of a kind, or the class itself.
+    Raises:
+        InputError: it is something else, such as the name of a kind, or the class itself.
     """
     several = isinstance(joint, Sequence) and not isinstance(joint, str)  # and no array or generator
     for value in joint if several else (joint,):  # type: ignore[attr-defined]

@@ -24,16 +24,14 @@ STEP = 1e-6  # of the extent of the nodes: step of the differences
 class LocalEnergy:
     """A sum of energies of a few nodes each, see `rodshell.settle`.
 
-    Parameters
-    ----------
-    blocks : (m, k) the nodes of each of its m parts.
-    formula : of the positions (m, k, 3) of these nodes [m], the energy (m,) of each part [J]: written with NumPy, and
-        for complex numbers too (`np.sqrt((v * v).sum(-1))` in place of `np.linalg.norm(v, axis=-1)`; no `abs`, which
-        forgets the step). A force that is constant is an energy as well, less the work that it does.
+    Args:
+        blocks: (m, k) the nodes of each of its m parts.
+        formula: of the positions (m, k, 3) of these nodes [m], the energy (m,) of each part [J]: written with NumPy,
+            and for complex numbers too (`np.sqrt((v * v).sum(-1))` in place of `np.linalg.norm(v, axis=-1)`; no `abs`,
+            which forgets the step). A force that is constant is an energy as well, less the work that it does.
 
-    Raises
-    ------
-    InputError : the formula is not a function of positions; the nodes are not a table of whole numbers.
+    Raises:
+        InputError: the formula is not a function of positions; the nodes are not a table of whole numbers.
     """
 
     blocks: Ints

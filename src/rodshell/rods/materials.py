@@ -21,12 +21,11 @@ PresetName = Literal["larch", "spruce", "oak", "bamboo", "gfrp", "plywood", "pet
 class Preset:
     """A named material.
 
-    Parameters
-    ----------
-    youngs_modulus, shear, density : mean values [Pa, Pa, kg/m3]; shear None: incompressible, Poisson's ratio 0.5.
-    bending_strength, shear_strength : characteristic and short-term [Pa]; None: the source has none.
-    grade : to which the figures apply.
-    strength_note : what the strengths mean, and for what they must be reduced.
+    Args:
+        youngs_modulus, shear, density: mean values [Pa, Pa, kg/m3]; shear None: incompressible, Poisson's ratio 0.5.
+        bending_strength, shear_strength: characteristic and short-term [Pa]; None: the source has none.
+        grade: to which the figures apply.
+        strength_note: what the strengths mean, and for what they must be reduced.
     """
 
     youngs_modulus: float
@@ -127,15 +126,13 @@ PRESETS: dict[PresetName, Preset] = {
 class Material:
     """Linear elastic material.
 
-    Parameters
-    ----------
-    poisson_ratio : [-], above -1 and up to 0.5, which is incompressible.
-    shear : shear modulus [Pa] in place of Poisson's ratio, as for timber, which is not isotropic.
-    name : of the preset, which has the strengths; set by `Material.preset`.
+    Args:
+        poisson_ratio: [-], above -1 and up to 0.5, which is incompressible.
+        shear: shear modulus [Pa] in place of Poisson's ratio, as for timber, which is not isotropic.
+        name: of the preset, which has the strengths; set by `Material.preset`.
 
-    Raises
-    ------
-    InputError : a value is out of range; Poisson's ratio and a shear modulus are both given; no such preset.
+    Raises:
+        InputError: a value is out of range; Poisson's ratio and a shear modulus are both given; no such preset.
     """
 
     youngs_modulus: Annotated[
@@ -174,14 +171,12 @@ class Material:
     def preset(cls, name: PresetName, **changed: float) -> Self:
         """A named material.
 
-        Parameters
-        ----------
-        name : of the preset, such as "larch".
-        changed : values that replace the preset's: youngs_modulus, density, shear or poisson_ratio.
+        Args:
+            name: of the preset, such as "larch".
+            changed: values that replace the preset's: youngs_modulus, density, shear or poisson_ratio.
 
-        Raises
-        ------
-        InputError : there is no such preset; a value cannot be used.
+        Raises:
+            InputError: there is no such preset; a value cannot be used.
         """
         for key in changed:
             if key not in _REPLACEABLE:
@@ -215,9 +210,8 @@ class Material:
 def _preset_named(name: str) -> Preset:
     """The preset of this `name`.
 
-    Raises
-    ------
-    InputError : there is no such preset.
+    Raises:
+        InputError: there is no such preset.
     """
     if not isinstance(name, str) or name not in get_args(PresetName):
         raise InputError(f"there is no material {shown(name)}: use {', '.join(get_args(PresetName))}")
@@ -227,13 +221,11 @@ def _preset_named(name: str) -> Preset:
 def _preset_values(name: str, changed: dict[str, Any]) -> dict[str, Any]:
     """Keyword arguments of `Material` for the preset `name` with some values `changed`.
 
-    Parameters
-    ----------
-    changed : values that replace the preset's, by their names.
+    Args:
+        changed: values that replace the preset's, by their names.
 
-    Raises
-    ------
-    InputError : there is no such preset.
+    Raises:
+        InputError: there is no such preset.
     """
     known = _preset_named(name)
     values: dict[str, Any] = {key: getattr(known, key) for key in ("youngs_modulus", "shear", "density")}

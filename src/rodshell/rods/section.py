@@ -265,14 +265,12 @@ SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 class Rod:
     """One kind of rod; its section and material give the stiffnesses of HQK Eq 1.
 
-    Parameters
-    ----------
-    section : its cross-section. A `GivenSection` has the stiffnesses itself.
-    material : what it is made of; None only with a `GivenSection`.
+    Args:
+        section: its cross-section. A `GivenSection` has the stiffnesses itself.
+        material: what it is made of; None only with a `GivenSection`.
 
-    Raises
-    ------
-    InputError : section or material are something else, or exclude each other.
+    Raises:
+        InputError: section or material are something else, or exclude each other.
     """
 
     section: Annotated[Section | GivenSection, "section and material"]
@@ -317,9 +315,8 @@ class Rod:
     def bend_stiffness(self) -> float:
         """EI [N m2] of a rod with the same bending stiffness in all directions.
 
-        Raises
-        ------
-        InputError : it has two.
+        Raises:
+            InputError: it has two.
         """
         first, second = self.bend_stiffnesses
         if first != second:
@@ -362,9 +359,8 @@ class Rod:
 def scaled(section: Section, factor: float) -> Section:
     """The same shape of section with all its lengths times `factor` [-].
 
-    Parameters
-    ----------
-    factor : of all its lengths [-].
+    Args:
+        factor: of all its lengths [-].
     """
     return type(section)(**{key: factor * value for key, value in vars(section).items()})
 

@@ -29,10 +29,9 @@ _RESERVED = (BOTH, "draped", "deployment", "stress", "mode", "buckling")  # woul
 class Support:
     """A support of all rod ends. This class holds them in place.
 
-    Parameters
-    ----------
-    name : a word of small letters and digits, by which results know it.
-    holds_directions : whether it holds the rods' directions too; a rod may spin in its clamp.
+    Args:
+        name: a word of small letters and digits, by which results know it.
+        holds_directions: whether it holds the rods' directions too; a rod may spin in its clamp.
     """
 
     name: str
@@ -57,19 +56,17 @@ class Support:
     def free(self, points: Floats) -> Mapping[int, Sequence[ArrayLike]]:
         """Directions (up to three, at right angles) along which rod ends may move, by the number of the end.
 
-        Parameters
-        ----------
-        points : (2m, 3) where the ends are before they move [m]: 2 i is the start of rod i, 2 i + 1 its end.
+        Args:
+            points: (2m, 3) where the ends are before they move [m]: 2 i is the start of rod i, 2 i + 1 its end.
         """
         return {}
 
     def energies(self, ends: Ints, points: Floats) -> "Sequence[Elements]":
         """What acts on the ends, such as the energies of springs.
 
-        Parameters
-        ----------
-        ends : (2m,) number of the node of each rod end.
-        points : (2m, 3) where the ends are before they move [m].
+        Args:
+            ends: (2m,) number of the node of each rod end.
+            points: (2m, 3) where the ends are before they move [m].
         """
         return ()
 
@@ -84,9 +81,8 @@ Asked = Support | str | Sequence[Support | str]
 def supports_of(given: Any) -> tuple[Support, ...]:
     """The different supports of one or several names and supports, in their order; "both" is all of the table.
 
-    Raises
-    ------
-    InputError : a name is not known, or is that of another support.
+    Raises:
+        InputError: a name is not known, or is that of another support.
     """
     items = [given] if isinstance(given, str | Support) else list(given) if isinstance(given, Sequence) else None
     words = (*SUPPORTS, BOTH)
@@ -106,9 +102,8 @@ def supports_of(given: Any) -> tuple[Support, ...]:
 def support_of(given: Any) -> Support:
     """The support of a name; a support is its own.
 
-    Raises
-    ------
-    InputError : the name is not known.
+    Raises:
+        InputError: the name is not known.
     """
     return given if isinstance(given, Support) else SUPPORTS[choice("ends", given, tuple(SUPPORTS))]
 

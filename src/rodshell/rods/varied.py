@@ -27,13 +27,12 @@ _OUT_OF_GRID = ("width", "a")
 class Varied:
     """Factors (n,) on the values of the unchanged rod.
 
-    Parameters
-    ----------
-    bend1, bend2, twist : on EI1, EI2 and GJ.
-    stretch : on EA and on the mass per length.
-    fibre1, fibre2 : on the distances of the outermost fibres along m1 and m2.
-    depth1, depth2 : on the extents of the outline along m1 and m2: of laths on each other those of all.
-    shear : on the largest shear stress of torsion over the twist per length.
+    Args:
+        bend1, bend2, twist: on EI1, EI2 and GJ.
+        stretch: on EA and on the mass per length.
+        fibre1, fibre2: on the distances of the outermost fibres along m1 and m2.
+        depth1, depth2: on the extents of the outline along m1 and m2: of laths on each other those of all.
+        shear: on the largest shear stress of torsion over the twist per length.
     """
 
     bend1: Floats
@@ -51,15 +50,13 @@ class Varied:
 def varied(rod: Rod, varies: str, factors: Floats) -> Varied:
     """Everything that changes with the factor on EI1.
 
-    Parameters
-    ----------
-    rod : the unchanged section and material.
-    varies : what is changed, see the module.
-    factors : (n,) on EI1 [-].
+    Args:
+        rod: the unchanged section and material.
+        varies: what is changed, see the module.
+        factors: (n,) on EI1 [-].
 
-    Raises
-    ------
-    InputError : the section has no such length.
+    Raises:
+        InputError: the section has no such length.
     """
     _require_varies(rod, varies)
     same = np.ones_like(factors)
@@ -90,13 +87,11 @@ def varied(rod: Rod, varies: str, factors: Floats) -> Varied:
 def _require_varies(rod: Rod, varies: str) -> None:
     """Refuse a length that a rod's section does not have.
 
-    Parameters
-    ----------
-    varies : what is changed, see the module.
+    Args:
+        varies: what is changed, see the module.
 
-    Raises
-    ------
-    InputError : the section has no such length.
+    Raises:
+        InputError: the section has no such length.
     """
     known = _lengths(rod)
     if varies not in known:
@@ -110,11 +105,10 @@ def sizes(rod: Rod, varies: str, factors: Floats) -> Floats | None:
 
     None for a given section, which has no lengths, and for laths.
 
-    Parameters
-    ----------
-    rod : the unchanged section and material.
-    varies : what is changed, see the module.
-    factors : (n,) on EI1 [-].
+    Args:
+        rod: the unchanged section and material.
+        varies: what is changed, see the module.
+        factors: (n,) on EI1 [-].
     """
     section = rod.section
     if isinstance(section, GivenSection) or varies == "laths":

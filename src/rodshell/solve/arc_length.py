@@ -45,11 +45,11 @@ TINY = 1e-300
 class Point:
     """An equilibrium on the path, at `arc` [m].
 
-    Parameters
-    ----------
-    motion (n, 3), change (e,), rate : derivatives by the arc of state, forces and factor.
-    strayed : how far it lies off its prediction, over the step.
-    ahead, behind : arc to the nearest singular stiffness on either side, as the stiffness of the `modes` changes here.
+    Args:
+        motion (n, 3), change (e,), rate: derivatives by the arc of state, forces and factor.
+        strayed: how far it lies off its prediction, over the step.
+        ahead, behind: arc to the nearest singular stiffness on either side, as the stiffness of the `modes` changes
+            here.
     """
 
     factor: float
@@ -70,9 +70,8 @@ class Point:
 class ArcLength:
     """Finds points on the path of a structure under t times a load.
 
-    Parameters
-    ----------
-    unloaded : the equilibrium at t = 0, its edges elastic.
+    Args:
+        unloaded: the equilibrium at t = 0, its edges elastic.
     """
 
     def __init__(self, unloaded: Equilibrium, load: Load) -> None:
@@ -95,9 +94,8 @@ class ArcLength:
     def begin(self) -> Point | None:
         """The structure at t = 0; None where its stiffness is singular.
 
-        Raises
-        ------
-        InputError : the load moves nothing.
+        Raises:
+            InputError: the load moves nothing.
         """
         start = self._unloaded
         elements = self._loaded.load.elements(start.elements, start.state, 0.0)
@@ -124,11 +122,10 @@ class ArcLength:
     def point(self, here: Point, other: Point | None, step: float, *, near: float = NEGLIGIBLE) -> Point | None:
         """The point a step further; None where Newton's method does not find it, or strays from the prediction.
 
-        Parameters
-        ----------
-        other : a point that shows the curvature of the path, or None.
-        step : arc [m].
-        near : of the length: how far it may stray in any case. The tangent foresees no jump of the stiffness.
+        Args:
+            other: a point that shows the curvature of the path, or None.
+            step: arc [m].
+            near: of the length: how far it may stray in any case. The tangent foresees no jump of the stiffness.
         """
         state, forces = here.state + step * here.motion, here.forces + step * here.change
         factor = here.factor + step * here.rate
@@ -149,9 +146,8 @@ class ArcLength:
 
         None where it is stable, or singular.
 
-        Parameters
-        ----------
-        step : arc [m], so short that its end is as good as the equilibrium.
+        Args:
+            step: arc [m], so short that its end is as good as the equilibrium.
         """
         state, forces = here.state + step * here.motion, here.forces + step * here.change
         factor = here.factor + step * here.rate
@@ -171,9 +167,8 @@ class ArcLength:
     def at_factor(self, factor: float, here: Point, there: Point) -> Point | None:
         """The point at a factor between those of two neighbours on a stable path; None where it is not found.
 
-        Parameters
-        ----------
-        here, there : points on either side of it.
+        Args:
+            here, there: points on either side of it.
         """
         span = there.arc - here.arc
         share = (factor - here.factor) / (there.factor - here.factor)
@@ -187,9 +182,8 @@ class ArcLength:
     def displaced(self, motion: Floats) -> Point | None:
         """The point whose state lies on the plane across a motion (n, 3) [m, rad] through its end, near factor 1.
 
-        Parameters
-        ----------
-        motion : from the state at t = 0.
+        Args:
+            motion: from the state at t = 0.
         """
         for parts in _RAMPS:
             point = self._displaced_by_parts(motion, parts)
@@ -217,17 +211,15 @@ class ArcLength:
     ) -> tuple[float, Floats, Floats, tuple[Elements, ...], Tangent, Floats] | None:  # fmt: skip
         """Newton's method to the equilibrium at this factor, or on the plane through the state `across` a motion.
 
-        Parameters
-        ----------
-        state, forces, factor : to begin with, what is held being where it is under the factor.
-        elements : of structure and load, their source frames near the state.
-        across : normal of the plane, (n, 3), or the tangent at a point, factor and all; None: the factor stays.
-        near : the farthest that a node may move [m].
+        Args:
+            state, forces, factor: to begin with, what is held being where it is under the factor.
+            elements: of structure and load, their source frames near the state.
+            across: normal of the plane, (n, 3), or the tangent at a point, factor and all; None: the factor stays.
+            near: the farthest that a node may move [m].
 
-        Returns
-        -------
-        Factor, state, forces and elements at the equilibrium, and the tangent and the rate of the state next to it;
-        None where it is not found.
+        Returns:
+            Factor, state, forces and elements at the equilibrium, and the tangent and the rate of the state next to it;
+            None where it is not found.
         """
         loaded, stretch, length, first = self._loaded, self._loaded.problem.stretch, self.length, state
         last, chord, begin = np.inf, False, factor

@@ -11,11 +11,10 @@ _ARRIVED = 1e-9  # of the parameter: a step that ends so near ends there
 class Continuation:
     """A parameter on its way, up or down, from where it is to its end.
 
-    Parameters
-    ----------
-    t, stop : the parameter, and where it goes.
-    step : the next step, or the longest one that is allowed.
-    shortest : of the steps.
+    Args:
+        t, stop: the parameter, and where it goes.
+        step: the next step, or the longest one that is allowed.
+        shortest: of the steps.
     """
 
     t: float

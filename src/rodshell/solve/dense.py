@@ -58,12 +58,11 @@ def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
     """Eliminate the pivots of a front: D L^T in `rows` (width, stride), which holds the front's upper triangle before;
     L^T in `panel` (width, stride), D in `pivots` (width,). False where a pivot vanishes or is not finite.
 
-    Parameters
-    ----------
-    rows : (width, stride) the front's upper triangle, overwritten with D L^T.
-    panel : (width, stride), filled with L^T.
-    pivots : (width,), filled with D.
-    work : `workspace`.
+    Args:
+        rows: (width, stride) the front's upper triangle, overwritten with D L^T.
+        panel: (width, stride), filled with L^T.
+        pivots: (width,), filled with D.
+        work: `workspace`.
     """
     width = len(rows)
     for begin in range(0, width, BLOCK):
@@ -134,12 +133,11 @@ def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-unty
 def subtract_product(panel, rows, first, kept, target, work):  # type: ignore[no-untyped-def]
     """target = kept target - panel[:, first:]^T rows[:, first:], except below the diagonal.
 
-    Parameters
-    ----------
-    panel, rows : (width, stride).
-    kept : `KEPT` or `OVERWRITTEN`.
-    target : (n, m), part of a matrix, for as many columns from `first` on.
-    work : `workspace`.
+    Args:
+        panel, rows: (width, stride).
+        kept: `KEPT` or `OVERWRITTEN`.
+        target: (n, m), part of a matrix, for as many columns from `first` on.
+        work: `workspace`.
     """
     n, m = target.shape
     for start in range(0, len(panel), DEPTH):
@@ -194,12 +192,11 @@ def add_rows(target, update, runs, end):  # type: ignore[no-untyped-def]
     """Add to the rows of a front up to `end`, the last of which are `target`, what a child's update matrix has for
     them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to.
 
-    Parameters
-    ----------
-    target : the rows of the front from some row `begin` to `end`, its columns from `begin` on.
-    update : the child's update matrix, of which the upper triangle is read.
-    runs : (k, 2) rows of the update matrix that stay contiguous: the first, and its row in the front.
-    end : the row of the front after the last that is added to.
+    Args:
+        target: the rows of the front from some row `begin` to `end`, its columns from `begin` on.
+        update: the child's update matrix, of which the upper triangle is read.
+        runs: (k, 2) rows of the update matrix that stay contiguous: the first, and its row in the front.
+        end: the row of the front after the last that is added to.
     """
     count, begin = len(runs), end - len(target)
     for low in range(count):
@@ -217,11 +214,10 @@ def forward(panel, values, aside):  # type: ignore[no-untyped-def]
     """Solve L y = b for the pivots of a front, b being the first of `values` (stride,), and subtract from the others
     what that takes. `aside` (width,) is scratch.
 
-    Parameters
-    ----------
-    panel : (width, stride) L^T.
-    values : (stride,) b, overwritten with y; from those behind the pivots, the product with L is subtracted.
-    aside : (width,) scratch.
+    Args:
+        panel: (width, stride) L^T.
+        values: (stride,) b, overwritten with y; from those behind the pivots, the product with L is subtracted.
+        aside: (width,) scratch.
     """
     width, stride = panel.shape
     for k in range(width):
@@ -245,12 +241,11 @@ def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
     """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x; the padding
     of the panel itself is 0. `aside` (2 width,) is scratch.
 
-    Parameters
-    ----------
-    panel : (width, stride) L^T, its padding 0.
-    pivots : (width,) D.
-    values : (stride,) y, overwritten with x; behind the pivots, the x that is already known; in the padding 0.
-    aside : (2 width,) scratch.
+    Args:
+        panel: (width, stride) L^T, its padding 0.
+        pivots: (width,) D.
+        values: (stride,) y, overwritten with x; behind the pivots, the x that is already known; in the padding 0.
+        aside: (2 width,) scratch.
     """
     width, stride = panel.shape
     begin = width // LANES * LANES

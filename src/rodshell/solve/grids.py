@@ -18,11 +18,10 @@ def together(
 ) -> Equilibrium:
     """The state of all grids, each in its own equilibrium.
 
-    Parameters
-    ----------
-    shell, problem : of all grids.
-    parts : of each grid its own shell and equilibrium.
-    earlier : of solves of all that were given up before; their work is added.
+    Args:
+        shell, problem: of all grids.
+        parts: of each grid its own shell and equilibrium.
+        earlier: of solves of all that were given up before; their work is added.
     """
     of_edges, found = _of_edges(shell), [part for _, part in parts]
     joined, state = side_by_side(shell, [(grid.with_elements(part.elements), part.state) for grid, part in parts])
@@ -40,10 +39,9 @@ def together(
 def side_by_side(shell: Shell, parts: Sequence[tuple[Shell, Floats]]) -> tuple[Shell, Floats]:
     """The shell of all grids, with the source frames and in the states of each.
 
-    Parameters
-    ----------
-    shell : of all, in any state.
-    parts : of each grid its shell and its state, whose twist angles belong to that shell's source frames.
+    Args:
+        shell: of all, in any state.
+        parts: of each grid its shell and its state, whose twist angles belong to that shell's source frames.
     """
     state, elements = np.zeros((len(shell.grid_of), 3)), list(shell.elements)
     for k, (grid, there) in enumerate(parts):
@@ -56,12 +54,11 @@ def side_by_side(shell: Shell, parts: Sequence[tuple[Shell, Floats]]) -> tuple[S
 def alone(whole: Shell, found: Equilibrium, k: int, shell: Shell, points: Floats) -> tuple[Shell, Equilibrium]:
     """The shell of one grid, in the equilibrium that was found for all.
 
-    Parameters
-    ----------
-    whole, found : of all grids.
-    k : which of them.
-    shell : of this grid, in its flat state.
-    points : (2m, 3) the ends of its rods [m].
+    Args:
+        whole, found: of all grids.
+        k: which of them.
+        shell: of this grid, in its flat state.
+        points: (2m, 3) the ends of its rods [m].
     """
     here, sets = whole.grid_of == k, found.elements
     elements = tuple(

@@ -68,12 +68,11 @@ class MovingBody(Protocol):
 class Motion:
     """A body, its supports and the forces on it.
 
-    Parameters
-    ----------
-    elements : every energy, stretch included; their source frames are those of the state to start from.
-    mass : (N, 3) lumped mass of each component [kg]; of a twist angle the rotary inertia [kg m2].
-    constraint : supports or a surface; or what they are at a time [s], for a motion that is prescribed.
-    explicit : energies whose forces are frozen at the start of a step (`ExplicitPenalty`); not among the elements.
+    Args:
+        elements: every energy, stretch included; their source frames are those of the state to start from.
+        mass: (N, 3) lumped mass of each component [kg]; of a twist angle the rotary inertia [kg m2].
+        constraint: supports or a surface; or what they are at a time [s], for a motion that is prescribed.
+        explicit: energies whose forces are frozen at the start of a step (`ExplicitPenalty`); not among the elements.
     """
 
     elements: tuple[Elements, ...]
@@ -110,10 +109,9 @@ class Motion:
     ) -> Self:
         """The motion of a rod or a shell; without a constraint it is free.
 
-        Parameters
-        ----------
-        body : its source frames being at the state to start from.
-        constraint : as of `Motion`; one that never moves may be given as a `Freedom`.
+        Args:
+            body: its source frames being at the state to start from.
+            constraint: as of `Motion`; one that never moves may be given as a `Freedom`.
         """
         if not all(hasattr(body, name) for name in ("elements", "explicit", "stretch", "mass", "freedom")):
             raise InputError(f"body must be a rodshell ElasticRod or Shell, not {described(body)}")
@@ -179,16 +177,14 @@ class ImplicitEuler:
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
         """One step.
 
-        Parameters
-        ----------
-        motion : its source frames being at the state.
-        state : (N, 3) at the start [m, at twist angles rad]; velocity : (N, 3) [m/s, rad/s].
-        time : of the start [s].
-        step : its length [s].
+        Args:
+            motion: its source frames being at the state.
+            state: (N, 3) at the start [m, at twist angles rad]; velocity : (N, 3) [m/s, rad/s].
+            time: of the start [s].
+            step: its length [s].
 
-        Raises
-        ------
-        InputError : an external force is not finite.
+        Raises:
+            InputError: an external force is not finite.
         """
         end = time + step
         constraint = motion.constraint_at(end)
@@ -239,20 +235,18 @@ class ContactLaw(Protocol[P]):
     def touching(self, supports: Constraint, state: Floats) -> P:
         """The constraint that a step from `state` (N, 3) begins with.
 
-        Parameters
-        ----------
-        supports : what holds the structure without the contact.
-        state : (N, 3) at the start of the step [m, at twist angles rad].
+        Args:
+            supports: what holds the structure without the contact.
+            state: (N, 3) at the start of the step [m, at twist angles rad].
         """
         ...
 
     def below(self, state: Floats, touching: P) -> P | None:
         """With the nodes that `state` (N, 3) has below the target, too; None where there are no new ones.
 
-        Parameters
-        ----------
-        state : (N, 3) at the end of the step [m, at twist angles rad].
-        touching : the constraint of the step.
+        Args:
+            state: (N, 3) at the end of the step [m, at twist angles rad].
+            touching: the constraint of the step.
         """
         ...
 
@@ -260,20 +254,18 @@ class ContactLaw(Protocol[P]):
         """With the nodes free to slip that stick by more than friction can hold, by the `reactions` (N, 3) [N], and
         the friction (N, 3) on them [N]; None where there are none.
 
-        Parameters
-        ----------
-        touching : the constraint of the step.
-        reactions : (N, 3) at its end [N].
+        Args:
+            touching: the constraint of the step.
+            reactions: (N, 3) at its end [N].
         """
         ...
 
     def landed(self, velocity: Floats, touching: P) -> Floats:
         """(N, 3) `velocity` at the end of a step, without what the contact takes of it [m/s].
 
-        Parameters
-        ----------
-        velocity : (N, 3) at the end of the step [m/s].
-        touching : the constraint of the step.
+        Args:
+            velocity: (N, 3) at the end of the step [m/s].
+            touching: the constraint of the step.
         """
         ...
 
@@ -281,14 +273,12 @@ class ContactLaw(Protocol[P]):
 class ContactEuler:
     """Takes single steps, as `ImplicitEuler` does.
 
-    Attributes
-    ----------
-    last : the constraint that the last step ended with.
+    Attributes:
+        last: the constraint that the last step ended with.
 
-    Parameters
-    ----------
-    law : what holds nodes that touch.
-    matrix : makes the matrix of the Newton iterations.
+    Args:
+        law: what holds nodes that touch.
+        matrix: makes the matrix of the Newton iterations.
     """
 
     def __init__(self, law: ContactLaw[P], matrix: MakeMatrix = narrow_or_sparse) -> None:

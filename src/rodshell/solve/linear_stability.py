@@ -39,10 +39,9 @@ GROWTH = 10.0  # of the shift, until nothing is below it
 class ExplicitTies:
     """Finds at one state after another which time steps are stable with explicit ties; the matrix is analysed once.
 
-    Parameters
-    ----------
-    motion : with the elements that it has at every state.
-    free : the free directions; their counts stay.
+    Args:
+        motion: with the elements that it has at every state.
+        free: the free directions; their counts stay.
     """
 
     def __init__(self, motion: Motion, free: Freedom) -> None:
@@ -54,11 +53,10 @@ class ExplicitTies:
     def look(self, motion: Motion, state: Floats, free: Freedom, stopped: Ints = NO_NODES) -> None:
         """Assemble the matrix at a state.
 
-        Parameters
-        ----------
-        motion : its source frames being at the state.
-        state : (N, 3) [m, at twist angles rad].
-        stopped : (k,) blocks that lose all their velocity at each step.
+        Args:
+            motion: its source frames being at the state.
+            state: (N, 3) [m, at twist angles rad].
+            stopped: (k,) blocks that lose all their velocity at each step.
         """
         implicit, explicit = (Potential(sets).hessians(state) for sets in (motion.elements, motion.explicit))
         self._data = self._assembly.assemble([*implicit, *(-hessians for hessians in explicit)], self._blocks, free)
@@ -69,9 +67,8 @@ class ExplicitTies:
     def grows(self, step: float) -> bool:
         """Whether some motion about the state grows.
 
-        Parameters
-        ----------
-        step : time step [s].
+        Args:
+            step: time step [s].
         """
         data, diagonal = self._data.copy(), self._assembly.diagonal
         data[diagonal] += self._mass / step**2
@@ -85,9 +82,8 @@ class ExplicitTies:
     def limit(self) -> float:
         """Longest step [s] at which nothing grows; infinite where nothing ever does.
 
-        Raises
-        ------
-        InputError : something explicit acts on what has no mass.
+        Raises:
+            InputError: something explicit acts on what has no mass.
         """
         high = LONGEST
         if not self.grows(high):
@@ -109,16 +105,14 @@ class ExplicitTies:
 def step_limit(motion: Motion, state: Floats, time: float = 0.0, *, stopped: Ints = NO_NODES) -> float:
     """Longest stable time step [s] at a state; infinite where nothing is explicit.
 
-    Parameters
-    ----------
-    motion : its source frames being at the state.
-    state : (N, 3) [m, at twist angles rad].
-    time : at which the constraint is taken [s].
-    stopped : (k,) blocks that lose all their velocity at each step.
+    Args:
+        motion: its source frames being at the state.
+        state: (N, 3) [m, at twist angles rad].
+        time: at which the constraint is taken [s].
+        stopped: (k,) blocks that lose all their velocity at each step.
 
-    Raises
-    ------
-    InputError : something explicit acts on what has no mass.
+    Raises:
+        InputError: something explicit acts on what has no mass.
     """
     if not motion.explicit:
         return np.inf
@@ -131,14 +125,12 @@ def step_limit(motion: Motion, state: Floats, time: float = 0.0, *, stopped: Int
 def refuse_unstable(motion: Motion, state: Floats, step: float) -> None:
     """Refuse a time step that explicit ties make unstable.
 
-    Parameters
-    ----------
-    motion, state : as of `step_limit`.
-    step : time step [s].
+    Args:
+        motion, state: as of `step_limit`.
+        step: time step [s].
 
-    Raises
-    ------
-    StabilityError : the step is beyond the limit.
+    Raises:
+        StabilityError: the step is beyond the limit.
     """
     limit = step_limit(motion, state)
     if step > limit:
@@ -155,11 +147,10 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
 
     Motions along a negative one grow as exp(sqrt(-s) t); others oscillate at sqrt(s) rad/s.
 
-    Parameters
-    ----------
-    motion : its source frames at `state`; all free directions must have mass.
-    free : the free directions, without blocked ones.
-    curvature : (N, 3, 3) what constraints that turn with the state add to the stiffness [N/m].
+    Args:
+        motion: its source frames at `state`; all free directions must have mass.
+        free: the free directions, without blocked ones.
+        curvature: (N, 3, 3) what constraints that turn with the state add to the stiffness [N/m].
     """
     energies = Potential((*motion.energies.sets, _Curvature(curvature)))
     root = 1.0 / np.sqrt(free.reduce_diagonal(motion.mass))

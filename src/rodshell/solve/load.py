@@ -28,12 +28,11 @@ from rodshell.solve.tangent import Tangent, TangentAssembly
 class Load:
     """What acts at the factor 1.
 
-    Parameters
-    ----------
-    forces : (N, 3) dead forces [N, on twist angles N m]; None: none.
-    potentials : energies whose negative gradients are forces that follow the structure; on its blocks.
-    strains : (e,) strains of the edges that are free of stress [-], those of a temperature; None: none.
-    motions : (N, 3) displacements of what is held [m, rad]; zero in the free directions; None: none.
+    Args:
+        forces: (N, 3) dead forces [N, on twist angles N m]; None: none.
+        potentials: energies whose negative gradients are forces that follow the structure; on its blocks.
+        strains: (e,) strains of the edges that are free of stress [-], those of a temperature; None: none.
+        motions: (N, 3) displacements of what is held [m, rad]; zero in the free directions; None: none.
     """
 
     forces: Floats | None = None
@@ -45,18 +44,16 @@ class Load:
     def of(cls, load: "Load | Floats") -> "Load":
         """A load, dead forces (N, 3) [N] being one.
 
-        Parameters
-        ----------
-        load : a load, or dead forces (N, 3) [N, on twist angles N m].
+        Args:
+            load: a load, or dead forces (N, 3) [N, on twist angles N m].
         """
         return load if isinstance(load, Load) else cls(forces=load)
 
     def elements(self, elements: Sequence[Elements], state: State, factor: float) -> tuple[Elements, ...]:
         """The energies of a structure and of this load, with their source frames at a state.
 
-        Parameters
-        ----------
-        elements : of the structure alone, or of both as this function returned them.
+        Args:
+            elements: of the structure alone, or of both as this function returned them.
         """
         structure = [element.refreshed(state) for element in elements if not isinstance(element, _Proportional)]
         before = [element.potential for element in elements if isinstance(element, _Proportional)] or self.potentials
@@ -65,9 +62,8 @@ class Load:
     def stretch(self, stretch: Stretch, factor: float) -> Stretch:
         """The edges as they are free of stress under the factor.
 
-        Parameters
-        ----------
-        stretch : at the factor 0.
+        Args:
+            stretch: at the factor 0.
         """
         if self.strains is None:
             return stretch
@@ -76,9 +72,8 @@ class Load:
     def require(self, problem: Problem, state: Floats) -> None:
         """Raise InputError where the load does not fit a structure, or moves what is free.
 
-        Parameters
-        ----------
-        state : (N, 3) any state of it.
+        Args:
+            state: (N, 3) any state of it.
         """
         for name, given, shape in (
             ("forces", self.forces, state.shape),
@@ -121,10 +116,9 @@ class _Proportional:
 class LoadedAssembly:
     """Assembles the equations of a structure under t times a load, at one state after another.
 
-    Parameters
-    ----------
-    problem : the structure; a load that it has stays as it is.
-    state : (N, 3) any state, for the pattern.
+    Args:
+        problem: the structure; a load that it has stays as it is.
+        state: (N, 3) any state, for the pattern.
     """
 
     def __init__(self, problem: Problem, load: Load, state: Floats) -> None:
@@ -140,10 +134,9 @@ class LoadedAssembly:
     def gradient(self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float) -> Floats:
         """(N, 3) forces out of balance [N, N m], those on the supports among them.
 
-        Parameters
-        ----------
-        elements : of structure and load at the factor, with their source frames at, or near, the state.
-        state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
+        Args:
+            elements: of structure and load at the factor, with their source frames at, or near, the state.
+            state, forces: (N, 3) [m, rad], and axial forces (e,) [N].
         """
         result = self._assembly.gradient(elements, state, forces)
         return result if self.load.forces is None else result - factor * self.load.forces
@@ -157,9 +150,8 @@ class LoadedAssembly:
     ) -> tuple[Tangent, Floats]:
         """The tangent stiffness, and the rate dx/dt (N, 3) of the state there [m, rad]; parameters as of `gradient`.
 
-        Raises
-        ------
-        SingularError : a pivot of the stiffness vanishes.
+        Raises:
+            SingularError: a pivot of the stiffness vanishes.
         """
         load, stretch = self.load, self.load.stretch(self.problem.stretch, factor)
         tangent = self._assembly.tangent(elements, state, forces, stretch)
@@ -180,10 +172,9 @@ class LoadedAssembly:
         """(nnz,) values of the change of K per unit of t at t = 0, the geometry being frozen: that with the internal
         forces, and the stiffness of the load's own potentials.
 
-        Parameters
-        ----------
-        elements : of structure and load, with their source frames at the state.
-        state, rate : (N, 3), and its rate [m, rad].
+        Args:
+            elements: of structure and load, with their source frames at the state.
+            state, rate: (N, 3), and its rate [m, rad].
         """
         change = self.change(state, rate, 0.0, 1.0)
         return self._assembly.stress_values(elements, state, change, rate)
@@ -191,9 +182,8 @@ class LoadedAssembly:
     def change(self, state: State, rate: Floats, factor: float, per: float = 1.0) -> Floats:
         """(e,) rate of the axial forces [N].
 
-        Parameters
-        ----------
-        rate : (N, 3) of the state [m, rad].
+        Args:
+            rate: (N, 3) of the state [m, rad].
         """
         stretch = self.load.stretch(self.problem.stretch, factor)
         result = stretch.stiffness * stretch.elongation(state, rate)

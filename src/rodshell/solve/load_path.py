@@ -47,11 +47,10 @@ FLAT, _MOST_TURNS = 1e-6, 6  # of the factor: a turning point is as near as this
 class PathPoint:
     """A point of a path.
 
-    Parameters
-    ----------
-    arc : root mean square displacement of the nodes along the path so far [m].
-    negative_modes : of the stiffness; 0 says stable.
-    equilibrium : the structure there, under the factor; what its problem carries as load is the whole load.
+    Args:
+        arc: root mean square displacement of the nodes along the path so far [m].
+        negative_modes: of the stiffness; 0 says stable.
+        equilibrium: the structure there, under the factor; what its problem carries as load is the whole load.
     """
 
     factor: float
@@ -74,20 +73,19 @@ class PathPoint:
 class LoadPath:
     """A path of equilibria under t times a load.
 
-    Parameters
-    ----------
-    factor : the largest t up to which the path is stable, `close` to where it is lost; 0 where the unloaded structure
-        is not stable.
-    limit : what ends the stable path: "limit point", the load cannot grow; "bifurcation", the structure leaves the path
-        sideways (one that is not quite symmetric has a limit point nearby instead); "none", nothing up to the largest
-        factor asked for; "lost", the path could not be followed further, and nothing is known above `factor`: from the
-        start where EA is so large (over EI/L^2 some 1e11) that round-off in it hides how stiff the structure is;
-        "unstable unloaded".
-    points : in the order of the path; the stable ones come first.
-    mode : (n, 3) how it gives way, the largest component of a node's displacement being 1; None unless the limit is a
-        limit point or a bifurcation.
-    place : block of the node that the mode moves farthest, or None.
-    turns : the points where t has an extremum: limit points, found to `FLAT`, where the path was followed past them.
+    Args:
+        factor: the largest t up to which the path is stable, `close` to where it is lost; 0 where the unloaded
+            structure is not stable.
+        limit: what ends the stable path: "limit point", the load cannot grow; "bifurcation", the structure leaves the
+            path sideways (one that is not quite symmetric has a limit point nearby instead); "none", nothing up to the
+            largest factor asked for; "lost", the path could not be followed further, and nothing is known above
+            `factor`: from the start where EA is so large (over EI/L^2 some 1e11) that round-off in it hides how stiff
+            the structure is; "unstable unloaded".
+        points: in the order of the path; the stable ones come first.
+        mode: (n, 3) how it gives way, the largest component of a node's displacement being 1; None unless the limit is
+            a limit point or a bifurcation.
+        place: block of the node that the mode moves farthest, or None.
+        turns: the points where t has an extremum: limit points, found to `FLAT`, where the path was followed past them.
     """
 
     factor: float
@@ -110,9 +108,8 @@ class LoadPath:
     def at(self, factor: float) -> Equilibrium | None:
         """The stable equilibrium at one of the `stations` asked for, or None where that was not reached.
 
-        Parameters
-        ----------
-        factor : t, as it was given to `load_path`.
+        Args:
+            factor: t, as it was given to `load_path`.
         """
         found = [point for point in self.points if point.factor == factor and not point.negative_modes]
         return found[0].equilibrium if found else None
@@ -131,20 +128,20 @@ def load_path(
 ) -> LoadPath:
     """Follow a structure from equilibrium without the load until it loses its stability, or further.
 
-    Parameters
-    ----------
-    unloaded : the equilibrium at factor 0; its edges elastic, its supports at rest. A load that it has stays as it is.
-    load : what grows, at factor 1: dead forces (n, 3) [N], or a `Load`; not zero in the free directions.
-    most : factor up to which the path is followed; past a limit, down to minus this, too.
-    close : accuracy of the factor, relative.
-    stations : factors at which the equilibrium is wanted, on the stable path; see `LoadPath.at`.
-    past_limit : continue along the same path, through limit points and past bifurcations, until t is beyond `most`.
-    most_factorizations : the path ends when they are used up.
-    progress : called at every step with the factorisations made and the factor reached; what it raises ends the path.
+    Args:
+        unloaded: the equilibrium at factor 0; its edges elastic, its supports at rest. A load that it has stays as it
+            is.
+        load: what grows, at factor 1: dead forces (n, 3) [N], or a `Load`; not zero in the free directions.
+        most: factor up to which the path is followed; past a limit, down to minus this, too.
+        close: accuracy of the factor, relative.
+        stations: factors at which the equilibrium is wanted, on the stable path; see `LoadPath.at`.
+        past_limit: continue along the same path, through limit points and past bifurcations, until t is beyond `most`.
+        most_factorizations: the path ends when they are used up.
+        progress: called at every step with the factorisations made and the factor reached; what it raises ends the
+            path.
 
-    Raises
-    ------
-    InputError : the load does not fit the structure.
+    Raises:
+        InputError: the load does not fit the structure.
     """
     search = _Search(unloaded, Load.of(load), most, close, sorted(stations), most_factorizations, progress)
     return search.run(past_limit)

@@ -43,12 +43,11 @@ _SOFTEST = 3  # steps of the inverse iteration, after which the softest motion i
 class LinearBuckling:
     """Factors on a load at which the linearised stiffness about a permanent state is singular.
 
-    Parameters
-    ----------
-    factors : (k,) ascending, all positive: no factor is missing below the last. Fewer than were asked for, or none,
-        where there are no more up to the largest looked for.
-    shapes : (k, N, 3) modes, the largest component of a node's displacement being 1.
-    rate : (N, 3) how the state moves per unit of the factor at first [m, rad].
+    Args:
+        factors: (k,) ascending, all positive: no factor is missing below the last. Fewer than were asked for, or none,
+            where there are no more up to the largest looked for.
+        shapes: (k, N, 3) modes, the largest component of a node's displacement being 1.
+        rate: (N, 3) how the state moves per unit of the factor at first [m, rad].
     """
 
     factors: Floats
@@ -60,10 +59,9 @@ class LinearBuckling:
 class Vibration:
     """Natural frequencies of small vibrations about an equilibrium.
 
-    Parameters
-    ----------
-    frequencies : (k,) ascending [Hz]; none is missing below the last.
-    shapes : (k, N, 3) modes, the largest component of a node's displacement being 1.
+    Args:
+        frequencies: (k,) ascending [Hz]; none is missing below the last.
+        shapes: (k, N, 3) modes, the largest component of a node's displacement being 1.
     """
 
     frequencies: Floats
@@ -75,18 +73,16 @@ def linear_buckling(
 ) -> LinearBuckling:
     """The lowest factors of linear buckling under a load on top of a permanent state.
 
-    Parameters
-    ----------
-    permanent : a stable equilibrium; what it carries stays as it is, and is not multiplied.
-    load : at factor 1: dead forces (N, 3) [N], or a `Load`.
-    count : so many of the lowest factors.
-    most : factors above this are not looked for.
+    Args:
+        permanent: a stable equilibrium; what it carries stays as it is, and is not multiplied.
+        load: at factor 1: dead forces (N, 3) [N], or a `Load`.
+        count: so many of the lowest factors.
+        most: factors above this are not looked for.
 
-    Raises
-    ------
-    InputError : the load does not fit the structure.
-    StabilityError : the permanent state is not stable.
-    ConvergenceError : the factors that were found are not all there are.
+    Raises:
+        InputError: the load does not fit the structure.
+        StabilityError: the permanent state is not stable.
+        ConvergenceError: the factors that were found are not all there are.
     """
     state, applied = permanent.state, Load.of(load)
     loaded = LoadedAssembly(permanent.problem, applied, state)
@@ -102,19 +98,18 @@ def frequencies(
 ) -> Vibration:
     """The lowest natural frequencies about an equilibrium, under the loads that it carries.
 
-    Parameters
-    ----------
-    mass : (N, 3) lumped mass of each component [kg, of a twist angle kg m2], some of which may be 0.
-    count : so many of the lowest, or as many as there are.
-    edge_mass : (e,) the part of the mass that is spread along each edge [kg]: it moves as the edge's points do between
-        its nodes (a consistent mass), so that frequencies of bending are of fourth order in the edges' length. Lumped
-        at the nodes, None, they are of second order: the k-th of a span of n edges is (k pi / n)^2 / 12 too low.
+    Args:
+        mass: (N, 3) lumped mass of each component [kg, of a twist angle kg m2], some of which may be 0.
+        count: so many of the lowest, or as many as there are.
+        edge_mass: (e,) the part of the mass that is spread along each edge [kg]: it moves as the edge's points do
+            between its nodes (a consistent mass), so that frequencies of bending are of fourth order in the edges'
+            length. Lumped at the nodes, None, they are of second order: the k-th of a span of n edges is (k pi / n)^2 /
+            12 too low.
 
-    Raises
-    ------
-    InputError : the mass has another shape, is negative, or is zero everywhere.
-    StabilityError : the equilibrium is not stable.
-    ConvergenceError : the frequencies that were found are not all there are.
+    Raises:
+        InputError: the mass has another shape, is negative, or is zero everywhere.
+        StabilityError: the equilibrium is not stable.
+        ConvergenceError: the frequencies that were found are not all there are.
     """
     tangent = equilibrium.tangent
     if mass.shape != equilibrium.state.shape:
@@ -132,13 +127,11 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
 
     By a few steps of the inverse iteration: as near as it takes to tell a stiffness from round-off.
 
-    Parameters
-    ----------
-    equilibrium : stable or not; a mechanism that it has is found.
+    Args:
+        equilibrium: stable or not; a mechanism that it has is found.
 
-    Returns
-    -------
-    Its stiffness x'Kx over that of all unknowns alone, and the motion (N, 3) so measured, its square sum being 1.
+    Returns:
+        Its stiffness x'Kx over that of all unknowns alone, and the motion (N, 3) so measured, its square sum being 1.
     """
     try:
         tangent = equilibrium.tangent

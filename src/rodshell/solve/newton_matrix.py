@@ -34,21 +34,19 @@ class SummedMatrix(Protocol):
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
         """Add the Hessians of a set of elements, or of a part of it.
 
-        Parameters
-        ----------
-        number : of the set, among those that the matrix was made for.
-        hessians : (m, 3k, 3k) of each element.
-        blocks : (m, k) of each element.
+        Args:
+            number: of the set, among those that the matrix was made for.
+            hessians: (m, 3k, 3k) of each element.
+            blocks: (m, k) of each element.
         """
         ...
 
     def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
         """Add to each block itself; a blocked direction gets a one.
 
-        Parameters
-        ----------
-        diagonal : (N, 3) diagonal of each block.
-        full : (N, 3, 3) a matrix for each block, or empty.
+        Args:
+            diagonal: (N, 3) diagonal of each block.
+            full: (N, 3, 3) a matrix for each block, or empty.
         """
         ...
 
@@ -59,9 +57,8 @@ class SummedMatrix(Protocol):
     def solve(self, field: Floats, free: Freedom) -> Floats:
         """(N, 3) solution for the part of `field` (N, 3) in the free directions; zero across them.
 
-        Parameters
-        ----------
-        field : (N, 3) right-hand side, of which the part in the free directions is used.
+        Args:
+            field: (N, 3) right-hand side, of which the part in the free directions is used.
         """
         ...
 
@@ -69,16 +66,15 @@ class SummedMatrix(Protocol):
 class Banded:
     """A symmetric matrix in the free directions, as a band (see `SummedMatrix`).
 
-    Parameters
-    ----------
-    element_blocks : (m, k) blocks of each element, for each set of elements.
-    free : the free directions; their counts stay, they may turn.
-    order : (N,) blocks in the order of the band; None finds it.
-    widest : where the half bandwidth is larger, no room is made: look at it and do without.
+    Args:
+        element_blocks: (m, k) blocks of each element, for each set of elements.
+        free: the free directions; their counts stay, they may turn.
+        order: (N,) blocks in the order of the band; None finds it.
+        widest: where the half bandwidth is larger, no room is made: look at it and do without.
 
-    Attributes
-    ----------
-    values : (size + b, b + 1 or some more); row j holds A[j, j], A[j + 1, j], ..., and once it is factorised L and D.
+    Attributes:
+        values: (size + b, b + 1 or some more); row j holds A[j, j], A[j + 1, j], ..., and once it is factorised L and
+            D.
     """
 
     def __init__(
@@ -107,11 +103,10 @@ class Banded:
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
         """Add element Hessians (m, 3k, 3k); the number of their set does not matter.
 
-        Parameters
-        ----------
-        number : of the set of elements; unused.
-        hessians : (m, 3k, 3k) of each element.
-        blocks : (m, k) of each element.
+        Args:
+            number: of the set of elements; unused.
+            hessians: (m, 3k, 3k) of each element.
+            blocks: (m, k) of each element.
         """
         self._look_at(free)
         _add(hessians, blocks, self._first, self._count, self._axes, self._plain, self.values)
@@ -152,10 +147,9 @@ class Banded:
 class SparseSum:
     """A matrix of any pattern, by a sparse solver.
 
-    Parameters
-    ----------
-    element_blocks : (m, k) blocks of each element, for each set of elements.
-    coordinates : (N, d) where the blocks lie [m], by which they are ordered, if that is known.
+    Args:
+        element_blocks: (m, k) blocks of each element, for each set of elements.
+        coordinates: (N, d) where the blocks lie [m], by which they are ordered, if that is known.
     """
 
     def __init__(self, element_blocks: Sequence[Ints], free: Freedom, coordinates: Floats | None = None) -> None:
@@ -173,11 +167,10 @@ class SparseSum:
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
         """Add the Hessians of a set of elements.
 
-        Parameters
-        ----------
-        number : of the set, among those that the matrix was made for.
-        hessians : (m, 3k, 3k) of each element.
-        blocks : (m, k) of each element.
+        Args:
+            number: of the set, among those that the matrix was made for.
+            hessians: (m, 3k, 3k) of each element.
+            blocks: (m, k) of each element.
         """
         self._assembly.add(number, hessians, blocks, free, self._data)
 
@@ -200,10 +193,9 @@ def narrow_or_sparse(
 ) -> SummedMatrix:
     """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell.
 
-    Parameters
-    ----------
-    element_blocks : (m, k) blocks of each element, for each set of elements.
-    coordinates : (N, d) where the blocks lie [m], by which a sparse matrix is ordered, if that is known.
+    Args:
+        element_blocks: (m, k) blocks of each element, for each set of elements.
+        coordinates: (N, d) where the blocks lie [m], by which a sparse matrix is ordered, if that is known.
     """
     banded = Banded(element_blocks, free, widest=WIDEST)
     return banded if banded.half_bandwidth <= WIDEST else SparseSum(element_blocks, free, coordinates)

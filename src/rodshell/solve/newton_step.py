@@ -58,17 +58,16 @@ class Step:
 class Iterate:
     """Where an iteration is, and what its steps so far say of the next one.
 
-    Parameters
-    ----------
-    state, forces : (n, 3) [m, rad], and axial forces (e,) [N].
-    elements : with their source frames at, or near, the state.
-    strains : (e,) of the edges [-]; mismatch : how far the forces are from matching them [-].
-    step, length : the last step, and how long it is; moved, changed : the last whole step and its change of the forces,
-        both relative.
-    longest : the longest step allowed; nearest : the last step that was near.
-    shifted : the last step was one of the shifted Hessian.
-    chord : the next step is by the factors at hand; was_chord : the last one was.
-    settled : whether the error that is left is small enough.
+    Args:
+        state, forces: (n, 3) [m, rad], and axial forces (e,) [N].
+        elements: with their source frames at, or near, the state.
+        strains: (e,) of the edges [-]; mismatch : how far the forces are from matching them [-].
+        step, length: the last step, and how long it is; moved, changed : the last whole step and its change of the
+            forces, both relative.
+        longest: the longest step allowed; nearest : the last step that was near.
+        shifted: the last step was one of the shifted Hessian.
+        chord: the next step is by the factors at hand; was_chord : the last one was.
+        settled: whether the error that is left is small enough.
     """
 
     state: Floats
@@ -109,9 +108,8 @@ class TooManyModesError(Exception):
 class NewtonStep:
     """Takes the steps of one iteration, with the matrix and the buffers that these share.
 
-    Parameters
-    ----------
-    descend, limit_steps, most_modes : as of `find_equilibrium`.
+    Args:
+        descend, limit_steps, most_modes: as of `find_equilibrium`.
     """
 
     def __init__(
@@ -136,9 +134,8 @@ class NewtonStep:
     def start(self, state: Floats, forces: Floats) -> Iterate:
         """Where the iteration begins.
 
-        Parameters
-        ----------
-        state, forces : (n, 3) [m, rad], and axial forces (e,) [N].
+        Args:
+            state, forces: (n, 3) [m, rad], and axial forces (e,) [N].
         """
         strains = self._problem.stretch.strains(state)
         return Iterate(state=state, forces=forces, elements=self._problem.elements, strains=strains)
@@ -146,10 +143,9 @@ class NewtonStep:
     def take(self, here: Iterate) -> Iterate:
         """The next iterate.
 
-        Raises
-        ------
-        SingularError : a pivot vanishes, and not by a mode without stiffness.
-        TooManyModesError : the start has more negative modes than are allowed.
+        Raises:
+            SingularError: a pivot vanishes, and not by a mode without stiffness.
+            TooManyModesError: the start has more negative modes than are allowed.
         """
         problem, stretch, state, forces = self._problem, self._problem.stretch, here.state, here.forces
         base = forces if problem.inextensible else self._no_forces
@@ -279,9 +275,8 @@ def generic_motion(state: Floats, twists: Bools) -> Floats:
     """(n, 3) a motion to begin an iteration with, of which all modes are a part, in axes that turn with the structure:
     which of several equal modes is found, and how nearly, is the same at every heading.
 
-    Parameters
-    ----------
-    state : (n, 3) nodes [m] and twist angles [rad]; twists : (n,) which of its blocks are angles.
+    Args:
+        state: (n, 3) nodes [m] and twist angles [rad]; twists : (n,) which of its blocks are angles.
     """
     numbers, nodes = generic(state.size, 1).reshape(-1, 3), state[~twists]
     x, y, _ = generic(len(nodes), 1)[0] @ (nodes - nodes.mean(axis=0))

@@ -57,21 +57,19 @@ def follow(
 ) -> Equilibrium:
     """Move from t = 0 to t = 1 by steps that shrink on failure and grow back.
 
-    Parameters
-    ----------
-    problem_at : the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
-        same at all t, and their source frames are carried along the path. The first
-        iteration of each step carries them there with the tangent stiffness: it is the tangent predictor.
-    state, forces : equilibrium, or a guess of it, at t = 0.
-    snap : where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
-        structure itself would; its constraint must be `Supports`.
-    most_factorizations : no step is begun after so many, and no descent takes many more; None: as many as it takes.
-    most_modes : the path ends at an equilibrium with more negative modes; None: at none.
+    Args:
+        problem_at: the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
+            same at all t, and their source frames are carried along the path. The first
+            iteration of each step carries them there with the tangent stiffness: it is the tangent predictor.
+        state, forces: equilibrium, or a guess of it, at t = 0.
+        snap: where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
+            structure itself would; its constraint must be `Supports`.
+        most_factorizations: no step is begun after so many, and no descent takes many more; None: as many as it takes.
+        most_modes: the path ends at an equilibrium with more negative modes; None: at none.
 
-    Returns
-    -------
-    The equilibrium at t = 1, or at the last t reached, with the status STALLED. Iterations,
-    factorizations and seconds of the report are those of the whole path, failed steps included.
+    Returns:
+        The equilibrium at t = 1, or at the last t reached, with the status STALLED. Iterations,
+        factorizations and seconds of the report are those of the whole path, failed steps included.
     """
     path = followed(
         problem_at, state, forces, first_step=first_step, snap=snap, most_factorizations=most_factorizations,
@@ -103,11 +101,10 @@ def followed(
 ) -> "Trace":
     """As `follow`, as far as it went.
 
-    Parameters
-    ----------
-    neutral, slide : as of `find_stable`.
-    easy : iterations of a step that may be followed by a longer one.
-    most, most_of_all : iterations of a step, and of the path; None: as many as it takes.
+    Args:
+        neutral, slide: as of `find_stable`.
+        easy: iterations of a step that may be followed by a longer one.
+        most, most_of_all: iterations of a step, and of the path; None: as many as it takes.
     """
     path, reports = Continuation(0.0, 1.0, first_step, SMALLEST_STEP), list[SolveReport]()
     last: Equilibrium | None = None
@@ -157,10 +154,9 @@ def _made(reports: Sequence[SolveReport]) -> int:
 class Snap:
     """Where a branch of stable equilibria ended and the structure went to another one.
 
-    Parameters
-    ----------
-    start, stop : of the step in t in which it happened.
-    moved : how far the node went that went farthest [m].
+    Args:
+        start, stop: of the step in t in which it happened.
+        moved: how far the node went that went farthest [m].
     """
 
     start: float
@@ -193,17 +189,16 @@ def trace(
     Where a branch ends, the structure snaps, unless the way back undoes that: a path that rises too steeply for the
     shortest step, as where it forks, goes back to where it came from.
 
-    Parameters
-    ----------
-    problem_at : the problem at t, its constraint being `Supports` with prescribed blocks; source frames as in `follow`.
-    shortest : step in t at which a branch that cannot be followed has ended.
-    snap : whether to go down the energy there and on from where that leads; else the path ends there.
-    most_factorizations : the path ends when they are used up.
-    progress : called with t and the equilibrium there before each step; it may raise an error to end the path.
+    Args:
+        problem_at: the problem at t, its constraint being `Supports` with prescribed blocks; source frames as in
+            `follow`.
+        shortest: step in t at which a branch that cannot be followed has ended.
+        snap: whether to go down the energy there and on from where that leads; else the path ends there.
+        most_factorizations: the path ends when they are used up.
+        progress: called with t and the equilibrium there before each step; it may raise an error to end the path.
 
-    Returns
-    -------
-    The path; its t is `stop` where it arrived.
+    Returns:
+        The path; its t is `stop` where it arrived.
     """
     path, snaps, reports = Continuation(start, stop, abs(stop - start), shortest), list[Snap](), list[SolveReport]()
     while not path.arrived:
@@ -241,10 +236,9 @@ def trace(
 def going_on(problem: Problem, last: Equilibrium) -> Problem:
     """The problem with the source frames and the pattern of an equilibrium of the same structure.
 
-    Parameters
-    ----------
-    problem : the next one on a path.
-    last : the equilibrium that the next solve starts from.
+    Args:
+        problem: the next one on a path.
+        last: the equilibrium that the next solve starts from.
     """
     elements = tuple(map(with_frames, problem.elements, last.elements))
     return replace(problem, elements=elements, pattern=last.problem.pattern)
@@ -259,9 +253,8 @@ def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
 def _surplus(here: Equilibrium, there: Equilibrium) -> float:
     """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell.
 
-    Parameters
-    ----------
-    here, there : equilibria of one structure under one load, the second with prescribed `Supports`.
+    Args:
+        here, there: equilibria of one structure under one load, the second with prescribed `Supports`.
     """
     supports = there.problem.constraint
     assert isinstance(supports, Supports)
@@ -314,15 +307,13 @@ def relax(
 ) -> Equilibrium:  # fmt: skip
     """The stable equilibrium that lies below a state; the last steps are those of `find_stable`.
 
-    Parameters
-    ----------
-    state : (N, 3) to begin with [m, at twist angles rad].
-    most_factorizations : no step down is taken after so many; None: as many as `MOST_STEPS` take.
-    progress : called with the number and the length of each step; an OutOfTimeError that it raises ends the descent.
+    Args:
+        state: (N, 3) to begin with [m, at twist angles rad].
+        most_factorizations: no step down is taken after so many; None: as many as `MOST_STEPS` take.
+        progress: called with the number and the length of each step; an OutOfTimeError that it raises ends the descent.
 
-    Returns
-    -------
-    Its report counts the descent's work too.
+    Returns:
+        Its report counts the descent's work too.
     """
     begin = time.perf_counter()
     edges = problem.stretch.with_forces(None)

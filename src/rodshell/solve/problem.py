@@ -32,45 +32,39 @@ class Constraint(Protocol):
     def freedom(self, state: Floats) -> Freedom:
         """The free directions.
 
-        Parameters
-        ----------
-        state : (n, 3) on the manifold [m, at twist angles rad].
+        Args:
+            state: (n, 3) on the manifold [m, at twist angles rad].
         """
         ...
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
         """Contribution of the constraint forces to the Hessian.
 
-        Parameters
-        ----------
-        state : (n, 3) on the manifold [m, rad].
-        gradient : (n, 3) of energy and load there [N, N m].
+        Args:
+            state: (n, 3) on the manifold [m, rad].
+            gradient: (n, 3) of energy and load there [N, N m].
 
-        Returns
-        -------
-        (n, 3, 3) -lambda phi'' of each block [N/m]; or an empty array, at every state.
+        Returns:
+            (n, 3, 3) -lambda phi'' of each block [N/m]; or an empty array, at every state.
         """
         ...
 
     def remaining(self, state: Floats) -> Floats | None:
         """Prescribed displacement that is still to go.
 
-        Parameters
-        ----------
-        state : (n, 3) the state now [m, rad].
+        Args:
+            state: (n, 3) the state now [m, rad].
 
-        Returns
-        -------
-        (n, 3) across the free directions [m, rad]; None where nothing moves.
+        Returns:
+            (n, 3) across the free directions [m, rad]; None where nothing moves.
         """
         ...
 
     def retract(self, state: Floats) -> Floats:
         """The state moved back onto the manifold after a step along the free directions.
 
-        Parameters
-        ----------
-        state : (n, 3) next to the manifold [m, rad].
+        Args:
+            state: (n, 3) next to the manifold [m, rad].
         """
         ...
 
@@ -79,9 +73,8 @@ class Constraint(Protocol):
 class Supports:
     """Fixed directions that never turn: supports, clamps, ghost nodes.
 
-    Parameters
-    ----------
-    moved : (k,) blocks that are prescribed, all their directions being fixed; goals : (k, 3) where they go [m].
+    Args:
+        moved: (k,) blocks that are prescribed, all their directions being fixed; goals : (k, 3) where they go [m].
     """
 
     free: Freedom
@@ -110,12 +103,11 @@ class Pattern:
     """What follows from the pattern of a problem's matrices alone. It never changes, so that any number of solves and
     tangents share it.
 
-    Parameters
-    ----------
-    blocks : (m, k) blocks of unknowns that each set of energies couples.
-    count : (n,) free directions of each block.
-    assembly : the maps from element Hessians to the sparse matrix.
-    solver : the order of elimination and the symbolic factorisation.
+    Args:
+        blocks: (m, k) blocks of unknowns that each set of energies couples.
+        count: (n,) free directions of each block.
+        assembly: the maps from element Hessians to the sparse matrix.
+        solver: the order of elimination and the symbolic factorisation.
     """
 
     blocks: tuple[Ints, ...]
@@ -126,10 +118,9 @@ class Pattern:
     def serves(self, blocks: tuple[Ints, ...], count: Ints) -> bool:
         """Whether another problem has this pattern.
 
-        Parameters
-        ----------
-        blocks : (m, k) of each of its sets of energies.
-        count : (n,) free directions of each of its blocks.
+        Args:
+            blocks: (m, k) of each of its sets of energies.
+            count: (n,) free directions of each of its blocks.
         """
         here, there = (*self.blocks, self.count), (*blocks, count)
         return len(here) == len(there) and all(map(np.array_equal, here, there))
@@ -147,16 +138,15 @@ class Pattern:
 class Problem:
     """A structure in equilibrium: elastic elements, edges, loads and a constraint.
 
-    Parameters
-    ----------
-    elements : every energy but the stretch.
-    length : characteristic length of the shape [m], by which motions are measured, see `unit`.
-    inextensible : the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
-    load : (n, 3) dead forces [N], or None.
-    flat_coordinates : (n, 2) where the blocks lie in the flat grid [m], from which the order of elimination follows,
-        or None.
-    pattern : of a problem that was solved before; where the matrices of this one have the same pattern, they are not
-        analysed again.
+    Args:
+        elements: every energy but the stretch.
+        length: characteristic length of the shape [m], by which motions are measured, see `unit`.
+        inextensible: the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
+        load: (n, 3) dead forces [N], or None.
+        flat_coordinates: (n, 2) where the blocks lie in the flat grid [m], from which the order of elimination follows,
+            or None.
+        pattern: of a problem that was solved before; where the matrices of this one have the same pattern, they are not
+            analysed again.
     """
 
     elements: tuple[Elements, ...]
@@ -180,12 +170,11 @@ class Problem:
     ) -> Self:
         """A shell without loads whose rod ends are held, or are on their way.
 
-        Parameters
-        ----------
-        points : (k, 3) the rods' ends [m], whose mean radius is the characteristic length.
-        goals : (k, 3) where the ends, and the ghost nodes of clamps after them, go [m]; None: they stay.
-        elements : the shell's own energies, with their source frames elsewhere; None: those of the shell.
-        pattern : of an earlier solve of this shell.
+        Args:
+            points: (k, 3) the rods' ends [m], whose mean radius is the characteristic length.
+            goals: (k, 3) where the ends, and the ghost nodes of clamps after them, go [m]; None: they stay.
+            elements: the shell's own energies, with their source frames elsewhere; None: those of the shell.
+            pattern: of an earlier solve of this shell.
         """
         free = shell.held_ends()
         supports = Supports(free) if goals is None else Supports(free, np.append(shell.ends, shell.ghosts), goals)
@@ -212,9 +201,8 @@ class Problem:
     def pattern_at(self, state: Floats) -> Pattern:
         """The pattern of this problem: the one that comes with it where it serves, or a new one.
 
-        Parameters
-        ----------
-        state : (n, 3) any state of the problem.
+        Args:
+            state: (n, 3) any state of the problem.
         """
         blocks, free = self.blocks(len(state)), self.constraint.freedom(state)
         if self.pattern is not None and self.pattern.serves(blocks, free.count):
@@ -244,10 +232,9 @@ class Problem:
 def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | None) -> LinearSolver:
     """The solver for a pattern, ordered by where the blocks lie in the flat grid if that is known.
 
-    Parameters
-    ----------
-    free : the free directions of the blocks.
-    flat_coordinates : (n, 2) of the blocks [m]; None: ordered by minimum degree.
+    Args:
+        free: the free directions of the blocks.
+        flat_coordinates: (n, 2) of the blocks [m]; None: ordered by minimum degree.
     """
     if flat_coordinates is None:
         return Multifrontal(assembly.indptr, assembly.indices)
@@ -274,15 +261,13 @@ class Force(Protocol):
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats | None:
         """The part of the force that is held over a step.
 
-        Parameters
-        ----------
-        time : of the step's end [s].
-        state, velocity : (N, 3) at its start [m, m/s].
-        mass : (N, 3) lumped mass of each component [kg, kg m2].
+        Args:
+            time: of the step's end [s].
+            state, velocity: (N, 3) at its start [m, m/s].
+            mass: (N, 3) lumped mass of each component [kg, kg m2].
 
-        Returns
-        -------
-        (N, 3) forces [N, on twist angles N m], or None.
+        Returns:
+            (N, 3) forces [N, on twist angles N m], or None.
         """
         ...
 
@@ -291,10 +276,9 @@ class Force(Protocol):
 class GravityForce:
     """Weight of the nodes. Twist angles have inertia but no weight.
 
-    Parameters
-    ----------
-    nodes : blocks that are nodes: `rod.nodes`.
-    acceleration : (3,) [m/s2].
+    Args:
+        nodes: blocks that are nodes: `rod.nodes`.
+        acceleration: (3,) [m/s2].
     """
 
     nodes: slice | Ints
@@ -308,9 +292,8 @@ class GravityForce:
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
         """The weight of the nodes.
 
-        Parameters
-        ----------
-        mass : (N, 3) lumped mass of each component [kg, kg m2].
+        Args:
+            mass: (N, 3) lumped mass of each component [kg, kg m2].
         """
         force = np.zeros_like(mass)
         force[self.nodes] = mass[self.nodes] * self.acceleration
@@ -332,19 +315,17 @@ class PointLoads:
     def on(cls, block: int, *force: float) -> "PointLoads":
         """One load on a single block.
 
-        Parameters
-        ----------
-        block : a node or a twist angle.
-        force : (fx, fy, fz) on a node [N], or one moment on a twist angle [N m].
+        Args:
+            block: a node or a twist angle.
+            force: (fx, fy, fz) on a node [N], or one moment on a twist angle [N m].
         """
         return cls(np.array([block]), np.array([[*force, 0.0, 0.0][:3]]))
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
         """The sum of the loads on each block.
 
-        Parameters
-        ----------
-        mass : (N, 3) lumped mass of each component, for its shape.
+        Args:
+            mass: (N, 3) lumped mass of each component, for its shape.
         """
         force = np.zeros_like(mass)
         _check_blocks(self.blocks, len(mass))
@@ -356,10 +337,9 @@ class PointLoads:
 class Damping:
     """Viscous damping -(rate M + coefficients) v, implicit: it never overshoots.
 
-    Parameters
-    ----------
-    rate : of all momenta [1/s]: alone it makes v decay as exp(-rate t), twist rates included.
-    coefficients : (N, 3) or broadcast to it: drag of each block [N s/m, N m s/rad].
+    Args:
+        rate: of all momenta [1/s]: alone it makes v decay as exp(-rate t), twist rates included.
+        coefficients: (N, 3) or broadcast to it: drag of each block [N s/m, N m s/rad].
     """
 
     rate: float = 0.0
@@ -388,9 +368,8 @@ class Damping:
 class ExplicitForce:
     """A force without a gradient, held over each step.
 
-    Parameters
-    ----------
-    force : (time, state, velocity) -> (N, 3) [N]; the time is that of the step's end, the rest of its start.
+    Args:
+        force: (time, state, velocity) -> (N, 3) [N]; the time is that of the step's end, the rest of its start.
     """
 
     force: Callable[[float, Floats, Floats], Floats]
@@ -401,11 +380,10 @@ class ExplicitForce:
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
         """The force, evaluated once for the step.
 
-        Parameters
-        ----------
-        time : of the step's end [s].
-        state, velocity : (N, 3) at its start [m, m/s].
-        mass : (N, 3) lumped mass of each component, for its shape.
+        Args:
+            time: of the step's end [s].
+            state, velocity: (N, 3) at its start [m, m/s].
+            mass: (N, 3) lumped mass of each component, for its shape.
         """
         return _checked(self.force(time, state, velocity), mass.shape, self.force, time)
 
@@ -414,13 +392,12 @@ class ExplicitForce:
 class ImplicitForce:
     """A force with its gradient, taken at the end of each step.
 
-    Parameters
-    ----------
-    force : (time, state, velocity) -> (N, 3) [N] and its derivatives by the state and by the velocity,
-        (m, 3k, 3k) each [N/m, N s/m] on the stencils `blocks`; either may be None for zero. Of a derivative that is
-        not symmetric (a load that follows the rod) Newton's matrix takes the symmetric part: it then converges
-        linearly, to the same step.
-    blocks : (m, k).
+    Args:
+        force: (time, state, velocity) -> (N, 3) [N] and its derivatives by the state and by the velocity,
+            (m, 3k, 3k) each [N/m, N s/m] on the stencils `blocks`; either may be None for zero. Of a derivative that is
+            not symmetric (a load that follows the rod) Newton's matrix takes the symmetric part: it then converges
+            linearly, to the same step.
+        blocks: (m, k).
     """
 
     force: Callable[[float, Floats, Floats], tuple[Floats, Floats | None, Floats | None]]
@@ -436,15 +413,13 @@ class ImplicitForce:
     def at(self, time: float, state: Floats, velocity: Floats, step: float) -> tuple[Floats, Floats]:
         """The force at the end of a step.
 
-        Parameters
-        ----------
-        time : of the end [s].
-        state, velocity : (N, 3) at the end [m, m/s].
-        step : length of the step [s].
+        Args:
+            time: of the end [s].
+            state, velocity: (N, 3) at the end [m, m/s].
+            step: length of the step [s].
 
-        Returns
-        -------
-        (N, 3) forces [N], and (m, 3k, 3k) minus the symmetric part of their derivative by the state at the end.
+        Returns:
+            (N, 3) forces [N], and (m, 3k, 3k) minus the symmetric part of their derivative by the state at the end.
         """
         force, by_state, by_velocity = self.force(time, state, velocity)
         force = _checked(force, state.shape, self.force, time)

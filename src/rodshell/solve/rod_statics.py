@@ -28,17 +28,16 @@ SPIN = (1.0, 0.0, 0.0)
 class RodSupports:
     """Where a rod is held. Clamps that are not named stay as they are.
 
-    Parameters
-    ----------
-    positions : node -> where it is held (3,) [m], or None: where it is. Nodes may count from the end (-1).
-    along : node -> orthonormal directions along which alone it is free.
-    tangents : clamped end -> tangent (3,) along the rod there.
-    directors : clamped end -> first material director m1 (3,) there; its part across the tangent is used.
-    turns : clamped end -> how far it is turned about its tangent in all [rad], more than once around if so given: from
-        the director, if one is given, or from where it has no twist angle, as it was built; the same again turns no
-        further.
-    spinning : clamped ends that hold position and direction but let the rod spin.
-    angles : edge -> twist angle that it is held at [rad].
+    Args:
+        positions: node -> where it is held (3,) [m], or None: where it is. Nodes may count from the end (-1).
+        along: node -> orthonormal directions along which alone it is free.
+        tangents: clamped end -> tangent (3,) along the rod there.
+        directors: clamped end -> first material director m1 (3,) there; its part across the tangent is used.
+        turns: clamped end -> how far it is turned about its tangent in all [rad], more than once around if so given:
+            from the director, if one is given, or from where it has no twist angle, as it was built; the same again
+            turns no further.
+        spinning: clamped ends that hold position and direction but let the rod spin.
+        angles: edge -> twist angle that it is held at [rad].
     """
 
     positions: Mapping[int, ArrayLike | None] = field(default_factory=dict)
@@ -71,12 +70,11 @@ class RodSupports:
 class RodLoads:
     """Dead loads on a rod.
 
-    Parameters
-    ----------
-    forces : node -> force (3,) [N]; or (n, 3), one for each node.
-    moments : edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
-        the twist angle, counted from frames transported from the last step's shape.
-    gravity : acceleration (3,) [m/s2].
+    Args:
+        forces: node -> force (3,) [N]; or (n, 3), one for each node.
+        moments: edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
+            the twist angle, counted from frames transported from the last step's shape.
+        gravity: acceleration (3,) [m/s2].
     """
 
     forces: Mapping[int, ArrayLike] | ArrayLike = field(default_factory=dict)
@@ -99,13 +97,11 @@ class RodLoads:
     def on(self, rod: ElasticRod, spinning: Sequence[End]) -> Floats:
         """(N, 3) load on each block [N, at angles N m].
 
-        Parameters
-        ----------
-        spinning : clamped ends that are free to spin.
+        Args:
+            spinning: clamped ends that are free to spin.
 
-        Raises
-        ------
-        InputError : a load that this rod cannot carry.
+        Raises:
+            InputError: a load that this rod cannot carry.
         """
         load = np.zeros((rod.block_count, 3)) if self.gravity is None else rod.weight(self.gravity)
         if isinstance(self.forces, Mapping):
@@ -141,10 +137,9 @@ class SupportPath:
     def of(rod: ElasticRod, state: Floats, wanted: RodSupports) -> "SupportPath":
         """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted.
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad] at the start.
-        wanted : the supports at the end.
+        Args:
+            state: (N, 3) node positions [m] and twist angles [rad] at the start.
+            wanted: the supports at the end.
         """
         wanted.require(rod)
         goals = dict[int, Floats]()
@@ -237,11 +232,10 @@ def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) ->
 def index_of(given: int, count: int, what: str) -> int:
     """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`.
 
-    Parameters
-    ----------
-    given : the index; a negative one counts from the end.
-    count : number of all that there are.
-    what : is counted, for messages: "node" or "edge".
+    Args:
+        given: the index; a negative one counts from the end.
+        count: number of all that there are.
+        what: is counted, for messages: "node" or "edge".
     """
     if not isinstance(given, int | np.integer):
         raise InputError(f"a {what} is a whole number, not {short(given)}")
@@ -260,14 +254,13 @@ NEUTRAL = 1e-6  # a mode of less than this of EI/L, the rod moving by its length
 class RodShape:
     """A rod in equilibrium.
 
-    Parameters
-    ----------
-    rod : with its source frames at `state`, so that a further solve can start here.
-    state : (N, 3) blocks.
-    axial_forces : (edges,) [N].
-    load : (N, 3) what it carries [N, at angles N m].
-    reactions : (N, 3) of the supports [N, at angles N m]; zero where nothing is held.
-    report : iterations, residual, and whether the equilibrium is stable.
+    Args:
+        rod: with its source frames at `state`, so that a further solve can start here.
+        state: (N, 3) blocks.
+        axial_forces: (edges,) [N].
+        load: (N, 3) what it carries [N, at angles N m].
+        reactions: (N, 3) of the supports [N, at angles N m]; zero where nothing is held.
+        report: iterations, residual, and whether the equilibrium is stable.
     """
 
     rod: ElasticRod
@@ -324,24 +317,22 @@ def solve_rod(
 ) -> RodShape:
     """Equilibrium of a rod, followed from `start` while supports and loads go to the goals given here.
 
-    Parameters
-    ----------
-    supports, loads : where the rod is held, and what it carries; None: as its clamps are, and nothing. A rod that
-        nothing keeps from spinning about itself is held at its first edge's angle.
-    start : a state (N, 3), or a shape found before (then `rod` is shape.rod); by default the rest shape. What held
-        it is let go bit by bit, unless it is given again: the loads and supports of a shape; of a state, natural
-        strains go from what they are there to the rod's own, and forces that hold what is left fade.
-    steps : equal steps to begin with; they halve where the solver fails and grow back.
-        Where ends travel far in a step, the solver can land on another branch than the one that a rod would
-        follow, with loops or twist in it: an equilibrium, but another. Give ten steps or more then, and see whether
-        twice as many end with the same energy.
-    stable : leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path continues
-        over saddles, and the report counts the negative modes at its end.
+    Args:
+        supports, loads: where the rod is held, and what it carries; None: as its clamps are, and nothing. A rod that
+            nothing keeps from spinning about itself is held at its first edge's angle.
+        start: a state (N, 3), or a shape found before (then `rod` is shape.rod); by default the rest shape. What held
+            it is let go bit by bit, unless it is given again: the loads and supports of a shape; of a state, natural
+            strains go from what they are there to the rod's own, and forces that hold what is left fade.
+        steps: equal steps to begin with; they halve where the solver fails and grow back.
+            Where ends travel far in a step, the solver can land on another branch than the one that a rod would
+            follow, with loops or twist in it: an equilibrium, but another. Give ten steps or more then, and see whether
+            twice as many end with the same energy.
+        stable: leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path continues
+            over saddles, and the report counts the negative modes at its end.
 
-    Raises
-    ------
-    InputError : a support or a load that this rod does not have.
-    ConvergenceError : the goal was not reached, or not in a stable equilibrium; `report` holds the figures.
+    Raises:
+        InputError: a support or a load that this rod does not have.
+        ConvergenceError: the goal was not reached, or not in a stable equilibrium; `report` holds the figures.
     """
     instance("rod", rod, ElasticRod)
     whole("steps", steps, 1)

@@ -14,14 +14,12 @@ _LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eig
 class ShiftedMatrix:
     """The matrix of an iteration; the memory of its factors serves for all of them.
 
-    Parameters
-    ----------
-    units : (dofs,) what the motion of each unknown is measured by [m, rad].
+    Args:
+        units: (dofs,) what the motion of each unknown is measured by [m, rad].
 
-    Attributes
-    ----------
-    values : (nnz,) of the matrix as it was given last, in the order of the pattern.
-    negative_modes : of the matrix as it was given, not shifted; a mode without stiffness counts as a negative one.
+    Attributes:
+        values: (nnz,) of the matrix as it was given last, in the order of the pattern.
+        negative_modes: of the matrix as it was given, not shifted; a mode without stiffness counts as a negative one.
     """
 
     def __init__(self, pattern: Pattern, units: Floats) -> None:
@@ -35,13 +33,11 @@ class ShiftedMatrix:
     def factorise(self, values: Floats) -> bool:
         """Factorise another matrix; whether that can be done.
 
-        Parameters
-        ----------
-        values : (nnz,) in the order of the pattern.
+        Args:
+            values: (nnz,) in the order of the pattern.
 
-        Raises
-        ------
-        SingularError : some are not finite.
+        Raises:
+            SingularError: some are not finite.
         """
         self.values = values
         try:

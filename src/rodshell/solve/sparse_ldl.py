@@ -74,15 +74,13 @@ class LinearSolver(Protocol):
     def factor(self, data: Floats, *, reuse: Factors | None = None) -> Factors:
         """The factors of the matrix with the values `data`, which they keep: it must not be changed afterwards.
 
-        Parameters
-        ----------
-        data : (nnz,) values of the upper triangle, in the order of the pattern.
-        reuse : factors by the same solver that are not needed any more: the new ones take over their memory, and
-            solving with the old ones is an error from then on.
+        Args:
+            data: (nnz,) values of the upper triangle, in the order of the pattern.
+            reuse: factors by the same solver that are not needed any more: the new ones take over their memory, and
+                solving with the old ones is an error from then on.
 
-        Raises
-        ------
-        SingularError : a pivot vanishes or is not finite.
+        Raises:
+            SingularError: a pivot vanishes or is not finite.
         """
         ...
 
@@ -101,12 +99,11 @@ class _Scratch(NamedTuple):
 class Multifrontal:
     """Multifrontal LDL^T of matrices of one pattern.
 
-    Parameters
-    ----------
-    indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
-    coordinates : (n, d) where each unknown lies, or (b, d) where each of the `blocks` does, for nested dissection; None
-        orders by minimum degree.
-    blocks : of unknowns that lie at one place; None: they are looked for.
+    Args:
+        indptr, indices: the pattern, upper triangle in compressed columns, every diagonal present.
+        coordinates: (n, d) where each unknown lies, or (b, d) where each of the `blocks` does, for nested dissection;
+            None orders by minimum degree.
+        blocks: of unknowns that lie at one place; None: they are looked for.
     """
 
     def __init__(
@@ -239,10 +236,9 @@ class MultifrontalFactors:
 def upper_triangle(indptr: Longs, indices: Longs, data: Floats) -> "csc_matrix":
     """The upper triangle of a matrix, in SciPy's form.
 
-    Parameters
-    ----------
-    indptr, indices : the pattern, upper triangle in compressed columns.
-    data : (nnz,) its values.
+    Args:
+        indptr, indices: the pattern, upper triangle in compressed columns.
+        data: (nnz,) its values.
     """
     return csc_matrix((data, indices, indptr), shape=(len(indptr) - 1, len(indptr) - 1))
 
@@ -250,11 +246,10 @@ def upper_triangle(indptr: Longs, indices: Longs, data: Floats) -> "csc_matrix":
 def product(indptr: Longs, indices: Longs, data: Floats, x: Floats) -> Floats:
     """(n,) product A x of a symmetric matrix that is given by its upper triangle.
 
-    Parameters
-    ----------
-    indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
-    data : (nnz,) its values.
-    x : (n,) vector.
+    Args:
+        indptr, indices: the pattern, upper triangle in compressed columns, every diagonal present.
+        data: (nnz,) its values.
+        x: (n,) vector.
     """
     data = np.require(data, requirements="W")  # that of a tangent cannot be written to, see there
     residual, *_ = _residual(indptr, indices, data, np.ascontiguousarray(x), np.zeros(len(x)))
@@ -463,14 +458,12 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     The inner nodes of a span come before all others: what is cut is a graph of joints and a single node of each span,
     coupled as they are after that elimination.
 
-    Parameters
-    ----------
-    coordinates : (n, d) where each block lies; any in which neighbours are near are suitable.
-    start, neighbours : the blocks coupled to block i are neighbours[start[i] : start[i + 1]].
+    Args:
+        coordinates: (n, d) where each block lies; any in which neighbours are near are suitable.
+        start, neighbours: the blocks coupled to block i are neighbours[start[i] : start[i + 1]].
 
-    Returns
-    -------
-    (n,) blocks in the order of their elimination.
+    Returns:
+        (n,) blocks in the order of their elimination.
     """
     inner, kept, start, neighbours = _without_spans(start, neighbours)
     points = np.ascontiguousarray(coordinates[kept], dtype=np.float64)

@@ -78,10 +78,9 @@ def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> BlockRows:
     """The blocks of a pattern (upper triangle, compressed columns); single unknowns, where some unknown of a block is
     not coupled as the others are.
 
-    Parameters
-    ----------
-    indptr, indices : the pattern of the upper triangle, in compressed columns.
-    begin : (b + 1,) first unknown of each block, and the number of unknowns.
+    Args:
+        indptr, indices: the pattern of the upper triangle, in compressed columns.
+        begin: (b + 1,) first unknown of each block, and the number of unknowns.
     """
     whole, start, rows = _block_rows(indptr, indices, begin)
     return BlockRows(begin, start, rows) if whole else blocks_of(indptr, indices, np.arange(begin[-1] + 1))
@@ -90,10 +89,9 @@ def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> BlockRows:
 def coupled(indptr: Longs, blocks: BlockRows) -> Blocks:
     """The graph of blocks.
 
-    Parameters
-    ----------
-    indptr : where columns begin in the pattern of the upper triangle.
-    blocks : see `BlockRows`.
+    Args:
+        indptr: where columns begin in the pattern of the upper triangle.
+        blocks: see `BlockRows`.
     """
     return Blocks(blocks.begin, *_coupled(indptr, *blocks))
 
@@ -101,10 +99,9 @@ def coupled(indptr: Longs, blocks: BlockRows) -> Blocks:
 def plan_of(indptr: Longs, blocks: Blocks, order: Longs) -> Plan:
     """Of a pattern whose `blocks` are eliminated in `order` (b,), except what the tree leaves open.
 
-    Parameters
-    ----------
-    indptr : where columns begin in the pattern of the upper triangle.
-    order : (b,) blocks in the order of elimination.
+    Args:
+        indptr: where columns begin in the pattern of the upper triangle.
+        order: (b,) blocks in the order of elimination.
     """
     order, tree, weight, count, *earlier = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
     first = _supernodes(tree, count, weight)
@@ -452,11 +449,10 @@ WORTHWHILE = 1e8  # multiplications from which on work is shared
 def parts_of(up, width, below):  # type: ignore[no-untyped-def]
     """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them.
 
-    Parameters
-    ----------
-    up : (n_s,) parent of each supernode, negative for a root; children come before their parents.
-    width : (n_s,) number of pivots of each supernode.
-    below : (n_s,) number of rows of each update matrix.
+    Args:
+        up: (n_s,) parent of each supernode, negative for a root; children come before their parents.
+        width: (n_s,) number of pivots of each supernode.
+        below: (n_s,) number of rows of each update matrix.
     """
     supers = len(up)
     lowest, work, total = np.empty(supers, dtype=np.int64), np.empty(supers), 0.0
@@ -496,11 +492,10 @@ def stacks_of(up, below, child_start, children, part_start, parts):  # type: ign
     it writes are then never on the same stack, and the children's lie on top of theirs. The last that a part writes
     stays there for the part that needs all; in that one every matrix stays, since threads share its supernodes.
 
-    Parameters
-    ----------
-    up : (n_s,) parent of each supernode, negative for a root.
-    below : (n_s,) number of rows of each update matrix.
-    child_start, children, part_start, parts : see `Plan`.
+    Args:
+        up: (n_s,) parent of each supernode, negative for a root.
+        below: (n_s,) number of rows of each update matrix.
+        child_start, children, part_start, parts: see `Plan`.
     """
     supers = len(up)
     odd, part = np.zeros(supers, dtype=np.int64), np.zeros(supers, dtype=np.int64)

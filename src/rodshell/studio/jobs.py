@@ -31,10 +31,9 @@ _STATUS = Annotated[dict[str, Any], AfterValidator(_status)]
 class Jobs:
     """A queue of jobs with one process, and what became of them, in a folder each.
 
-    Parameters
-    ----------
-    folder : in which each job has a folder with status.json and, when it is done, result/.
-    time_limit : of a job [s].
+    Args:
+        folder: in which each job has a folder with status.json and, when it is done, result/.
+        time_limit: of a job [s].
     """
 
     def __init__(self, folder: Path, time_limit: float, room: Room) -> None:
@@ -62,13 +61,11 @@ class Jobs:
     def add(self, case: dict[str, Any], size: int) -> str:
         """Queue a case; the id of its job.
 
-        Parameters
-        ----------
-        size : of the case [bytes].
+        Args:
+            size: of the case [bytes].
 
-        Raises
-        ------
-        InputError : too many jobs wait, or there is no room for another.
+        Raises:
+            InputError: too many jobs wait, or there is no room for another.
         """
         if len(self._queue) >= limit(WAITING):
             raise InputError(

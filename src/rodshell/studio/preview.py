@@ -43,9 +43,8 @@ class Preview:
     def of(self, form: "Form") -> tuple[dict[str, Any], bytes]:
         """Facts and scene of a form.
 
-        Parameters
-        ----------
-        form : of a target; with or without popped-up shells.
+        Args:
+            form: of a target; with or without popped-up shells.
         """
         facts = {
             "name": form.case.drawings.name or form.target.name,

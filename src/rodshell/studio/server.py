@@ -56,15 +56,14 @@ HEADERS = {
 class Settings:
     """How a server runs.
 
-    Parameters
-    ----------
-    folder : in which sessions and jobs are kept.
-    hosts : names, with the port, by which it may be reached.
-    token : that requests must bring; "": none is needed. once : another one, for a single request: the address that a
-        browser was started with is seen by other users of the machine.
-    key : which pages that brought a token keep in a cookie, and need no token then; default: the token.
-    first : the case with which a session begins, and the files that it names.
-    time_limit : of a job [s]; largest_upload : [bytes], before RODSHELL_LIMITS.
+    Args:
+        folder: in which sessions and jobs are kept.
+        hosts: names, with the port, by which it may be reached.
+        token: that requests must bring; "": none is needed. once : another one, for a single request: the address that
+            a browser was started with is seen by other users of the machine.
+        key: which pages that brought a token keep in a cookie, and need no token then; default: the token.
+        first: the case with which a session begins, and the files that it names.
+        time_limit: of a job [s]; largest_upload : [bytes], before RODSHELL_LIMITS.
     """
 
     folder: Path
@@ -81,9 +80,8 @@ class Settings:
 def studio_app(settings: Settings) -> ASGIApp:
     """The server as an ASGI application.
 
-    Parameters
-    ----------
-    settings : see there.
+    Args:
+        settings: see there.
     """
     first = settings.first or presets()["pavilion"]
     room = Room(settings.folder)
@@ -289,9 +287,8 @@ async def _send_news(socket: WebSocket, news: asyncio.Queue[News]) -> None:
 def _message(received: Message) -> dict[str, Any]:
     """What a page sent.
 
-    Raises
-    ------
-    InputError : it is not a table as JSON, or too large.
+    Raises:
+        InputError: it is not a table as JSON, or too large.
     """
     text = received.get("text")
     if text is None:
@@ -309,9 +306,8 @@ def _message(received: Message) -> dict[str, Any]:
 def _obey(session: Session, message: dict[str, Any]) -> None:
     """Do what a page asks for.
 
-    Raises
-    ------
-    InputError : it cannot be done, or is nothing that a page asks for.
+    Raises:
+        InputError: it cannot be done, or is nothing that a page asks for.
     """
     try:
         match message:

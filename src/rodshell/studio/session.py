@@ -47,10 +47,9 @@ def _variant(kept: dict[str, Any]) -> dict[str, Any]:
 class State:
     """What is kept of a session.
 
-    Parameters
-    ----------
-    cases : in their order, for undo and redo; at : the present one.
-    variants : kept by name: their case, figures and verdict.
+    Args:
+        cases: in their order, for undo and redo; at : the present one.
+        variants: kept by name: their case, figures and verdict.
     """
 
     cases: list[dict[str, Any]] = field(default_factory=list)
@@ -65,16 +64,14 @@ class State:
 class Session:
     """A session in its folder.
 
-    Parameters
-    ----------
-    folder : of the session; made if it is missing.
-    time_limit : of a job [s].
-    room : makes room for so many bytes.
-    left : called when the process was ended since there is no page; the session can then be opened again.
+    Args:
+        folder: of the session; made if it is missing.
+        time_limit: of a job [s].
+        room: makes room for so many bytes.
+        left: called when the process was ended since there is no page; the session can then be opened again.
 
-    Raises
-    ------
-    InputError : what was kept of it is damaged.
+    Raises:
+        InputError: what was kept of it is damaged.
     """
 
     def __init__(
@@ -128,10 +125,9 @@ class Session:
     def show(self, serial: int, case: dict[str, Any], *, live: bool) -> None:
         """Find the form of a case, which may name uploaded files.
 
-        Parameters
-        ----------
-        serial : of the page's input; what is found carries it.
-        live : somebody drags; else the case becomes the present one, for undo and redo.
+        Args:
+            serial: of the page's input; what is found carries it.
+            live: somebody drags; else the case becomes the present one, for undo and redo.
         """
         if not live and case != self.state.case:
             self._record(case)
@@ -154,9 +150,8 @@ class Session:
     def keep_variant(self, name: str) -> None:
         """Keep the present case with what was found of it under a name.
 
-        Raises
-        ------
-        InputError : nothing was checked yet, the name is empty, or there are too many.
+        Raises:
+            InputError: nothing was checked yet, the name is empty, or there are too many.
         """
         if not name.strip():
             raise InputError("a variant needs a name")
@@ -236,10 +231,9 @@ def _with_names(value: Any, folder: str) -> Any:
 class Sessions:
     """All sessions of a server, by their ids.
 
-    Parameters
-    ----------
-    folder : in which each session has a folder.
-    first : the case with which a new session begins, and files that it names, by name.
+    Args:
+        folder: in which each session has a folder.
+        first: the case with which a new session begins, and files that it names, by name.
     """
 
     def __init__(
@@ -252,9 +246,8 @@ class Sessions:
     def new(self) -> str:
         """A new session's id.
 
-        Raises
-        ------
-        InputError : there is no room for it.
+        Raises:
+            InputError: there is no room for it.
         """
         name = secrets.token_urlsafe(18)
         self._room.make(2 * BLOCK + sum(map(len, self._files.values())))
@@ -280,9 +273,8 @@ class Sessions:
     def hearing(self, session: Session, heard: Heard) -> AbstractContextManager[None]:
         """Hear a session's news, as `Session.listening`.
 
-        Raises
-        ------
-        InputError : too many others have a page or a process.
+        Raises:
+            InputError: too many others have a page or a process.
         """
         others = [other for other in self._open.values() if other.listeners or other.worker.is_running]
         count = len(others) - (session in others)

@@ -21,13 +21,11 @@ _KEY = re.compile("[0-9a-f]{48}")
 def first_case(name: str) -> tuple[dict[str, Any], dict[str, bytes]]:
     """A case for the page, and the files that it names, as if they had been uploaded.
 
-    Parameters
-    ----------
-    name : a built-in case, a case file or a surface.
+    Args:
+        name: a built-in case, a case file or a surface.
 
-    Raises
-    ------
-    InputError : as of `load_case`.
+    Raises:
+        InputError: as of `load_case`.
     """
     if name in BUILT_IN:
         return presets()[name], {}
@@ -52,9 +50,8 @@ def own_folder(folder: Path) -> str:
 
     It is kept there, so that pages continue when the server is started again.
 
-    Raises
-    ------
-    OutputError : nothing can be kept there.
+    Raises:
+        OutputError: nothing can be kept there.
     """
     key = folder / "key"
     try:

@@ -43,16 +43,15 @@ MEMORY = 3_000_000_000  # bytes of a worker's data at most
 class Order:
     """What a worker is to do.
 
-    Parameters
-    ----------
-    serial : numbers the orders of a session.
-    kind : "form": find the form of a case; "files": the last form's files as a ZIP archive; "job": find the form and
-        write its folder.
-    case : tables as in a case file, in which "upload:NAME" stands for a file.
-    uploads : folder of the files that it may name; "": it may name none.
-    live : somebody drags: start from the form before, and leave refinement and checks out.
-    time_limit : of form finding [s].
-    folder : of the result of a "job".
+    Args:
+        serial: numbers the orders of a session.
+        kind: "form": find the form of a case; "files": the last form's files as a ZIP archive; "job": find the form and
+            write its folder.
+        case: tables as in a case file, in which "upload:NAME" stands for a file.
+        uploads: folder of the files that it may name; "": it may name none.
+        live: somebody drags: start from the form before, and leave refinement and checks out.
+        time_limit: of form finding [s].
+        folder: of the result of a "job".
     """
 
     serial: int
@@ -68,11 +67,10 @@ class Order:
 class News:
     """What a worker sends.
 
-    Parameters
-    ----------
-    serial : of the order; kind : "taken", "progress", "stage", "files"; at its end "done", "failed", or "left", for a
-        newer one.
-    facts : plain values for the page; content : a scene, or a file.
+    Args:
+        serial: of the order; kind : "taken", "progress", "stage", "files"; at its end "done", "failed", or "left", for
+            a newer one.
+        facts: plain values for the page; content : a scene, or a file.
     """
 
     serial: int
@@ -88,10 +86,9 @@ class _Superseded(Exception):
 def run_worker(connection: Connection, memory: int = MEMORY) -> None:
     """Obey orders until the other end of the connection is closed.
 
-    Parameters
-    ----------
-    connection : receives `Order`, sends `News`.
-    memory : bytes of data that the process may have.
+    Args:
+        connection: receives `Order`, sends `News`.
+        memory: bytes of data that the process may have.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its workers
     resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
@@ -123,9 +120,8 @@ def _import_all() -> None:
 def job_of(order: Order) -> "Job":
     """The job of an order's case, which reads no file of the server but uploads, whatever its keys are.
 
-    Raises
-    ------
-    InputError : the case names another file, or cannot be used.
+    Raises:
+        InputError: the case names another file, or cannot be used.
     """
 
     def uploaded(value: object) -> str:

@@ -35,15 +35,13 @@ class AskTell:
         """Of one objective, DE/best/1/bin: each individual has one child, the best of all moved by the difference of
         two others and crossed with the parent, which it replaces if it is better.
 
-        Parameters
-        ----------
-        lower, upper : (n,) bounds; first : (k, n) population.
-        constraints : their number; seed : of the random numbers.
-        difference : factor of the difference; crossed : share of the variables that come from the moved one.
+        Args:
+            lower, upper: (n,) bounds; first : (k, n) population.
+            constraints: their number; seed : of the random numbers.
+            difference: factor of the difference; crossed : share of the variables that come from the moved one.
 
-        Raises
-        ------
-        ImportError : pymoo is not installed.
+        Raises:
+            ImportError: pymoo is not installed.
         """
         from pymoo.algorithms.soo.nonconvex.de import DE
 
@@ -58,14 +56,12 @@ class AskTell:
     ) -> Self:
         """Of several objectives: the non-dominated sorting genetic algorithm [Deb et al. 2002].
 
-        Parameters
-        ----------
-        lower, upper : (n,) bounds; first : (k, n) population.
-        objectives, constraints : their numbers; seed : of the random numbers.
+        Args:
+            lower, upper: (n,) bounds; first : (k, n) population.
+            objectives, constraints: their numbers; seed : of the random numbers.
 
-        Raises
-        ------
-        ImportError : pymoo is not installed.
+        Raises:
+            ImportError: pymoo is not installed.
         """
         from pymoo.algorithms.moo.nsga2 import NSGA2
 
@@ -81,9 +77,8 @@ class AskTell:
     def tell(self, values: Floats, violations: Floats | None = None) -> None:
         """What was found there.
 
-        Parameters
-        ----------
-        values : (k, objectives); violations : (k, constraints), above zero where a constraint does not hold.
+        Args:
+            values: (k, objectives); violations : (k, constraints), above zero where a constraint does not hold.
         """
         self._asked.set("F", values)
         if violations is not None:

@@ -34,10 +34,9 @@ _PATHS = {f"{table}.{key}" for table, keys in FILE_KEYS.items() for key in keys}
 class Axis:
     """Values of one key, or of several that change together.
 
-    Parameters
-    ----------
-    keys : of the case, dotted; "base" for the base itself.
-    rows : values of these keys, in SI where they are numbers.
+    Args:
+        keys: of the case, dotted; "base" for the base itself.
+        rows: values of these keys, in SI where they are numbers.
     """
 
     keys: tuple[str, ...]
@@ -48,11 +47,10 @@ class Axis:
 class Span:
     """An interval of one key.
 
-    Parameters
-    ----------
-    low, high : its ends in SI: numbers, or as many numbers in a tuple.
-    whole : whether its values are whole numbers, both ends included.
-    scale : "linear", or "log" with equal ratios.
+    Args:
+        low, high: its ends in SI: numbers, or as many numbers in a tuple.
+        whole: whether its values are whole numbers, both ends included.
+        scale: "linear", or "log" with equal ratios.
     """
 
     key: str
@@ -82,17 +80,15 @@ class Span:
 def read_axes(given: Mapping[str, Any], sample: Mapping[str, Any] | None, base: Job, folder: Path) -> tuple[Axis, ...]:
     """The axes of the tables [axes] and [sample].
 
-    Parameters
-    ----------
-    given : by key, or by keys with commas: a list of values, { from, to, count, scale }, or without count what is
-        sampled.
-    sample : { method, count, seed }; None without a sample.
-    base : a job by whose case quantities are read.
-    folder : in which files lie whose paths are relative.
+    Args:
+        given: by key, or by keys with commas: a list of values, { from, to, count, scale }, or without count what is
+            sampled.
+        sample: { method, count, seed }; None without a sample.
+        base: a job by whose case quantities are read.
+        folder: in which files lie whose paths are relative.
 
-    Raises
-    ------
-    InputError : a value cannot be used, a key occurs twice, or there are too many designs.
+    Raises:
+        InputError: a value cannot be used, a key occurs twice, or there are too many designs.
     """
     axes, spans = list[Axis | None](), list[Span]()
     for name, values in flat_keys(given):
@@ -139,14 +135,12 @@ def flat_keys(given: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 def read_span(key: str, given: Mapping[str, Any], base: Job, known: Sequence[str]) -> Span:
     """The interval of a key.
 
-    Parameters
-    ----------
-    given : { from, to, scale }; known : the names that it may have.
-    base : a job by whose case quantities are read.
+    Args:
+        given: { from, to, scale }; known : the names that it may have.
+        base: a job by whose case quantities are read.
 
-    Raises
-    ------
-    InputError : an end is missing or not a number, both are the same, or zero with a logarithmic scale.
+    Raises:
+        InputError: an end is missing or not a number, both are the same, or zero with a logarithmic scale.
     """
     for name in given:
         if name not in known:
@@ -195,13 +189,11 @@ def _sampled(spans: Sequence[Span], sample: Mapping[str, Any]) -> Axis:
 def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
     """(count, dimensions) points in the unit cube [0, 1).
 
-    Parameters
-    ----------
-    method : one of `METHODS`; dimensions : of the cube; count : of points; seed : of the random numbers.
+    Args:
+        method: one of `METHODS`; dimensions : of the cube; count : of points; seed : of the random numbers.
 
-    Raises
-    ------
-    InputError : Sobol points, whose count is not a power of two.
+    Raises:
+        InputError: Sobol points, whose count is not a power of two.
     """
     if method == "sobol":
         power = (count - 1).bit_length()
@@ -217,14 +209,12 @@ def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
 def read_listed(name: str, values: object, base: Job, folder: Path) -> Axis:
     """An axis of listed values.
 
-    Parameters
-    ----------
-    name : of its key; of several keys, "a, b", whose values are rows.
-    values : the list; base, folder : as of `read_axes`.
+    Args:
+        name: of its key; of several keys, "a, b", whose values are rows.
+        values: the list; base, folder : as of `read_axes`.
 
-    Raises
-    ------
-    InputError : it is not such a list.
+    Raises:
+        InputError: it is not such a list.
     """
     keys = tuple(key.strip() for key in name.split(","))
     if not isinstance(values, list | tuple) or not values:
@@ -264,9 +254,8 @@ def _plain(base: Job, key: str, given: Any) -> Any:
 def _resolved(base: Job, key: str, given: Any) -> Any:
     """What a value becomes in the case; one number that stands for a pair stays one number.
 
-    Raises
-    ------
-    InputError : the case cannot have it.
+    Raises:
+        InputError: the case cannot have it.
     """
     _require_one_turn(key, given)
     found = _at(base.changed({key: given}).case, key)

@@ -31,10 +31,9 @@ Short = dict[str, Any]
 class Column:
     """A key of result.json.
 
-    Parameters
-    ----------
-    name : dotted, such as "bending.pop_up.utilisation".
-    counts : whether it is a list, of which the table shows the number of entries.
+    Args:
+        name: dotted, such as "bending.pop_up.utilisation".
+        counts: whether it is a list, of which the table shows the number of entries.
     """
 
     name: str
@@ -51,14 +50,12 @@ class Column:
 def read_columns(given: object, taken: Sequence[str]) -> tuple[Column, ...]:
     """The columns named in `columns`.
 
-    Parameters
-    ----------
-    given : keys of result.json, or "job".
-    taken : names of the axes' keys.
+    Args:
+        given: keys of result.json, or "job".
+        taken: names of the axes' keys.
 
-    Raises
-    ------
-    InputError : result.json has no such key, it is a table, or it is already a column.
+    Raises:
+        InputError: result.json has no such key, it is a table, or it is already a column.
     """
     if isinstance(given, str) or not isinstance(given, Sequence):
         raise InputError(f'columns = {shown(given)}: give a list of keys of result.json, such as ["net.min_angle_deg"]')
@@ -126,10 +123,9 @@ def _inside(node: Mapping[str, Any]) -> dict[str, Any]:
 def row_of(results: Results, *, verdict: Verdict | None, seconds: float) -> dict[str, Any]:
     """What is kept of a form: the standard columns, and the short content of its result.json.
 
-    Parameters
-    ----------
-    verdict : None where it was not checked.
-    seconds : processor time [s].
+    Args:
+        verdict: None where it was not checked.
+        seconds: processor time [s].
     """
     drape = results.drape
     return {

@@ -27,11 +27,10 @@ _LOOK = 0.2  # s between two calls of progress
 class Wanted:
     """A job that is wanted.
 
-    Parameters
-    ----------
-    id : its identity; job : itself.
-    archive : the folder for its files; None: they are not wanted.
-    again : whether it is run even if it is finished.
+    Args:
+        id: its identity; job : itself.
+        archive: the folder for its files; None: they are not wanted.
+        again: whether it is run even if it is finished.
     """
 
     id: str
@@ -43,11 +42,10 @@ class Wanted:
 class Computation:
     """Computes jobs and records them; see `opened_computation`.
 
-    Parameters
-    ----------
-    plan : whose settings count; store : of finished jobs; table : which shows them; engine : that runs them.
-    progress : called at least each fifth of a second.
-    retry : whether jobs that were stopped by a limit, or died, are run again.
+    Args:
+        plan: whose settings count; store : of finished jobs; table : which shows them; engine : that runs them.
+        progress: called at least each fifth of a second.
+        retry: whether jobs that were stopped by a limit, or died, are run again.
     """
 
     def __init__(
@@ -62,9 +60,8 @@ class Computation:
     def wanted(self, job: Job, *, kept: bool) -> Wanted:
         """A job as it is wanted; kept : with its result folder in archives/.
 
-        Raises
-        ------
-        InputError : a file of its case cannot be read.
+        Raises:
+            InputError: a file of its case cannot be read.
         """
         name = job_identity(job, self._plan.settings.until)
         return Wanted(name, job, self.store.inside(f"{ARCHIVES}/{name}") if kept else None)
@@ -72,15 +69,13 @@ class Computation:
     def compute(self, wanted: Iterable[Wanted], stage: str, total: int) -> None:
         """Compute those that are not finished.
 
-        Parameters
-        ----------
-        wanted : jobs, taken one by one as there is room for them; the same job may come twice.
-        stage : for the progress; total : number of jobs.
+        Args:
+            wanted: jobs, taken one by one as there is room for them; the same job may come twice.
+            stage: for the progress; total : number of jobs.
 
-        Raises
-        ------
-        KeyboardInterrupt : what is finished is recorded. OutputError : it cannot be recorded. EngineError : jobs cannot
-            be run.
+        Raises:
+            KeyboardInterrupt: what is finished is recorded. OutputError : it cannot be recorded. EngineError : jobs
+                cannot be run.
         """
         done = 0
         try:
@@ -148,15 +143,13 @@ def opened_computation(
 ) -> Iterator[Computation]:
     """A computation into a folder, in which the table shows what is finished however this is left.
 
-    Parameters
-    ----------
-    plan : of the sweep or search; folder : for it; progress, retry : as of `Computation`; address : of a
-        scheduler.
+    Args:
+        plan: of the sweep or search; folder : for it; progress, retry : as of `Computation`; address : of a
+            scheduler.
 
-    Raises
-    ------
-    InputError, EngineError : the engine cannot be used. OutputError : the folder cannot be written, is in use, or has
-        files that are not of a sweep. KeyboardInterrupt : with what is finished, in a sentence.
+    Raises:
+        InputError, EngineError: the engine cannot be used. OutputError : the folder cannot be written, is in use, or
+            has files that are not of a sweep. KeyboardInterrupt : with what is finished, in a sentence.
     """
     require_progress(progress)
     _require_own(folder)

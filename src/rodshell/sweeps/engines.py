@@ -28,10 +28,9 @@ HERE = Workers()  # of a process of dask
 class Engine:
     """Runs tasks; `full` says when to wait.
 
-    Parameters
-    ----------
-    executor : that runs them; workers : of this process; None: those of dask.
-    settings : with the limits of a job.
+    Args:
+        executor: that runs them; workers : of this process; None: those of dask.
+        settings: with the limits of a job.
     """
 
     def __init__(self, executor: Executor, workers: Workers | None, settings: Settings) -> None:
@@ -46,9 +45,8 @@ class Engine:
     def reply(self, future: "Future[Reply]") -> Reply:
         """What a task that has finished came to.
 
-        Raises
-        ------
-        EngineError : no task can be run any more. OutputError : a form cannot be saved.
+        Raises:
+            EngineError: no task can be run any more. OutputError : a form cannot be saved.
         """
         return future.result()
 
@@ -94,14 +92,12 @@ def _run_here(task: Task, time_limit: float | None, memory_limit: float | None) 
 def opened_engine(settings: Settings, address: str | None = None) -> Iterator[Engine]:
     """The engine of a sweep; when it is left, jobs that still run are stopped.
 
-    Parameters
-    ----------
-    address : of a dask scheduler, or its scheduler file, which implies that engine; None: the scheduler that dask's own
-        settings name (DASK_SCHEDULER_ADDRESS), else a local one. It can run any program here.
+    Args:
+        address: of a dask scheduler, or its scheduler file, which implies that engine; None: the scheduler that dask's
+            own settings name (DASK_SCHEDULER_ADDRESS), else a local one. It can run any program here.
 
-    Raises
-    ------
-    InputError : dask is not installed, or not reached. EngineError : no process can be started.
+    Raises:
+        InputError: dask is not installed, or not reached. EngineError : no process can be started.
     """
     with ExitStack() as stack:
         if address is not None:

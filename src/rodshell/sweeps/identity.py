@@ -24,14 +24,12 @@ DIGITS = 32
 def job_identity(job: Job, until: str) -> str:
     """32 hexadecimal digits of SHA-256.
 
-    Parameters
-    ----------
-    job : of a case that a file can describe.
-    until : the last stage that is run.
+    Args:
+        job: of a case that a file can describe.
+        until: the last stage that is run.
 
-    Raises
-    ------
-    InputError : a file of the case cannot be read.
+    Raises:
+        InputError: a file of the case cannot be read.
     """
     tables: dict[str, Any] = written(job.case)
     for table, keys in FILE_KEYS.items():

@@ -35,15 +35,14 @@ RUN = ("engine", "workers", "keep", "best", "without", "until", "time_limit", "m
 class Settings:
     """How jobs are run.
 
-    Parameters
-    ----------
-    engine : "processes" on this machine, or "dask".
-    workers : number of jobs at the same time, on this machine.
-    keep : which forms are kept as result folders.
-    best : the column whose smallest value is the best form's.
-    without : codes of findings; a form whose verdict has any of them is not the best.
-    until : the last stage of a job, see `Job.run`; with "pop-up" there is no verdict.
-    time_limit : longest time of one job [s]; memory_limit : largest memory of one job [B]; None: no limit.
+    Args:
+        engine: "processes" on this machine, or "dask".
+        workers: number of jobs at the same time, on this machine.
+        keep: which forms are kept as result folders.
+        best: the column whose smallest value is the best form's.
+        without: codes of findings; a form whose verdict has any of them is not the best.
+        until: the last stage of a job, see `Job.run`; with "pop-up" there is no verdict.
+        time_limit: longest time of one job [s]; memory_limit : largest memory of one job [B]; None: no limit.
     """
 
     engine: _EngineName = "processes"
@@ -60,12 +59,11 @@ class Settings:
 class Origin:
     """What a plan is read from.
 
-    Parameters
-    ----------
-    name : of the file, for titles and the default folder.
-    text : the file as it was given; "" for a mapping.
-    folder : in which its files lie.
-    bases : its jobs by the name that the column "base" shows, at least one.
+    Args:
+        name: of the file, for titles and the default folder.
+        text: the file as it was given; "" for a mapping.
+        folder: in which its files lie.
+        bases: its jobs by the name that the column "base" shows, at least one.
     """
 
     name: str
@@ -95,11 +93,10 @@ class Origin:
 class Plan:
     """What the plan of a sweep and that of a search have in common.
 
-    Parameters
-    ----------
-    origin : what it was read from.
-    keys : by whose values a design is known: of the case, or "base", or "generation".
-    columns : in addition to those of every table.
+    Args:
+        origin: what it was read from.
+        keys: by whose values a design is known: of the case, or "base", or "generation".
+        columns: in addition to those of every table.
     """
 
     origin: Origin
@@ -110,9 +107,8 @@ class Plan:
     def job(self, values: Sequence[Any]) -> Job:
         """The job of a design, by the values of its keys.
 
-        Raises
-        ------
-        InputError : no case can have them together.
+        Raises:
+            InputError: no case can have them together.
         """
         base, changes = self._changes(values)
         return self.origin.bases[base].changed(changes) if changes else self.origin.bases[base]
@@ -141,9 +137,8 @@ class Plan:
 class SweepPlan(Plan):
     """A whole sweep.
 
-    Parameters
-    ----------
-    axes : the first one changes slowest.
+    Args:
+        axes: the first one changes slowest.
     """
 
     axes: tuple[Axis, ...]
@@ -156,9 +151,8 @@ class SweepPlan(Plan):
     def designs(self) -> Iterator[tuple[tuple[Any, ...], Job]]:
         """Values of the keys, and the job, of each design in the order of the axes, made one by one.
 
-        Raises
-        ------
-        InputError : a case cannot have these values.
+        Raises:
+            InputError: a case cannot have these values.
         """
         for rows in product(*(axis.rows for axis in self.axes)):
             values = tuple(value for row in rows for value in row)
@@ -168,13 +162,11 @@ class SweepPlan(Plan):
 def read_plan(source: Source) -> SweepPlan:
     """The plan of a sweep.
 
-    Parameters
-    ----------
-    source : path of a TOML file, or its content as a mapping.
+    Args:
+        source: path of a TOML file, or its content as a mapping.
 
-    Raises
-    ------
-    InputError : it cannot be read or used; in one sentence.
+    Raises:
+        InputError: it cannot be read or used; in one sentence.
     """
     origin = read_origin(source, TABLES)
     given = origin.tables
@@ -193,13 +185,11 @@ def read_plan(source: Source) -> SweepPlan:
 def read_origin(source: Source, tables: Sequence[str]) -> Origin:
     """What a plan is read from.
 
-    Parameters
-    ----------
-    source : as of `read_plan`; tables : that the file may have.
+    Args:
+        source: as of `read_plan`; tables : that the file may have.
 
-    Raises
-    ------
-    InputError : it cannot be read, has an unknown key, or its base cannot be used.
+    Raises:
+        InputError: it cannot be read, has an unknown key, or its base cannot be used.
     """
     name, text, folder, given = _opened(source)
     known("", given, tables)
@@ -242,13 +232,11 @@ def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:
 def read_settings(given: Mapping[str, Any], columns: Sequence[str]) -> Settings:
     """The table [run].
 
-    Parameters
-    ----------
-    given : the table; columns : names of columns in addition to those of every sweep.
+    Args:
+        given: the table; columns : names of columns in addition to those of every sweep.
 
-    Raises
-    ------
-    InputError : an unknown key, or a value that cannot be used.
+    Raises:
+        InputError: an unknown key, or a value that cannot be used.
     """
     if "address" in given:
         raise InputError(
@@ -299,9 +287,8 @@ def table(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 def known(name: str, given: Mapping[str, Any], names: Sequence[str]) -> None:
     """InputError for a key that a table does not have.
 
-    Parameters
-    ----------
-    name : of the table, "" for the whole file; given : the table; names : of the keys that it has.
+    Args:
+        name: of the table, "" for the whole file; given : the table; names : of the keys that it has.
     """
     for key in given:
         if key not in names:

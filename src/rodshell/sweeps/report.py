@@ -27,14 +27,13 @@ SHAPES = 12  # pictures at most
 class Page:
     """What a report says.
 
-    Parameters
-    ----------
-    kind : of the plan, in its heading; plan : whose designs are shown; summary : lines in its heading.
-    first : the two columns that are shown first, across and up.
-    measures : columns that say how good a design is; of two the front is shown.
-    larger : those of them that are to be large, and not small.
-    counts : whether a design may be on the front.
-    shapes : jobs whose shapes are shown, kept in archives/; caption : what they are, in a sentence.
+    Args:
+        kind: of the plan, in its heading; plan : whose designs are shown; summary : lines in its heading.
+        first: the two columns that are shown first, across and up.
+        measures: columns that say how good a design is; of two the front is shown.
+        larger: those of them that are to be large, and not small.
+        counts: whether a design may be on the front.
+        shapes: jobs whose shapes are shown, kept in archives/; caption : what they are, in a sentence.
     """
 
     kind: str
@@ -59,13 +58,11 @@ def require_plotly() -> None:
 def write_report(store: Store, page: Page) -> Path:
     """Write report.html; returns its path.
 
-    Parameters
-    ----------
-    store : of the sweep, whose designs it shows; page : what it says.
+    Args:
+        store: of the sweep, whose designs it shows; page : what it says.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises:
+        OutputError: it cannot be written.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup

@@ -25,13 +25,12 @@ _BEST = "best"
 class Swept:
     """What a sweep has come to.
 
-    Parameters
-    ----------
-    folder : of the sweep; None: nothing was written.
-    designs : their number; computed : jobs that were computed now.
-    verdicts : number of designs by verdict, "not checked" and "no form" among them.
-    not_converged : number of forms that did not converge.
-    failures : sentences of designs without a form, with their number, the most frequent first.
+    Args:
+        folder: of the sweep; None: nothing was written.
+        designs: their number; computed : jobs that were computed now.
+        verdicts: number of designs by verdict, "not checked" and "no form" among them.
+        not_converged: number of forms that did not converge.
+        failures: sentences of designs without a form, with their number, the most frequent first.
     """
 
     folder: Path | None
@@ -74,25 +73,22 @@ def sweep(
 ) -> Swept:
     """Compute all designs of a sweep that are not finished yet, and write their table.
 
-    Parameters
-    ----------
-    source : path of a sweep file, or its content as a mapping: {"base": "hemisphere", "axes": {"layout.spacing":
-        ["25 mm", "30 mm"]}}. A base may also be a `Job`.
-    out : folder of the sweep. What an earlier run has finished there is not computed again.
-    retry : run jobs again that were stopped by a limit, or whose process died.
-    report : also write report.html, and keep the results of the best designs, whose shapes it shows.
-    address : of a dask scheduler that you trust, or its scheduler file; default: as `opened_engine` says.
-    progress : called as progress(stage, detail, 0.0).
+    Args:
+        source: path of a sweep file, or its content as a mapping: {"base": "hemisphere", "axes": {"layout.spacing":
+            ["25 mm", "30 mm"]}}. A base may also be a `Job`.
+        out: folder of the sweep. What an earlier run has finished there is not computed again.
+        retry: run jobs again that were stopped by a limit, or whose process died.
+        report: also write report.html, and keep the results of the best designs, whose shapes it shows.
+        address: of a dask scheduler that you trust, or its scheduler file; default: as `opened_engine` says.
+        progress: called as progress(stage, detail, 0.0).
 
-    Returns
-    -------
-    What was found, in numbers; the table is table.csv in the folder, see also `read_sweep`.
+    Returns:
+        What was found, in numbers; the table is table.csv in the folder, see also `read_sweep`.
 
-    Raises
-    ------
-    InputError : the sweep, or the case of one of its designs, cannot be used; nothing was computed. OutputError : the
-        folder cannot be written, or another sweep is writing there. KeyboardInterrupt : the table shows what is
-        finished; the same call continues.
+    Raises:
+        InputError: the sweep, or the case of one of its designs, cannot be used; nothing was computed. OutputError :
+            the folder cannot be written, or another sweep is writing there. KeyboardInterrupt : the table shows what is
+            finished; the same call continues.
     """
     plan = source if isinstance(source, SweepPlan) else read_plan(source)
     folder = file_path("out", out)
@@ -117,9 +113,8 @@ def sweep(
 def _check_designs(plan: SweepPlan) -> None:
     """Make the case of each design, one by one.
 
-    Raises
-    ------
-    InputError : a case cannot have its values.
+    Raises:
+        InputError: a case cannot have its values.
     """
     for _ in plan.designs():
         pass
@@ -128,9 +123,8 @@ def _check_designs(plan: SweepPlan) -> None:
 def planned(plan: SweepPlan, out: str | PathLike[str]) -> tuple[int, int]:
     """Number of different jobs of a sweep, and of those that are finished in a folder already; nothing is written.
 
-    Parameters
-    ----------
-    plan : of the sweep; out : its folder, which may be missing.
+    Args:
+        plan: of the sweep; out : its folder, which may be missing.
     """
     jobs = {job_identity(job, plan.settings.until) for _, job in plan.designs()}
     folder = file_path("out", out)

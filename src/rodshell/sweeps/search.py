@@ -36,12 +36,11 @@ DIFFERENCE, CROSSED = 0.6, 0.9
 class Optimised:
     """What a search has come to.
 
-    Parameters
-    ----------
-    designs : their number; computed : jobs that were computed now.
-    feasible : number of designs that converged and keep all constraints.
-    front : of those, the ones that no other is better than in all objectives, the smallest first objective first: by
-        name the values of the variables' keys, objectives, verdict, further columns, and the job.
+    Args:
+        designs: their number; computed : jobs that were computed now.
+        feasible: number of designs that converged and keep all constraints.
+        front: of those, the ones that no other is better than in all objectives, the smallest first objective first: by
+            name the values of the variables' keys, objectives, verdict, further columns, and the job.
     """
 
     folder: Path
@@ -81,23 +80,20 @@ def optimise(
 
     With one objective by differential evolution, with several by NSGA-II, both of pymoo.
 
-    Parameters
-    ----------
-    source : path of a search file, or its content as a mapping, see docs/sweeps.md.
-    out : folder of the search. What an earlier run has finished there is not computed again.
-    retry : run jobs again that were stopped by a limit, or whose process died.
-    report : also write report.html, and keep the results of up to twelve designs of the front.
-    address : as of `sweep`.
-    progress : called as progress(stage, detail, 0.0).
+    Args:
+        source: path of a search file, or its content as a mapping, see docs/sweeps.md.
+        out: folder of the search. What an earlier run has finished there is not computed again.
+        retry: run jobs again that were stopped by a limit, or whose process died.
+        report: also write report.html, and keep the results of up to twelve designs of the front.
+        address: as of `sweep`.
+        progress: called as progress(stage, detail, 0.0).
 
-    Returns
-    -------
-    The best designs, also in front.csv; all are in table.csv, see `read_sweep`.
+    Returns:
+        The best designs, also in front.csv; all are in table.csv, see `read_sweep`.
 
-    Raises
-    ------
-    InputError : the search cannot be used, or pymoo is not installed. OutputError : the folder cannot be written, or is
-        in use. KeyboardInterrupt : the same call continues.
+    Raises:
+        InputError: the search cannot be used, or pymoo is not installed. OutputError : the folder cannot be written, or
+            is in use. KeyboardInterrupt : the same call continues.
     """
     plan = source if isinstance(source, SearchPlan) else read_search(source)
     folder = file_path("out", out)
@@ -194,9 +190,8 @@ def front_of(plan: SearchPlan, store: Store) -> tuple[list[Finished], int]:
 
     Of designs that are as good in every objective, the first is taken.
 
-    Parameters
-    ----------
-    plan : of the search; store : with its designs.
+    Args:
+        plan: of the search; store : with its designs.
     """
     kept = [
         (_judged(plan, design.outcome, design.row)[0], design)

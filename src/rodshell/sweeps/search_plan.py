@@ -34,11 +34,10 @@ class Objective:
 class Constraint:
     """What a column must be.
 
-    Parameters
-    ----------
-    low, high : bounds of a number; None: there is none.
-    words : that it may be, in place of bounds.
-    without : codes of which the column "findings" may have none.
+    Args:
+        low, high: bounds of a number; None: there is none.
+        words: that it may be, in place of bounds.
+        without: codes of which the column "findings" may have none.
     """
 
     column: str
@@ -70,10 +69,9 @@ def _keys_of(variable: Span | Axis) -> tuple[str, ...]:
 class SearchPlan(Plan):
     """A whole search; its keys are "generation" and those of its variables.
 
-    Parameters
-    ----------
-    variables : intervals, or lists of values.
-    objectives, constraints : on columns of the table.
+    Args:
+        variables: intervals, or lists of values.
+        objectives, constraints: on columns of the table.
     """
 
     variables: tuple[Span | Axis, ...]

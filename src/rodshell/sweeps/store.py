@@ -50,12 +50,12 @@ REMEDY = "move it to compute all designs again, or choose another folder"
 class Finished:
     """A design whose job is finished.
 
-    Parameters
-    ----------
-    position : of the design; job : its identity.
-    keys : values of the axes' keys, in JSON's types.
-    outcome : "found", "refused" (bad input), "failed" (an error of the program), "stopped" (by a limit) or "crashed".
-    row : what is kept of it, see `columns.row_of`; of a job that found no form its status alone.
+    Args:
+        position: of the design; job : its identity.
+        keys: values of the axes' keys, in JSON's types.
+        outcome: "found", "refused" (bad input), "failed" (an error of the program), "stopped" (by a limit) or
+            "crashed".
+        row: what is kept of it, see `columns.row_of`; of a job that found no form its status alone.
     """
 
     position: int
@@ -68,13 +68,11 @@ class Finished:
 class Store:
     """The file of a sweep; use it in a `with`.
 
-    Parameters
-    ----------
-    writing : whether jobs are recorded; then the folder is made, and no other sweep can use it.
+    Args:
+        writing: whether jobs are recorded; then the folder is made, and no other sweep can use it.
 
-    Raises
-    ------
-    OutputError : it cannot be opened, or another sweep is writing there.
+    Raises:
+        OutputError: it cannot be opened, or another sweep is writing there.
     """
 
     def __init__(self, folder: Path, *, writing: bool) -> None:
@@ -163,9 +161,8 @@ class Store:
     def inside(self, name: str) -> Path:
         """A path in the folder.
 
-        Raises
-        ------
-        OutputError : it leads outside by a link.
+        Raises:
+            OutputError: it leads outside by a link.
         """
         path = self.folder / name
         if not path.resolve().is_relative_to(self.folder.resolve()):
@@ -190,10 +187,9 @@ class Store:
     def plan(self, designs: Iterable[tuple[Sequence[Any], str]], *, notes: Mapping[str, str] | None = None) -> None:
         """Write the designs of the sweep in place of earlier ones, all or none.
 
-        Parameters
-        ----------
-        designs : values of the keys, and the identity of the job.
-        notes : by name, to be noted with them.
+        Args:
+            designs: values of the keys, and the identity of the job.
+            notes: by name, to be noted with them.
         """
         self._write(designs, notes or {}, more=False)
 
@@ -254,13 +250,11 @@ class Store:
     def record(self, job: str, outcome: str, row: Mapping[str, Any]) -> None:
         """A job is finished.
 
-        Parameters
-        ----------
-        job : its identity; outcome, row : see `Finished`.
+        Args:
+            job: its identity; outcome, row : see `Finished`.
 
-        Raises
-        ------
-        OutputError : it cannot be written.
+        Raises:
+            OutputError: it cannot be written.
         """
         try:
             content = json.dumps(row, separators=(",", ":"), allow_nan=False)
@@ -295,9 +289,8 @@ def _require_plain(path: Path, *, most: int | None = None) -> None:
 def read_json(text: str | bytes, kind: type) -> Any:
     """Content of a store.
 
-    Raises
-    ------
-    ValueError : it is not JSON of this kind; a number is not finite, or a text has half of a character.
+    Raises:
+        ValueError: it is not JSON of this kind; a number is not finite, or a text has half of a character.
     """
     text = text if isinstance(text, str) else text.decode()
     found = json.loads(text, parse_float=_finite, parse_constant=_finite, parse_int=_whole)
@@ -340,9 +333,8 @@ def _read_row(packed: bytes) -> dict[str, Any]:
 def replaced(file: Path) -> Iterator[Path]:
     """A path to write to, which then takes the place of a file of the sweep in one step.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises:
+        OutputError: it cannot be written.
     """
     part = file.with_name(f".{file.name}.part")
     try:

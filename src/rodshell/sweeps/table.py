@@ -38,9 +38,8 @@ def header_of(store: Store) -> tuple[list[str], list[Column]]:
 def header_notes(keys: Sequence[str], columns: Sequence[Column]) -> dict[str, str]:
     """What the table's columns are, to be noted with the designs.
 
-    Parameters
-    ----------
-    keys : of the designs; columns : in addition to those of every sweep.
+    Args:
+        keys: of the designs; columns : in addition to those of every sweep.
     """
     return {HEADER: json.dumps({"keys": list(keys), "columns": [column.name for column in columns]})}
 
@@ -53,9 +52,8 @@ def names_of(keys: Sequence[str], columns: Sequence[Column]) -> list[str]:
 def table_rows(store: Store, columns: Sequence[Column]) -> Iterator[list[Any]]:
     """The rows of the finished designs, one by one: the axes' keys, the standard columns, and `columns`.
 
-    Parameters
-    ----------
-    store : of the sweep; columns : in addition to those of every sweep.
+    Args:
+        store: of the sweep; columns : in addition to those of every sweep.
     """
     keys = header_of(store)[0]
     for design in store.finished():
@@ -85,9 +83,8 @@ class Table:
     def write(self) -> None:
         """Write it now.
 
-        Raises
-        ------
-        OutputError : it cannot be written.
+        Raises:
+            OutputError: it cannot be written.
         """
         keys, columns = header_of(self._store)
         names = names_of(keys, columns)
@@ -97,13 +94,11 @@ class Table:
 def write_csv(file: Path, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     """Write a table.
 
-    Parameters
-    ----------
-    file : which is replaced; names : of the columns; rows : of plain values.
+    Args:
+        file: which is replaced; names : of the columns; rows : of plain values.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises:
+        OutputError: it cannot be written.
     """
     with replaced(file) as part, part.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
@@ -133,18 +128,15 @@ def in_short(value: Any) -> str:
 def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pyarrow.Table":
     """The table of a sweep, also of one that still runs; `.to_pandas()`, or `polars.from_arrow` of it.
 
-    Parameters
-    ----------
-    columns : further keys of result.json; nothing is computed again for them.
+    Args:
+        columns: further keys of result.json; nothing is computed again for them.
 
-    Returns
-    -------
-    A row for each finished design: the axes' keys, the columns of every sweep, those that it names, and `columns`.
-    Numbers are in SI, what is not known is null, lists and tables are JSON.
+    Returns:
+        A row for each finished design: the axes' keys, the columns of every sweep, those that it names, and `columns`.
+        Numbers are in SI, what is not known is null, lists and tables are JSON.
 
-    Raises
-    ------
-    InputError : pyarrow is not installed, or result.json has no such key. OutputError : there is no sweep.
+    Raises:
+        InputError: pyarrow is not installed, or result.json has no such key. OutputError : there is no sweep.
     """
     with Store(file_path("folder", folder), writing=False) as store:
         keys, columns_of_sweep = header_of(store)
@@ -156,13 +148,11 @@ def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pya
 def _arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Table":
     """Rows as an Arrow table.
 
-    Parameters
-    ----------
-    names : of the columns; rows : of plain values.
+    Args:
+        names: of the columns; rows : of plain values.
 
-    Raises
-    ------
-    InputError : pyarrow is not installed.
+    Raises:
+        InputError: pyarrow is not installed.
     """
     try:
         import pyarrow
@@ -188,9 +178,8 @@ def _alike(values: list[Any]) -> list[Any]:
 def write_parquet(store: Store) -> None:
     """Write table.parquet, if pyarrow is installed.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises:
+        OutputError: it cannot be written.
     """
     with suppress(ImportError):
         import pyarrow.parquet

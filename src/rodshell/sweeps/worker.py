@@ -53,10 +53,9 @@ def _load_kernels() -> None:
 def reply_to(task: dict[str, Any]) -> dict[str, Any]:
     """Run a job: {"outcome", "row"}; {"mismatch"} in a process of another version; {"unwritten"} for a form not saved.
 
-    Parameters
-    ----------
-    task : "case", its text; "until", the last stage; "archive", the folder for its files, or None; "version", of the
-        coordinator.
+    Args:
+        task: "case", its text; "until", the last stage; "archive", the folder for its files, or None; "version", of the
+            coordinator.
     """
     if task["version"] != program_version():
         return {"mismatch": program_version()}

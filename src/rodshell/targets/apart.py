@@ -36,15 +36,13 @@ numpy.savez(sys.argv[3], **found)
 def read_apart(reader: Path, path: Path, data: bytes, format: str, **request: object) -> dict[str, Any]:
     """What a reader finds in a file.
 
-    Parameters
-    ----------
-    path : of the file, for messages.
-    format : as it is called in messages.
-    request : further values for the reader.
+    Args:
+        path: of the file, for messages.
+        format: as it is called in messages.
+        request: further values for the reader.
 
-    Raises
-    ------
-    InputError : the reader fails, or needs too long.
+    Raises:
+        InputError: the reader fails, or needs too long.
     """
     import numpy as np
 

@@ -27,11 +27,10 @@ DENSE = 0.04  # of the size: distance of the points by which the patches are fou
 class Creased(Freeform):
     """A mesh whose creases lie on seams; make one with `cut_at`.
 
-    Parameters
-    ----------
-    uncut : the target of the same mesh.
-    drawn, seams : the lines as they are given, and where they cut: along creases that are near.
-    pieces : by the sides of the seams on which they are, see `Patch`.
+    Args:
+        uncut: the target of the same mesh.
+        drawn, seams: the lines as they are given, and where they cut: along creases that are near.
+        pieces: by the sides of the seams on which they are, see `Patch`.
     """
 
     uncut: Freeform
@@ -158,15 +157,14 @@ class Creased(Freeform):
 def cut_at(target: Target, seams: Sequence[Seam], progress: Progress = silent) -> Target:
     """A target as seams cut it: where a mesh is creased along them, in smooth pieces that meet there.
 
-    Parameters
-    ----------
-    target : of any kind; one that was cut before is cut again.
-    seams : lines in plan; the creases near them are taken.
-    progress : called at each step of the fit of each piece.
+    Args:
+        target: of any kind; one that was cut before is cut again.
+        seams: lines in plan; the creases near them are taken.
+        progress: called at each step of the fit of each piece.
 
-    Raises
-    ------
-    InputError : the mesh is creased where there is no seam, or a piece between them is not smooth; names lines that do.
+    Raises:
+        InputError: the mesh is creased where there is no seam, or a piece between them is not smooth; names lines that
+            do.
     """
     drawn = tuple(seams)
     if isinstance(target, Creased):

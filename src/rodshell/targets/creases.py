@@ -42,10 +42,9 @@ ON_SEAM = 1e-4  # vertices closer to a seam are on it
 class Creases:
     """The creases of a mesh that are seen from above.
 
-    Parameters
-    ----------
-    mesh : with all faces oriented alike.
-    name : of the mesh, for messages.
+    Args:
+        mesh: with all faces oriented alike.
+        name: of the mesh, for messages.
     """
 
     def __init__(self, mesh: TriangleMesh, name: str) -> None:
@@ -113,10 +112,9 @@ class Creases:
 
         A face that a seam crosses is in both parts where the mesh is smooth; in neither where it bridges a crease.
 
-        Parameters
-        ----------
-        seams : the lines at which it is cut.
-        bridged : which of them run along creases that faces bridge.
+        Args:
+            seams: the lines at which it is cut.
+            bridged: which of them run along creases that faces bridge.
         """
         within = dict[tuple[int, int], Bools]()
         for k, (seam, bridge) in enumerate(zip(seams, bridged, strict=True)):

@@ -22,17 +22,14 @@ _SAG = 2e-5  # of a curve's extent: how finely arcs and splines of a DXF are div
 def read_curves(path: Path, unit: float) -> list[Floats]:
     """Read closed curves from an OBJ, DXF or 3dm file.
 
-    Parameters
-    ----------
-    unit : length of the file's unit [m]; a 3dm file that states its own is read in that.
+    Args:
+        unit: length of the file's unit [m]; a 3dm file that states its own is read in that.
 
-    Returns
-    -------
-    Closed polylines (n, 3) [m], the longest first: the edge of the shell, then its openings.
+    Returns:
+        Closed polylines (n, 3) [m], the longest first: the edge of the shell, then its openings.
 
-    Raises
-    ------
-    InputError : the file is missing or damaged, or has no closed curve.
+    Raises:
+        InputError: the file is missing or damaged, or has no closed curve.
     """
     loops = closed_loops(_strokes(path, unit))
     if not loops or not all(np.isfinite(loop).all() for loop in loops):
@@ -43,17 +40,14 @@ def read_curves(path: Path, unit: float) -> list[Floats]:
 def read_lines(path: Path, unit: float) -> list[Floats]:
     """Read open and closed curves from an OBJ, DXF or 3dm file; those that touch end to end are joined.
 
-    Parameters
-    ----------
-    unit : length of the file's unit [m]; a 3dm file that states its own is read in that.
+    Args:
+        unit: length of the file's unit [m]; a 3dm file that states its own is read in that.
 
-    Returns
-    -------
-    Polylines (n, 3) [m].
+    Returns:
+        Polylines (n, 3) [m].
 
-    Raises
-    ------
-    InputError : the file is missing or damaged, or has no curve.
+    Raises:
+        InputError: the file is missing or damaged, or has no curve.
     """
     lines = join_end_to_end(_strokes(path, unit))
     if not lines or not all(np.isfinite(line).all() for line in lines):

@@ -31,15 +31,13 @@ def along_creases(points: Floats, triangles: Ints, face: Ints) -> Ints:
     Levin and Rippa 1990]. The other diagonal is taken where it leaves clearly less, and most of that at itself. Finely
     meshed smooth surfaces turn too little to change.
 
-    Parameters
-    ----------
-    points : (n, 3).
-    triangles : (t, 3), oriented alike within each face.
-    face : (t,) of which each triangle is a part.
+    Args:
+        points: (n, 3).
+        triangles: (t, 3), oriented alike within each face.
+        face: (t,) of which each triangle is a part.
 
-    Returns
-    -------
-    (t, 3) the triangles in the order of their faces.
+    Returns:
+        (t, 3) the triangles in the order of their faces.
     """
     if not (np.diff(np.sort(face)) == 0).any():
         return triangles

@@ -13,15 +13,13 @@ KINDS = "LINE LWPOLYLINE POLYLINE ARC CIRCLE ELLIPSE SPLINE"
 def main(request: dict[str, Any]) -> dict[str, Any]:
     """The curves of a drawing as polylines.
 
-    Parameters
-    ----------
-    request : `path`; `sag`, of a curve's extent, how finely arcs and splines are divided; `most`, curves; and
-        `farthest`, coordinate in the unit of the drawing.
+    Args:
+        request: `path`; `sag`, of a curve's extent, how finely arcs and splines are divided; `most`, curves; and
+            `farthest`, coordinate in the unit of the drawing.
 
-    Returns
-    -------
-    `count` of the curves; if it is not above `most`, `far`, the largest coordinate; if that is not beyond `farthest`,
-    `points` (n, 3) of all polylines, and `ends`, where each of them ends, the first being empty.
+    Returns:
+        `count` of the curves; if it is not above `most`, `far`, the largest coordinate; if that is not beyond
+        `farthest`, `points` (n, 3) of all polylines, and `ends`, where each of them ends, the first being empty.
     """
     found = ezdxf.readfile(request["path"]).modelspace().query(KINDS)
     if len(found) > request["most"]:

@@ -47,11 +47,10 @@ def cubic_spacing(area: float, count: int) -> float:
 class Fit:
     """A smooth field that was fitted to a mesh.
 
-    Parameters
-    ----------
-    cubics : those of it that are on the surface (or fill an opening), which come first.
-    off : (n,) distance of each vertex of the mesh [m]; infinite where the field points elsewhere, or another sheet
-        crosses.
+    Args:
+        cubics: those of it that are on the surface (or fill an opening), which come first.
+        off: (n,) distance of each vertex of the mesh [m]; infinite where the field points elsewhere, or another sheet
+            crosses.
     """
 
     field: SmoothField
@@ -66,10 +65,9 @@ def fit_mesh(mesh: TriangleMesh, *, size: float, progress: Progress = silent) ->
     time, up to one for each vertex, as long as that helps: not where the mesh is rough, as no smooth surface follows
     noise. A mesh that is still not followed, such as one that is fine only where it curves, gets up to `MOST`.
 
-    Parameters
-    ----------
-    size : half of its largest extent [m].
-    progress : called at each step of each fit.
+    Args:
+        size: half of its largest extent [m].
+        progress: called at each step of each fit.
     """
     area, count = float(mesh.areas.sum()), len(mesh.vertices)
     spacing = cubic_spacing(area, count)
@@ -118,16 +116,14 @@ def fit_field(
 ) -> tuple[SmoothField, int]:
     """Fit a smooth field to samples of a surface, by weighted least squares.
 
-    Parameters
-    ----------
-    spacing : distance between cubics [m], see `cubic_spacing`.
-    past : how far the field is continued past an open rim [m].
-    reach : distance from the cubics up to which the field is defined [m].
-    each_ring : called before each ring of cubics past the rim.
+    Args:
+        spacing: distance between cubics [m], see `cubic_spacing`.
+        past: how far the field is continued past an open rim [m].
+        reach: distance from the cubics up to which the field is defined [m].
+        each_ring: called before each ring of cubics past the rim.
 
-    Returns
-    -------
-    The field; and the number of its cubics that are on the surface (or fill an opening), which come first.
+    Returns:
+        The field; and the number of its cubics that are on the surface (or fill an opening), which come first.
     """
     points = CellList.of(samples.points, spacing)
     chosen = points.spread(spacing)

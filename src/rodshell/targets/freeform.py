@@ -42,16 +42,15 @@ class Freeform(Target):
 
     Two such targets are equal only if they are the same object.
 
-    Parameters
-    ----------
-    surface : one smooth piece, facing up.
-    base : z of a plane below which there is no shell [m], or None.
-    curves : closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
-    source : kind, file and options, as they are written in a case file.
-    repairs : what was changed in the mesh, in sentences.
-    whole : the mesh with what is beyond its creases; None: it has none.
-    creased : what is said of its creases.
-    usable : False: the whole is not a smooth surface, and must be cut along its creases by seams.
+    Args:
+        surface: one smooth piece, facing up.
+        base: z of a plane below which there is no shell [m], or None.
+        curves: closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
+        source: kind, file and options, as they are written in a case file.
+        repairs: what was changed in the mesh, in sentences.
+        whole: the mesh with what is beyond its creases; None: it has none.
+        creased: what is said of its creases.
+        usable: False: the whole is not a smooth surface, and must be cut along its creases by seams.
     """
 
     surface: TriangleMesh
@@ -77,21 +76,19 @@ class Freeform(Target):
     ) -> "Freeform":
         """Make a target of a mesh; the shell ends at the mesh's open boundary, at curves and at a base plane.
 
-        Parameters
-        ----------
-        vertices : (n, 3) [m].
-        faces : (m, 3) indices of the vertices of each triangle.
-        base : z of a plane below which there is no shell [m], or None.
-        curves : closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
-        source : kind, file and options, as they are written in a case file.
-        name : of the mesh, for messages.
-        notes : what was changed in the mesh before, in sentences.
-        progress : called at each step of the fit.
+        Args:
+            vertices: (n, 3) [m].
+            faces: (m, 3) indices of the vertices of each triangle.
+            base: z of a plane below which there is no shell [m], or None.
+            curves: closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
+            source: kind, file and options, as they are written in a case file.
+            name: of the mesh, for messages.
+            notes: what was changed in the mesh before, in sentences.
+            progress: called at each step of the fit.
 
-        Raises
-        ------
-        InputError : an argument is of the wrong kind; the mesh is not a smooth surface; or it is closed, and neither a
-            base nor a curve says where the shell ends.
+        Raises:
+            InputError: an argument is of the wrong kind; the mesh is not a smooth surface; or it is closed, and neither
+                a base nor a curve says where the shell ends.
         """
         require_progress(progress)
         vertices = array("vertices", vertices, np.float64, None, 3)
@@ -137,9 +134,8 @@ class Freeform(Target):
     def require_usable(self) -> None:
         """Refuse a mesh that no seams cut along its creases, where it is smooth nowhere else.
 
-        Raises
-        ------
-        InputError : names seams that would.
+        Raises:
+            InputError: names seams that would.
         """
         if not self.usable:
             raise InputError(self.creased + self.along_creases)

@@ -57,19 +57,16 @@ HALVINGS = 12
 def read_heights(path: Path, size: tuple[float, float], height: float | None) -> tuple[Floats, Ints, tuple[str, ...]]:
     """Read heights on a lattice and mesh them; empty cells and "nan" are holes.
 
-    Parameters
-    ----------
-    path : a file of one of the kinds in `GRID_FILES`.
-    size : width along x and depth along y [m]; the file's first row is at the largest y, depth / 2.
-    height : of a table the factor of its numbers; of an image the height of white, black being 0 [m]; None for 1.
+    Args:
+        path: a file of one of the kinds in `GRID_FILES`.
+        size: width along x and depth along y [m]; the file's first row is at the largest y, depth / 2.
+        height: of a table the factor of its numbers; of an image the height of white, black being 0 [m]; None for 1.
 
-    Returns
-    -------
-    Vertices (n, 3), centred on the origin [m], triangles (m, 3), and notes for the user, in sentences.
+    Returns:
+        Vertices (n, 3), centred on the origin [m], triangles (m, 3), and notes for the user, in sentences.
 
-    Raises
-    ------
-    InputError : the file is missing or damaged, or its numbers are not a lattice.
+    Raises:
+        InputError: the file is missing or damaged, or its numbers are not a lattice.
     """
     height = 1.0 if height is None else height
     notes: tuple[str, ...] = ()
@@ -100,18 +97,15 @@ def read_table(path: Path, size: tuple[float, float]) -> tuple[Floats, Floats, F
     Cells are separated by semicolons, tabs, commas or blanks; unless by commas, a comma is a decimal point. Empty cells
     are holes; between blanks, which leave no cell empty, "nan" is one.
 
-    Parameters
-    ----------
-    size : width and depth [m]. Rows of heights are at equal steps within it, the largest y first; points keep their
-        proportions and are scaled to it.
+    Args:
+        size: width and depth [m]. Rows of heights are at equal steps within it, the largest y first; points keep their
+            proportions and are scaled to it.
 
-    Returns
-    -------
-    Heights (rows, columns) in the file's unit, x of the columns and y of the rows, centred on the origin [m].
+    Returns:
+        Heights (rows, columns) in the file's unit, x of the columns and y of the rows, centred on the origin [m].
 
-    Raises
-    ------
-    InputError : the file is missing, is not a table of numbers, or its points are not a lattice.
+    Raises:
+        InputError: the file is missing, is not a table of numbers, or its points are not a lattice.
     """
     table = _numbers(path, _cells(path))
     if np.isinf(table).any():
@@ -207,13 +201,12 @@ def _is_coordinates(table: Floats) -> bool:
 def read_image(path: Path) -> tuple[Floats, float | None]:
     """Read a grey image as heights; where it has few grey levels, its terraces are smoothed away within one level.
 
-    Returns
-    -------
-    Heights (rows, columns), black being 0 and white 1; and the step between grey levels where that is coarse, or None.
+    Returns:
+        Heights (rows, columns), black being 0 and white 1; and the step between grey levels where that is coarse, or
+        None.
 
-    Raises
-    ------
-    InputError : the file is missing or damaged, or has too many pixels (found before they are decoded).
+    Raises:
+        InputError: the file is missing or damaged, or has too many pixels (found before they are decoded).
     """
     from PIL import Image
 
@@ -245,9 +238,8 @@ def smoothed(grey: Floats, step: float) -> Floats:
     A smoothing spline along both axes [Eilers and Marx 1996], which keeps planes. Its weight is the largest that
     changes heights by the rms error of rounding, and none by more than a step.
 
-    Parameters
-    ----------
-    grey : (n, m) heights, in multiples of `step`.
+    Args:
+        grey: (n, m) heights, in multiples of `step`.
     """
     low, high = -3.0, 8.0  # powers of ten; at the largest a bend of a hundred pixels is still followed
     best = grey
@@ -280,16 +272,14 @@ def _splined(values: Floats, weight: float) -> Floats:
 class Placement:
     """Where the surface of a file is placed: x -> scale turn(x) + move.
 
-    Parameters
-    ----------
-    up : axis of the file that points upwards, which becomes z before anything else; None: y of glTF, as its standard
-        says, and z of other files.
-    turn : angles about x, y and z, applied in that order [rad].
-    move : along x, y and z, applied last [m].
+    Args:
+        up: axis of the file that points upwards, which becomes z before anything else; None: y of glTF, as its standard
+            says, and z of other files.
+        turn: angles about x, y and z, applied in that order [rad].
+        move: along x, y and z, applied last [m].
 
-    Raises
-    ------
-    InputError : the scale is not positive, or a number is missing or not finite; another axis points upwards.
+    Raises:
+        InputError: the scale is not positive, or a number is missing or not finite; another axis points upwards.
     """
 
     up: Literal["z", "y"] | None = None
@@ -341,20 +331,18 @@ def surface_from(
 ) -> Freeform:
     """Make a target of the surface in an OBJ, STL, PLY, OFF, glTF, 3dm or STEP file.
 
-    Parameters
-    ----------
-    unit : length of the file's unit [m]; None where the file states its unit.
-    name : object name, if the file has several (3dm: object or layer name, or number; STEP: name of a face, shell or
-        solid, or the number of a face). The untrimmed faces of a 3dm polysurface are joined.
-    base : z of a plane below which there is no shell [m], after placement; None for a surface that ends at its edge.
-    boundary : path of an OBJ, DXF or 3dm file with closed curves on the surface, in the same unit, unless a 3dm file
-        states its own, and placed with it: the longest bounds the shell, the others are openings.
-    placement : scales, turns and moves the surface.
-    progress : called before the file is read, and at each step of the fit.
+    Args:
+        unit: length of the file's unit [m]; None where the file states its unit.
+        name: object name, if the file has several (3dm: object or layer name, or number; STEP: name of a face, shell or
+            solid, or the number of a face). The untrimmed faces of a 3dm polysurface are joined.
+        base: z of a plane below which there is no shell [m], after placement; None for a surface that ends at its edge.
+        boundary: path of an OBJ, DXF or 3dm file with closed curves on the surface, in the same unit, unless a 3dm file
+            states its own, and placed with it: the longest bounds the shell, the others are openings.
+        placement: scales, turns and moves the surface.
+        progress: called before the file is read, and at each step of the fit.
 
-    Raises
-    ------
-    InputError : an argument or a file cannot be used; one sentence says why.
+    Raises:
+        InputError: an argument or a file cannot be used; one sentence says why.
     """
     path = file_path("file", file)
     if unit is not None:
@@ -394,15 +382,13 @@ def heights_from(
 ) -> Freeform:
     """Make a target of heights on a lattice: a CSV with a row of heights for each y, a CSV of points, or a grey image.
 
-    Parameters
-    ----------
-    size : width along x and depth along y [m], centred on the origin; the first row is at the largest y.
-    height : of a CSV the length of its unit [m], default 1; of an image the height of white [m], default 1.
-    base, boundary, placement, progress : as in `surface_from`, with the boundary in metres.
+    Args:
+        size: width along x and depth along y [m], centred on the origin; the first row is at the largest y.
+        height: of a CSV the length of its unit [m], default 1; of an image the height of white [m], default 1.
+        base, boundary, placement, progress: as in `surface_from`, with the boundary in metres.
 
-    Raises
-    ------
-    InputError : an argument or a file cannot be used; one sentence says why.
+    Raises:
+        InputError: an argument or a file cannot be used; one sentence says why.
     """
     path = file_path("file", file)
     width, depth = numbers("size", size, "two lengths in m: width along x, depth along y", 2, "m")

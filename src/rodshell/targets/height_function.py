@@ -32,15 +32,14 @@ _CLIMBERS = 500  # samples from which peaks are searched
 class Heights:
     """z = function(x, y) and its derivatives.
 
-    Parameters
-    ----------
-    function : of x and y; takes jets where `exact`, otherwise only plain arrays.
-    size : half the larger width of its domain [m].
-    exact : whether derivatives are taken from jets; otherwise by differences.
-    trusted : where the function is evaluated as it is; None for everywhere. Outside, along every normal of the
-        region's edge, it is continued by its Taylor polynomial of second degree in that direction (in both directions
-        outside a corner of a rectangle). The continued surface has continuous curvature, and its derivatives are exact:
-        those of the polynomial's coefficients are taken from jets of jets.
+    Args:
+        function: of x and y; takes jets where `exact`, otherwise only plain arrays.
+        size: half the larger width of its domain [m].
+        exact: whether derivatives are taken from jets; otherwise by differences.
+        trusted: where the function is evaluated as it is; None for everywhere. Outside, along every normal of the
+            region's edge, it is continued by its Taylor polynomial of second degree in that direction (in both
+            directions outside a corner of a rectangle). The continued surface has continuous curvature, and its
+            derivatives are exact: those of the polynomial's coefficients are taken from jets of jets.
     """
 
     function: Callable[[Any, Any], Any]
@@ -51,13 +50,11 @@ class Heights:
     def jet(self, x: Floats, y: Floats) -> Jet:
         """Evaluate z with its first and second derivatives.
 
-        Parameters
-        ----------
-        x, y : (n,) points of the plan [m].
+        Args:
+            x, y: (n,) points of the plan [m].
 
-        Returns
-        -------
-        A jet, whose parts are (n,), or single floats where they are constant.
+        Returns:
+            A jet, whose parts are (n,), or single floats where they are constant.
         """
         with np.errstate(all="ignore"):
             if self.trusted is None:
@@ -134,13 +131,11 @@ def _put(parts: Floats, where: Any, jet: Jet) -> None:
 def sample(heights: Heights, domain: _Region) -> Floats:
     """Sample a height function on a lattice up to the domain's edge.
 
-    Parameters
-    ----------
-    domain : rows of the lattice of a disc are circles, from the centre to the edge.
+    Args:
+        domain: rows of the lattice of a disc are circles, from the centre to the edge.
 
-    Returns
-    -------
-    (8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy.
+    Returns:
+        (8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy.
     """
     a, b = domain.half_extent
     if isinstance(domain, Disc):
@@ -154,14 +149,12 @@ def sample(heights: Heights, domain: _Region) -> Floats:
 def require_smooth(heights: Heights, domain: _Region, samples: Floats, name: str) -> None:
     """Refuse a function without finite height, slope and curvature everywhere in the domain, or with steps or creases.
 
-    Parameters
-    ----------
-    samples : as `sample` returns them.
-    name : of the target, for the message.
+    Args:
+        samples: as `sample` returns them.
+        name: of the target, for the message.
 
-    Raises
-    ------
-    InputError : names the place and a remedy.
+    Raises:
+        InputError: names the place and a remedy.
     """
     _refuse(samples.reshape(8, -1), domain, name)
     if heights.exact:  # differences smooth a crease
@@ -189,18 +182,15 @@ def trusted_region(heights: Heights, domain: _Region, samples: Floats, name: str
 
     There it is finite, and not steeper than slope 4 or twice its steepest inside.
 
-    Parameters
-    ----------
-    samples : as `sample` returns them.
-    name : of the target, for the message.
+    Args:
+        samples: as `sample` returns them.
+        name: of the target, for the message.
 
-    Returns
-    -------
-    None where that is all of 1.6 times the domain.
+    Returns:
+        None where that is all of 1.6 times the domain.
 
-    Raises
-    ------
-    InputError : a function without exact derivatives cannot be continued, and needs to be.
+    Raises:
+        InputError: a function without exact derivatives cannot be continued, and needs to be.
     """
     edge = _edge(domain)
     limit = max(_TAME, 2 * float(np.hypot(samples[3], samples[4]).max()))
@@ -220,9 +210,8 @@ def trusted_region(heights: Heights, domain: _Region, samples: Floats, name: str
 def climb(heights: Heights, domain: _Region) -> Floats:
     """Climb from many samples to local peaks.
 
-    Returns
-    -------
-    Points (n, 2) of the domain and its edge [m] without a higher point nearby; the highest is among them.
+    Returns:
+        Points (n, 2) of the domain and its edge [m] without a higher point nearby; the highest is among them.
     """
     at = sample(heights, domain).reshape(8, -1)
     a, b = domain.half_extent

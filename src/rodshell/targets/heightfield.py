@@ -65,12 +65,11 @@ Step = tuple[Callable[..., Any], _Slot, _Slot | None]
 class Formula:
     """z = f(x, y), callable with numbers, arrays or jets. Make one with `parse_formula`.
 
-    Parameters
-    ----------
-    text : the formula as it was written.
-    constants : numbers in slots 2, 3, ...; slots 0 and 1 are x and y.
-    steps : a straight-line program: functions of one or two earlier slots, whose results go into the next slots. Equal
-        parts of the formula are evaluated once.
+    Args:
+        text: the formula as it was written.
+        constants: numbers in slots 2, 3, ...; slots 0 and 1 are x and y.
+        steps: a straight-line program: functions of one or two earlier slots, whose results go into the next slots.
+            Equal parts of the formula are evaluated once.
     """
 
     text: str
@@ -90,13 +89,11 @@ class Formula:
 def parse_formula(text: str) -> Formula:
     """Read a formula in x and y without running any code.
 
-    Parameters
-    ----------
-    text : numbers, x, y, pi, e, + - * / ^ (or **), parentheses and `_FUNCTIONS`.
+    Args:
+        text: numbers, x, y, pi, e, + - * / ^ (or **), parentheses and `_FUNCTIONS`.
 
-    Raises
-    ------
-    InputError : anything else; one sentence that names the wrong part and lists what is allowed.
+    Raises:
+        InputError: anything else; one sentence that names the wrong part and lists what is allowed.
     """
     if not isinstance(text, str):
         raise InputError(f"a formula must be text such as {shown('0.1 - 2*x^2 - y^2')}, not {shown(text)}")
@@ -262,18 +259,16 @@ class HeightField(WalledTarget):
     4, or twice the steepest inside) within 1.6 times the domain, Taylor polynomials of second degree continue it, so
     that the curvature stays continuous.
 
-    Parameters
-    ----------
-    formula : in x and y [m], such as "0.1 - 2*x^2 - y^2"; see `parse_formula`.
-    function : instead of a formula: z(x, y) of arrays (n,) [m]. If it consists of arithmetic and numpy functions, its
-        derivatives are exact (`Jet`). Any other is differentiated by central differences of fourth order, is called up
-        to 1.61 times the domain and must be smooth there: creases in it are not detected.
-    domain : a disc or a rectangle, centred on the origin.
+    Args:
+        formula: in x and y [m], such as "0.1 - 2*x^2 - y^2"; see `parse_formula`.
+        function: instead of a formula: z(x, y) of arrays (n,) [m]. If it consists of arithmetic and numpy functions,
+            its derivatives are exact (`Jet`). Any other is differentiated by central differences of fourth order, is
+            called up to 1.61 times the domain and must be smooth there: creases in it are not detected.
+        domain: a disc or a rectangle, centred on the origin.
 
-    Raises
-    ------
-    InputError : not exactly one of formula and function; a formula that cannot be read; a height, slope or curvature in
-        the domain that is not finite; a step or a crease. The message says where, and names a remedy.
+    Raises:
+        InputError: not exactly one of formula and function; a formula that cannot be read; a height, slope or curvature
+            in the domain that is not finite; a step or a crease. The message says where, and names a remedy.
     """
 
     formula: str | None = None

@@ -21,9 +21,8 @@ class Jet:
     a single variable. Parts may be jets: a jet of jets has higher derivatives. Operations without a derivative here
     (comparisons, np.where, np.maximum, float()) are refused with a TypeError.
 
-    Parameters
-    ----------
-    value, dx, dy, dxx, dxy, dyy : (n,) arrays, floats or jets.
+    Args:
+        value, dx, dy, dxx, dxy, dyy: (n,) arrays, floats or jets.
     """
 
     __slots__ = ("dx", "dxx", "dxy", "dy", "dyy", "value")
@@ -349,10 +348,9 @@ _RULES: dict[np.ufunc, Callable[..., Any]] = {
 def differences(function: Callable[[Any, Any], Any], x: Floats, y: Floats, step: float) -> Jet:
     """Differentiate a function of plain arrays by central differences of fourth order.
 
-    Parameters
-    ----------
-    function : z(x, y) of arrays; it is called once with all 17 points of the stencil.
-    x, y : (n,) points.
+    Args:
+        function: z(x, y) of arrays; it is called once with all 17 points of the stencil.
+        x, y: (n,) points.
     """
     near, far = np.array([[1], [-1]]), np.array([[2], [-2]])
     zero = np.zeros((2, 1))

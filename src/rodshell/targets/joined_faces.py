@@ -25,17 +25,14 @@ def joined(faces: list[Nurbs], name: str) -> tuple[Floats, Ints, float]:
     All have equally many quads each way, whose corners lie at equal distances along the edges and so meet. Where faces
     meet at an angle, the mesh is creased.
 
-    Parameters
-    ----------
-    name : of the file, for the message.
+    Args:
+        name: of the file, for the message.
 
-    Returns
-    -------
-    Vertices (k, 3), triangles (m, 3) and the largest angle at which two faces meet [rad].
+    Returns:
+        Vertices (k, 3), triangles (m, 3) and the largest angle at which two faces meet [rad].
 
-    Raises
-    ------
-    InputError : a face shares a part of an edge only.
+    Raises:
+        InputError: a face shares a part of an edge only.
     """
     count = max(int(np.ceil(GRID * np.sqrt(2 / len(faces)))), FEWEST, *(n for face in faces for n in face.quads))
     grids = np.array([_evenly(face, count) for face in faces])
@@ -92,10 +89,9 @@ def _even(t: Floats, x: Floats, share: Floats) -> Floats:
 def _require_whole_edges(sides: Floats, free: set[int], extent: float, name: str) -> None:
     """Refuse faces that meet along a part of an edge, where the mesh would have a crack.
 
-    Parameters
-    ----------
-    sides : (4 m, n, 3) points of the edges of m faces.
-    free : those that have a length and are not the edge of another face.
+    Args:
+        sides: (4 m, n, 3) points of the edges of m faces.
+        free: those that have a length and are not the edge of another face.
     """
     share = np.linspace(0.0, 1.0, FINER + 1)[:, None, None]
     dense = {i: (sides[i][:-1] + share * np.diff(sides[i], axis=0)).reshape(-1, 3) for i in free}

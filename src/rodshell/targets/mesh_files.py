@@ -38,19 +38,16 @@ NAMES = 20  # of a file's objects that a message lists
 def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = None) -> tuple[Floats, Ints, Notes]:
     """Read the surface in a mesh file.
 
-    Parameters
-    ----------
-    path : an OBJ, STL, PLY, OFF or glTF file.
-    unit : length of the file's unit [m]; None only for a format that fixes it.
-    name : of an object or a group, if the file has several.
+    Args:
+        path: an OBJ, STL, PLY, OFF or glTF file.
+        unit: length of the file's unit [m]; None only for a format that fixes it.
+        name: of an object or a group, if the file has several.
 
-    Returns
-    -------
-    Vertices (n, 3) [m], triangles (m, 3), and notes for the user, in sentences.
+    Returns:
+        Vertices (n, 3) [m], triangles (m, 3), and notes for the user, in sentences.
 
-    Raises
-    ------
-    InputError : the file is missing, damaged or truncated; it has no surface or no unit; its size is implausible.
+    Raises:
+        InputError: the file is missing, damaged or truncated; it has no surface or no unit; its size is implausible.
     """
     path = Path(path)
     data = file_bytes(path)
@@ -78,9 +75,8 @@ def require_few_heights(path: Path, rows: int, columns: int) -> None:
 def file_bytes(path: Path) -> bytes:
     """The content of a file.
 
-    Raises
-    ------
-    InputError : the file is missing, empty, a device or too large, or cannot be read.
+    Raises:
+        InputError: the file is missing, empty, a device or too large, or cannot be read.
     """
     data = read_bytes(path, LARGEST_FILE, smaller="reduce the mesh, as about 20,000 triangles are enough")
     if not data:
@@ -91,16 +87,14 @@ def file_bytes(path: Path) -> bytes:
 def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> Floats:
     """Scale vertices to metres, and refuse a size that no gridshell has.
 
-    Parameters
-    ----------
-    vertices : (n, 3) in the file's unit.
-    faces : (m, 3); only vertices of faces count for the size.
-    unit : length of the file's unit [m]; None only for a format that fixes it.
-    path : of the file, for the message.
+    Args:
+        vertices: (n, 3) in the file's unit.
+        faces: (m, 3); only vertices of faces count for the size.
+        unit: length of the file's unit [m]; None only for a format that fixes it.
+        path: of the file, for the message.
 
-    Raises
-    ------
-    InputError : no unit, or a surface smaller than 1 um or larger than 1 km.
+    Raises:
+        InputError: no unit, or a surface smaller than 1 um or larger than 1 km.
     """
     used = vertices[np.unique(faces)] if len(faces) else vertices
     extent = np.ptp(used, axis=0) if len(used) and np.isfinite(used).all() else np.full(3, np.nan)
@@ -118,15 +112,13 @@ def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> 
 def require_size(path: Path, extent: Floats, unit: float, *, instead: str = ANOTHER_UNIT) -> None:
     """Refuse a size that no gridshell has; one that is not finite is left to other checks.
 
-    Parameters
-    ----------
-    path : of the file, for the message.
-    extent : (k,) widths along x, y and perhaps z in the file's unit.
-    unit : length of the file's unit [m].
+    Args:
+        path: of the file, for the message.
+        extent: (k,) widths along x, y and perhaps z in the file's unit.
+        unit: length of the file's unit [m].
 
-    Raises
-    ------
-    InputError : smaller than 1 um or larger than 1 km.
+    Raises:
+        InputError: smaller than 1 um or larger than 1 km.
     """
     largest = float(extent.max()) * unit
     if np.isfinite(largest) and largest > 0 and not SMALLEST <= largest <= LARGEST:
@@ -238,14 +230,12 @@ _TRIANGLES = {".obj": _of_obj, ".off": _of_off, ".ply": _of_ply}
 def read_with(path: Path, format: str, reader: Callable[[], Content]) -> Content:
     """What a reader finds; a damaged file can break it anywhere.
 
-    Parameters
-    ----------
-    path : of the file, for messages.
-    format : as it is called in messages.
+    Args:
+        path: of the file, for messages.
+        format: as it is called in messages.
 
-    Raises
-    ------
-    InputError : the reader fails.
+    Raises:
+        InputError: the reader fails.
     """
     try:
         with np.errstate(all="ignore"):  # values that are not finite are refused later, with their place

@@ -17,11 +17,10 @@ HIGHEST = 25  # degree: of splines beyond it, no digit of a point is known
 class Nurbs:
     """A surface of rational B-splines.
 
-    Parameters
-    ----------
-    degrees : along u and along v.
-    knots : (m + degree + 1,) and (n + degree + 1,), ascending.
-    controls : (m, n, 4) control points: weight times x, y and z, and the weight, which is positive.
+    Args:
+        degrees: along u and along v.
+        knots: (m + degree + 1,) and (n + degree + 1,), ascending.
+        controls: (m, n, 4) control points: weight times x, y and z, and the weight, which is positive.
     """
 
     degrees: tuple[int, int]
@@ -79,14 +78,12 @@ class Nurbs:
 def splines(knots: Floats, degree: int, t: Floats) -> Floats:
     """Evaluate all B-splines of a degree, by the recursion of Cox and de Boor.
 
-    Parameters
-    ----------
-    knots : (m + degree + 1,), ascending.
-    t : (k,) parameters.
+    Args:
+        knots: (m + degree + 1,), ascending.
+        t: (k,) parameters.
 
-    Returns
-    -------
-    (k, m) values.
+    Returns:
+        (k, m) values.
     """
     last = np.flatnonzero(knots < knots[-degree - 1])[-1]  # the end belongs to this span
     span = np.clip(np.searchsorted(knots, t, side="right") - 1, degree, last)

@@ -39,18 +39,15 @@ READERS = Path(__file__).parent
 def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Floats], float | None, Notes]:
     """Read one surface of a 3dm file; the untrimmed faces of a polysurface are joined.
 
-    Parameters
-    ----------
-    name : object or layer name, or the surface's number from 1 on, if the file has several surfaces.
+    Args:
+        name: object or layer name, or the surface's number from 1 on, if the file has several surfaces.
 
-    Returns
-    -------
-    Vertices (n, 3), triangles (m, 3) and trims (closed polylines) in the file's unit; that unit [m], or None;
-    and notes for the user, in sentences.
+    Returns:
+        Vertices (n, 3), triangles (m, 3) and trims (closed polylines) in the file's unit; that unit [m], or None;
+        and notes for the user, in sentences.
 
-    Raises
-    ------
-    InputError : the file is missing or damaged; rhino3dm is not installed; the file has no such face, or several.
+    Raises:
+        InputError: the file is missing or damaged; rhino3dm is not installed; the file has no such face, or several.
     """
     found = rhino_content(path, file_bytes(path), name=name)
     if "surfaces" not in found:
@@ -81,14 +78,12 @@ def _nurbs(path: Path, found: dict[str, Any], k: int) -> Nurbs:
 def rhino_content(path: Path, data: bytes, **request: object) -> dict[str, Any]:
     """What `opennurbs` finds in a 3dm file.
 
-    Parameters
-    ----------
-    path : of the file, for messages.
-    request : the `name` of a surface; or the `most` curves that are read.
+    Args:
+        path: of the file, for messages.
+        request: the `name` of a surface; or the `most` curves that are read.
 
-    Raises
-    ------
-    InputError : the file is damaged; rhino3dm is not installed.
+    Raises:
+        InputError: the file is damaged; rhino3dm is not installed.
     """
     if find_spec("rhino3dm") is None:
         raise InputError(f'{path}: 3dm files need rhino3dm: pip install "rodshell[rhino]"')
@@ -132,17 +127,14 @@ def _no_single_surface(
 def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Floats]]:
     """Read one face of a STEP file, in a separate process (see `opencascade`).
 
-    Parameters
-    ----------
-    name : of the face or of its shell or solid, or the face's number from 1 on, if the file has several.
+    Args:
+        name: of the face or of its shell or solid, or the face's number from 1 on, if the file has several.
 
-    Returns
-    -------
-    Vertices (n, 3) [m], triangles (m, 3) and trims (closed polylines) [m].
+    Returns:
+        Vertices (n, 3) [m], triangles (m, 3) and trims (closed polylines) [m].
 
-    Raises
-    ------
-    InputError : the file is missing or damaged; OpenCASCADE is not installed; the file has no such face, or several.
+    Raises:
+        InputError: the file is missing or damaged; OpenCASCADE is not installed; the file has no such face, or several.
     """
     if find_spec("OCP") is None:
         raise InputError(f'{path}: STEP files need OpenCASCADE: pip install "rodshell[step]"')

@@ -52,11 +52,10 @@ def parts(whole: Any, kind: Any) -> Iterator[Any]:
 def _points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
     """Points (k, l, 3) of a surface on a lattice of its parameters [mm].
 
-    Parameters
-    ----------
-    grid : intervals each way, at least.
-    per_span : intervals for each span of the surface.
-    finest : intervals each way, at most.
+    Args:
+        grid: intervals each way, at least.
+        per_span: intervals for each span of the surface.
+        finest: intervals each way, at most.
     """
     from OCP.GeomAbs import GeomAbs_CN
 
@@ -116,14 +115,12 @@ def trims_of(face: Any, along_edges: int) -> Any:
 def main(request: dict[str, Any]) -> dict[str, Any]:
     """The faces of a file, and the one that is wanted.
 
-    Parameters
-    ----------
-    request : `path`, `name` of a face, or None, and the resolution: `grid`, `per_span`, `finest`, `along_edges`.
+    Args:
+        request: `path`, `name` of a face, or None, and the resolution: `grid`, `per_span`, `finest`, `along_edges`.
 
-    Returns
-    -------
-    `names` (JSON, a list for each face) and, if one face matches, `points` (k, l, 3) of its surface and `trims`
-    (n, along_edges + 1, 3), the curves that bound it, in millimetres.
+    Returns:
+        `names` (JSON, a list for each face) and, if one face matches, `points` (k, l, 3) of its surface and `trims`
+        (n, along_edges + 1, 3), the curves that bound it, in millimetres.
     """
     from OCP.BRepAdaptor import BRepAdaptor_Surface
 

@@ -12,17 +12,16 @@ FEWEST = 8  # pieces of each span of a curve
 def main(request: dict[str, Any]) -> dict[str, Any]:
     """The surfaces of a file, and the one that is wanted; or its curves.
 
-    Parameters
-    ----------
-    request : `path`; `along_edges`, the pieces of each edge or curve; `most_joined`, faces of a polysurface; and
-        `name` of an object or a layer, or None, or `most`, curves.
+    Args:
+        request: `path`; `along_edges`, the pieces of each edge or curve; `most_joined`, faces of a polysurface; and
+            `name` of an object or a layer, or None, or `most`, curves.
 
-    Returns
-    -------
-    `unit`, by its name, `names` (JSON: object, layer and number of faces of each surface) and `others` (JSON: numbers
-    of meshes, SubDs and curves); nothing for another kind of file. If one surface matches, and has one face or only
-    untrimmed ones, also their number `surfaces`, of each `degrees0` (2,), `knots_u0` and `knots_v0` without the first
-    and the last and `controls0` (m, n, 4), and `trims` (k, along_edges + 1, 3), the curves that bound a single one.
+    Returns:
+        `unit`, by its name, `names` (JSON: object, layer and number of faces of each surface) and `others` (JSON:
+        numbers of meshes, SubDs and curves); nothing for another kind of file. If one surface matches, and has one face
+        or only untrimmed ones, also their number `surfaces`, of each `degrees0` (2,), `knots_u0` and `knots_v0` without
+        the first and the last and `controls0` (m, n, 4), and `trims` (k, along_edges + 1, 3), the curves that bound a
+        single one.
 
     Of curves `unit` and their `count`; if it is not above `most`, `points` and `ends` as `dxf_curves` returns them.
     """

@@ -22,10 +22,9 @@ class Seam:
 
     An open seam is prolonged straight past both ends. Seams with the same points are equal.
 
-    Parameters
-    ----------
-    points : (n, 2) [m].
-    crests : fine polylines (k, 3) on the parts of it that are creases [m].
+    Args:
+        points: (n, 2) [m].
+        crests: fine polylines (k, 3) on the parts of it that are creases [m].
     """
 
     points: Floats
@@ -35,13 +34,11 @@ class Seam:
     def of(points: ArrayLike) -> "Seam":
         """Make a seam of points.
 
-        Parameters
-        ----------
-        points : (n, 2), or (n, 3), whose z is ignored [m].
+        Args:
+            points: (n, 2), or (n, 3), whose z is ignored [m].
 
-        Raises
-        ------
-        InputError : fewer than two different points, or one that is not finite.
+        Raises:
+            InputError: fewer than two different points, or one that is not finite.
         """
         try:
             given = np.asarray(points, dtype=float)
@@ -84,13 +81,11 @@ class Seam:
     def distance(self, x: Floats) -> Floats:
         """Signed distance in plan, positive to the left of the seam's direction.
 
-        Parameters
-        ----------
-        x : (n, 2) or (n, 3) points [m].
+        Args:
+            x: (n, 2) or (n, 3) points [m].
 
-        Returns
-        -------
-        (n,) [m].
+        Returns:
+            (n,) [m].
         """
         k, share, off = self._nearest(x)
         edge = np.diff(self._corners, axis=0)
@@ -140,12 +135,11 @@ def nearest(line: Floats, x: Floats) -> tuple[Ints, Floats, Floats]:
 class Patch(Target):
     """A part of a target: the points on given sides of its seams.
 
-    Parameters
-    ----------
-    surface : the target that has the patch's surface, and continues it past a seam: the whole; or where that is creased
-        along a seam, the smooth piece of it on this side.
-    sides : for each seam 1 if the patch is on its left, -1 if it is on its right.
-    middle : x, y of a point well inside [m], the default of the anchor.
+    Args:
+        surface: the target that has the patch's surface, and continues it past a seam: the whole; or where that is
+            creased along a seam, the smooth piece of it on this side.
+        sides: for each seam 1 if the patch is on its left, -1 if it is on its right.
+        middle: x, y of a point well inside [m], the default of the anchor.
     """
 
     whole: Target

@@ -21,11 +21,10 @@ NEVER = 1e30  # the cost of a triangle that lies outside its face, or has no are
 class Polygons:
     """Faces with any number of corners.
 
-    Parameters
-    ----------
-    points : (n, 3).
-    corners : (k,) indices of the points around each face, one face after the other.
-    sizes : (m,) number of corners of each face.
+    Args:
+        points: (n, 3).
+        corners: (k,) indices of the points around each face, one face after the other.
+        sizes: (m,) number of corners of each face.
     """
 
     points: Floats
@@ -41,13 +40,12 @@ class Polygons:
 
         A crease that crosses faces from corner to corner runs along their diagonals, not across them.
 
-        Parameters
-        ----------
-        name : of the file, for the message.
+        Args:
+            name: of the file, for the message.
 
-        Raises
-        ------
-        InputError : a face has a corner that is not there; faces have so many corners that to split them takes minutes.
+        Raises:
+            InputError: a face has a corner that is not there; faces have so many corners that to split them takes
+                minutes.
         """
         require_indices(self.points, self.corners, name)
         work = float((self.sizes.astype(float) ** 3)[self.sizes > 4].sum())

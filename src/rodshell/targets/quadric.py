@@ -86,13 +86,11 @@ def _implicit(x, weights, slope, scale):  # type: ignore[no-untyped-def]
 class Hemisphere(_Quadric):
     """x^2 + y^2 + z^2 = radius^2, z >= 0 [HQK Eq 13a].
 
-    Parameters
-    ----------
-    radius : [m].
+    Args:
+        radius: [m].
 
-    Raises
-    ------
-    InputError : the radius is not a positive number.
+    Raises:
+        InputError: the radius is not a positive number.
     """
 
     radius: float
@@ -129,14 +127,12 @@ class Hemisphere(_Quadric):
 class Cap(Hemisphere):
     """The part of a sphere around the origin that lies above a base plane.
 
-    Parameters
-    ----------
-    radius : of the sphere [m].
-    base : z of the base plane [m]; default 0, which makes a hemisphere.
+    Args:
+        radius: of the sphere [m].
+        base: z of the base plane [m]; default 0, which makes a hemisphere.
 
-    Raises
-    ------
-    InputError : the radius is not a positive number, or the base plane does not cut the sphere.
+    Raises:
+        InputError: the radius is not a positive number, or the base plane does not cut the sphere.
     """
 
     base: float = 0.0
@@ -171,14 +167,12 @@ class Cap(Hemisphere):
 class Paraboloid(_Quadric):
     """(x^2 + y^2) / radius^2 + z / height = 1, z >= 0 [HQK Eq 13b].
 
-    Parameters
-    ----------
-    radius : of the rim [m].
-    height : of the top above the rim [m].
+    Args:
+        radius: of the rim [m].
+        height: of the top above the rim [m].
 
-    Raises
-    ------
-    InputError : radius or height is not a positive number.
+    Raises:
+        InputError: radius or height is not a positive number.
     """
 
     radius: float
@@ -220,13 +214,11 @@ class Paraboloid(_Quadric):
 class Ellipsoid(_Quadric):
     """(x/a)^2 + (y/b)^2 + (z/c)^2 = 1, z >= 0 [HQK Eq 13c].
 
-    Parameters
-    ----------
-    a, b, c : half-axes along x, y and z [m].
+    Args:
+        a, b, c: half-axes along x, y and z [m].
 
-    Raises
-    ------
-    InputError : a half-axis is not a positive number.
+    Raises:
+        InputError: a half-axis is not a positive number.
     """
 
     a: float

@@ -53,26 +53,22 @@ class Domain(Protocol):
     def holds(self, xy: Floats) -> Bools:
         """Whether points of the plan are inside or on the edge.
 
-        Parameters
-        ----------
-        xy : (n, 2) points [m].
+        Args:
+            xy: (n, 2) points [m].
 
-        Returns
-        -------
-        (n,) booleans.
+        Returns:
+            (n,) booleans.
         """
         ...
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
         """Signed distance to the edge, negative inside.
 
-        Parameters
-        ----------
-        xy : (n, 2) points [m].
+        Args:
+            xy: (n, 2) points [m].
 
-        Returns
-        -------
-        Distance (n,) [m], its gradient (n, 2) [-] and its Hessian (n, 2, 2) [1/m].
+        Returns:
+            Distance (n,) [m], its gradient (n, 2) [-] and its Hessian (n, 2, 2) [1/m].
         """
         ...
 
@@ -81,13 +77,11 @@ class Domain(Protocol):
 class Disc:
     """A disc around the origin of the plan.
 
-    Parameters
-    ----------
-    radius : [m].
+    Args:
+        radius: [m].
 
-    Raises
-    ------
-    InputError : the radius is not a positive number.
+    Raises:
+        InputError: the radius is not a positive number.
     """
 
     radius: float
@@ -113,13 +107,11 @@ class Disc:
 class EllipseDomain:
     """The points with (x/a)^2 + (y/b)^2 <= 1.
 
-    Parameters
-    ----------
-    a, b : half-axes along x and y [m].
+    Args:
+        a, b: half-axes along x and y [m].
 
-    Raises
-    ------
-    InputError : a half-axis is not a positive number.
+    Raises:
+        InputError: a half-axis is not a positive number.
     """
 
     a: float
@@ -159,13 +151,11 @@ class EllipseDomain:
 class Rectangle:
     """A rectangle centred on the origin of the plan: |x| <= width/2 and |y| <= depth/2.
 
-    Parameters
-    ----------
-    size : width along x and depth along y [m].
+    Args:
+        size: width along x and depth along y [m].
 
-    Raises
-    ------
-    InputError : the size is not a pair of positive numbers.
+    Raises:
+        InputError: the size is not a pair of positive numbers.
     """
 
     size: tuple[float, float]
@@ -214,12 +204,11 @@ def _find_roots(ap, shift, least, t):  # type: ignore[no-untyped-def]
 class Rim:
     """Closed polylines on a surface, fine enough to replace smooth curves; make one with `Rim.of`.
 
-    Parameters
-    ----------
-    points : (n, 3) points of all loops, one loop after the other [m].
-    inward : (n, 3) unit vectors in the surface, across the edge from each point to the next, towards the shell.
-    after : (n,) index of the next point of the loop.
-    off : largest distance to the rim from the loops, each in the sense in which it is given [m].
+    Args:
+        points: (n, 3) points of all loops, one loop after the other [m].
+        inward: (n, 3) unit vectors in the surface, across the edge from each point to the next, towards the shell.
+        after: (n,) index of the next point of the loop.
+        off: largest distance to the rim from the loops, each in the sense in which it is given [m].
     """
 
     points: Floats
@@ -240,13 +229,12 @@ class Rim:
         neighbours. A straight side ends where the loop curves three times as much beyond as before, and turns as at the
         first of equal edges. Between corners and such ends six points or more are joined by cubics, and fewer by sides.
 
-        Parameters
-        ----------
-        loops : closed polylines (n, 3) with the shell on their left, seen from outside [m].
-        onto : moves points (n, 3) onto the surface.
-        normal : outward unit normals (n, 3) of the surface at points.
-        given : of each loop, how `off` is measured: seen from above, from its points in space and from its sides on the
-            surface, or from these alone (default).
+        Args:
+            loops: closed polylines (n, 3) with the shell on their left, seen from outside [m].
+            onto: moves points (n, 3) onto the surface.
+            normal: outward unit normals (n, 3) of the surface at points.
+            given: of each loop, how `off` is measured: seen from above, from its points in space and from its sides on
+                the surface, or from these alone (default).
         """
         points, laid, plan, after, count = list[Floats](), [np.empty((0, 3))], [np.empty((0, 3))], list[Ints](), 0
         for all_points, sense in zip_longest(loops, given):
@@ -304,13 +292,11 @@ class Rim:
     def feet(self, x: Floats) -> tuple[Ints, Floats]:
         """The closest points of the rim, as `at` takes them.
 
-        Parameters
-        ----------
-        x : (n, 3) points [m].
+        Args:
+            x: (n, 3) points [m].
 
-        Returns
-        -------
-        Index (n,) of the nearest edge, and the fraction (n,) of it before the closest point.
+        Returns:
+            Index (n,) of the nearest edge, and the fraction (n,) of it before the closest point.
         """
         edge, share = np.empty(len(x), dtype=np.intp), np.empty(len(x))
         _feet(x, self.points, self.after, self._before, *self._balls, edge, share)
@@ -441,14 +427,12 @@ def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
     the smoothest whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain.
     Vertices outside of jagged parts do not move.
 
-    Parameters
-    ----------
-    loop : (n, 3) closed polyline [m].
-    normals : (n, 3) of the surface there.
+    Args:
+        loop: (n, 3) closed polyline [m].
+        normals: (n, 3) of the surface there.
 
-    Returns
-    -------
-    (n, 3) the smoothed loop, or None if no part is jagged.
+    Returns:
+        (n, 3) the smoothed loop, or None if no part is jagged.
     """
     free = _jagged(loop, normals)
     if not free.any():

@@ -28,11 +28,10 @@ PITCH = 0.5  # spacings between the samples of a cap
 class Samples:
     """Points of a surface.
 
-    Parameters
-    ----------
-    points : (n, 3) [m].
-    normals : (n, 3) outward unit normals.
-    areas : (n,) area that each point represents [m2].
+    Args:
+        points: (n, 3) [m].
+        normals: (n, 3) outward unit normals.
+        areas: (n,) area that each point represents [m2].
     """
 
     points: Floats
@@ -52,9 +51,8 @@ def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
     long triangle of a vault lies below the arch that it spans. Vertices of the rim come first, so that cubics are
     placed there: beyond the rim there is nothing to fit to.
 
-    Parameters
-    ----------
-    spacing : distance between the cubics that will be fitted [m].
+    Args:
+        spacing: distance between the cubics that will be fitted [m].
     """
     faces, corners = mesh.faces, mesh.vertices[mesh.faces]
     edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
@@ -116,9 +114,8 @@ def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Sampl
     sides, and would meet itself there in a crease. A cap is the interpolant of |r|^3 through the surface around the
     opening: its bending energy is the smallest [Duchon 1977].
 
-    Parameters
-    ----------
-    spacing : distance between the cubics that will be fitted [m].
+    Args:
+        spacing: distance between the cubics that will be fitted [m].
     """
     points, normals = [samples.points], [samples.normals]
     outer, *openings = [mesh.vertices[loop] for loop in mesh.loops] or [np.empty((0, 3))]

@@ -33,14 +33,13 @@ TERMS = 10  # of a cubic in two variables
 class CellList:
     """Points sorted into cells; make one with `CellList.of`.
 
-    Parameters
-    ----------
-    points : (n, 3) [m].
-    low : (3,) lower corner of the first cell [m].
-    shape : (3,) number of cells along each axis.
-    cell : width of a cell [m].
-    start : (cells + 1,) where the points of each cell begin in `order`; cells are counted with z fastest.
-    order : (n,) indices of the points, cell by cell.
+    Args:
+        points: (n, 3) [m].
+        low: (3,) lower corner of the first cell [m].
+        shape: (3,) number of cells along each axis.
+        cell: width of a cell [m].
+        start: (cells + 1,) where the points of each cell begin in `order`; cells are counted with z fastest.
+        order: (n,) indices of the points, cell by cell.
     """
 
     points: Floats
@@ -65,14 +64,12 @@ class CellList:
     def nearest(self, x: Floats, count: int = 1, limit: float = np.inf) -> tuple[Floats, Ints]:
         """The nearest points, nearest first.
 
-        Parameters
-        ----------
-        x : (n, 3) points whose neighbours are wanted [m].
-        limit : neighbours further away need not be found; their distance is then infinite [m].
+        Args:
+            x: (n, 3) points whose neighbours are wanted [m].
+            limit: neighbours further away need not be found; their distance is then infinite [m].
 
-        Returns
-        -------
-        Distances (n, count) [m] and indices (n, count).
+        Returns:
+            Distances (n, count) [m] and indices (n, count).
         """
         distance, index = np.full(len(x) * count, np.inf), np.zeros(len(x) * count, dtype=np.intp)
         _nearest(x, *self._lattice, count, limit, distance, index)
@@ -81,15 +78,14 @@ class CellList:
     def within(self, x: Floats, radius: float, *, ordered: bool = False) -> tuple[Ints, Ints, Floats]:
         """All points within a radius.
 
-        Parameters
-        ----------
-        x : (m, 3) points whose neighbours are wanted [m].
-        radius : [m].
-        ordered : whether the nearest come first.
+        Args:
+            x: (m, 3) points whose neighbours are wanted [m].
+            radius: [m].
+            ordered: whether the nearest come first.
 
-        Returns
-        -------
-        Where the list of each point begins (m + 1,), the lists one after the other (k,), and the distances (k,) [m].
+        Returns:
+            Where the list of each point begins (m + 1,), the lists one after the other (k,), and the distances (k,)
+            [m].
         """
         most = _most_within(x, *self._lattice, radius)
         begin, near, away = np.zeros(len(x) + 1, dtype=np.intp), np.empty(most, dtype=np.intp), np.empty(most)
@@ -242,13 +238,13 @@ def _thin(points, low, shape, cell, start, order, distance, free):  # type: igno
 class SmoothField:
     """A smooth implicit function F, blended from cubics over tangent planes.
 
-    Parameters
-    ----------
-    centres : (m, 3) points of the surface, about `spacing` apart [m].
-    frames : (m, 3, 3) whose rows are two tangents and the outward normal.
-    coefficients : (m, 10) of 1, a, b, a^2, ab, b^2, a^3, a^2 b, a b^2, b^3 in a = xi / spacing, b = eta / spacing [m].
-    spacing : between centres [m].
-    reach : F is NaN further than this from every centre [m].
+    Args:
+        centres: (m, 3) points of the surface, about `spacing` apart [m].
+        frames: (m, 3, 3) whose rows are two tangents and the outward normal.
+        coefficients: (m, 10) of 1, a, b, a^2, ab, b^2, a^3, a^2 b, a b^2, b^3 in a = xi / spacing, b = eta / spacing
+            [m].
+        spacing: between centres [m].
+        reach: F is NaN further than this from every centre [m].
     """
 
     centres: Floats
@@ -287,10 +283,9 @@ class SmoothField:
     def implicit(self, x: Floats, *, second: bool = True) -> Implicit:
         """Evaluate F and its derivatives.
 
-        Parameters
-        ----------
-        x : (n, 3) points [m].
-        second : whether second derivatives are wanted; without them the Hessian is empty.
+        Args:
+            x: (n, 3) points [m].
+            second: whether second derivatives are wanted; without them the Hessian is empty.
         """
         distance, nearest = self.nearest(x)
         value, gradient, hessian = np.empty(len(x)), np.empty((len(x), 3)), np.empty((len(x) if second else 0, 3, 3))

@@ -16,10 +16,9 @@ def surface_mesh(target: Target, around: Floats, *, cells: int = CELLS) -> tuple
     It is made for pictures: the surface is sampled on a square mesh, whose triangles are cut at the end of the shell.
     What lies under an overhang is left out.
 
-    Parameters
-    ----------
-    around : (k, 3) points of a shell on the target [m].
-    cells : of the mesh along the longer side of the plan.
+    Args:
+        around: (k, 3) points of a shell on the target [m].
+        cells: of the mesh along the longer side of the plan.
     """
     low, high = around[:, :2].min(axis=0), around[:, :2].max(axis=0)
     step = float((high - low).max()) * (1 + 2 * BEYOND) / cells

@@ -24,11 +24,10 @@ _NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error b
 class Implicit(NamedTuple):
     """An implicit function F at n points; F > 0 outside, and |grad F| is of order 1.
 
-    Parameters
-    ----------
-    value : (n,) F [m].
-    gradient : (n, 3) [-].
-    hessian : (n, 3, 3) [1/m].
+    Args:
+        value: (n,) F [m].
+        gradient: (n, 3) [-].
+        hessian: (n, 3, 3) [1/m].
     """
 
     value: Floats
@@ -39,11 +38,10 @@ class Implicit(NamedTuple):
 class Gap(NamedTuple):
     """Signed distance of n points to a surface.
 
-    Parameters
-    ----------
-    distance : (n,) positive outside [m].
-    normal : (n, 3) its gradient, the outward unit normal.
-    hessian : (n, 3, 3) [1/m]; on the surface the shape operator: 1/R in every tangent direction of a sphere.
+    Args:
+        distance: (n,) positive outside [m].
+        normal: (n, 3) its gradient, the outward unit normal.
+        hessian: (n, 3, 3) [1/m]; on the surface the shape operator: 1/R in every tangent direction of a sphere.
     """
 
     distance: Floats
@@ -54,9 +52,8 @@ class Gap(NamedTuple):
 class Deviation(NamedTuple):
     """Distance of a surface from the vertices of the mesh that it was fitted to.
 
-    Parameters
-    ----------
-    max, rms : the largest, and the root of the mean square [m].
+    Args:
+        max, rms: the largest, and the root of the mean square [m].
     """
 
     max: float
@@ -128,9 +125,8 @@ class Target(ABC):
     def implicit(self, x: Floats) -> Implicit:
         """Evaluate the implicit function, also past the end.
 
-        Parameters
-        ----------
-        x : (n, 3) points [m].
+        Args:
+            x: (n, 3) points [m].
         """
 
     def level(self, x: Floats) -> tuple[Floats, Floats]:
@@ -142,13 +138,11 @@ class Target(ABC):
     def height_at(self, xy: Floats) -> Floats:
         """Height of the surface over points of the plan; that of the uppermost part where there are several.
 
-        Parameters
-        ----------
-        xy : (n, 2) points of the plan [m].
+        Args:
+            xy: (n, 2) points of the plan [m].
 
-        Returns
-        -------
-        (n,) z [m]; NaN where there is no surface.
+        Returns:
+            (n,) z [m]; NaN where there is no surface.
         """
 
     @property
@@ -164,13 +158,11 @@ class Target(ABC):
     def margin(self, x: Floats) -> Floats:
         """Distance to the end, positive inside; the shell is cut where it is 0.
 
-        Parameters
-        ----------
-        x : (n, 3) points on or near the surface [m].
+        Args:
+            x: (n, 3) points on or near the surface [m].
 
-        Returns
-        -------
-        (n,) [m].
+        Returns:
+            (n,) [m].
         """
 
     def covers(self, x: Floats) -> Bools:
@@ -180,10 +172,9 @@ class Target(ABC):
     def retract(self, x: Floats, steps: int = 4) -> Floats:
         """Move points onto the surface along its gradient, which for small gaps leads near the closest points.
 
-        Parameters
-        ----------
-        x : (n, 3) points [m].
-        steps : of Newton's method, at most.
+        Args:
+            x: (n, 3) points [m].
+            steps: of Newton's method, at most.
         """
         x = np.ascontiguousarray(x)
         for _ in range(steps):
@@ -270,30 +261,25 @@ class Target(ABC):
     def contact(self, x: Floats) -> Gap:
         """Signed distance to the body on which a grid falls: the surface and a wall below its rim.
 
-        Parameters
-        ----------
-        x : (n, 3) points [m].
+        Args:
+            x: (n, 3) points [m].
 
-        Raises
-        ------
-        InputError : this target has no such body.
+        Raises:
+            InputError: this target has no such body.
         """
         raise InputError(f'a grid cannot fall on a target of kind "{self.name}": use drape method "bound"')
 
     def lift(self, xy: Floats) -> Floats:
         """Lift points of the plan onto the surface.
 
-        Parameters
-        ----------
-        xy : (n, 2) points of the plan [m].
+        Args:
+            xy: (n, 2) points of the plan [m].
 
-        Returns
-        -------
-        (n, 3) points of the surface [m].
+        Returns:
+            (n, 3) points of the surface [m].
 
-        Raises
-        ------
-        InputError : there is no surface over a point.
+        Raises:
+            InputError: there is no surface over a point.
         """
         z = self.height_at(xy)
         if not np.isfinite(z).all():
@@ -309,14 +295,12 @@ Target._check_points()
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
     """Hessians of the distance at points away from a surface, S (I + d S)^-1.
 
-    Parameters
-    ----------
-    shape : (n, 3, 3) shape operators S at the closest points [1/m].
-    distance : (n,) signed distances d of the points [m].
+    Args:
+        shape: (n, 3, 3) shape operators S at the closest points [1/m].
+        distance: (n,) signed distances d of the points [m].
 
-    Returns
-    -------
-    (n, 3, 3) [1/m].
+    Returns:
+        (n, 3, 3) [1/m].
     """
     result, a, adjugate = np.empty_like(shape), np.empty((3, 3)), np.empty((3, 3))
     for m in range(len(shape)):
@@ -344,15 +328,14 @@ def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, sl
     Across the tangent plane the step leads to F = 0; within it, it solves B step = x - y, B = (1 + damping) + t F''.
     At a centre of curvature B is singular within the plane, and the step has no part there.
 
-    Parameters
-    ----------
-    x, y : (n, 3) points, and estimates of the points closest to them, which are moved [m].
-    rows : (m,) of the points that are moved.
-    value, gradient, hessian : (m,), (m, 3), (m, 3, 3) F there, see `Implicit`.
-    damping : (m,) 0 for Newton's step, larger for shorter steps.
-    longest : longer steps are shortened [m].
-    slope : (n, 3) output in these rows, F' before the step.
-    length : (m,) output, of Newton's step [m]; infinite where the distance is not convex.
+    Args:
+        x, y: (n, 3) points, and estimates of the points closest to them, which are moved [m].
+        rows: (m,) of the points that are moved.
+        value, gradient, hessian: (m,), (m, 3), (m, 3, 3) F there, see `Implicit`.
+        damping: (m,) 0 for Newton's step, larger for shorter steps.
+        longest: longer steps are shortened [m].
+        slope: (n, 3) output in these rows, F' before the step.
+        length: (m,) output, of Newton's step [m]; infinite where the distance is not convex.
     """
     for m in range(len(rows)):
         row, gx, gy, gz = rows[m], gradient[m, 0], gradient[m, 1], gradient[m, 2]
@@ -393,10 +376,9 @@ def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, sl
 def along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
     """One step of Newton from points x (n, 3) to F = 0 along the gradient, and the largest |F| before it.
 
-    Parameters
-    ----------
-    x : (n, 3) [m].
-    value, gradient : (n,), (n, 3) F there, see `Implicit`.
+    Args:
+        x: (n, 3) [m].
+        value, gradient: (n,), (n, 3) F there, see `Implicit`.
     """
     result, furthest = np.empty((len(x), 3)), 0.0
     for m in range(len(x)):
@@ -420,11 +402,10 @@ def _times(h, x, y, z):  # type: ignore[no-untyped-def]
 def shape_operators(gradient, hessian, forces, normal, shape):  # type: ignore[no-untyped-def]
     """Unit normals n, and shape operators P F'' P / |F'| with P = 1 - n n.
 
-    Parameters
-    ----------
-    gradient, hessian : (m, 3), (m, 3, 3) of F at points of the surface.
-    forces : (m, 3) by whose normal components the operators are multiplied [N]; empty: they are not.
-    normal, shape : (m, 3), (m, 3, 3) output.
+    Args:
+        gradient, hessian: (m, 3), (m, 3, 3) of F at points of the surface.
+        forces: (m, 3) by whose normal components the operators are multiplied [N]; empty: they are not.
+        normal, shape: (m, 3), (m, 3, 3) output.
     """
     for m in range(len(gradient)):
         gx, gy, gz = gradient[m]

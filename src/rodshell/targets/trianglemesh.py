@@ -26,10 +26,9 @@ FARTHEST = 1e9  # m: coordinates that are still known to a micrometre
 class TriangleMesh:
     """A mesh of triangles; make one with `sound_mesh`.
 
-    Parameters
-    ----------
-    vertices : (n, 3) [m].
-    faces : (m, 3) indices of vertices, in counter-clockwise order seen from outside.
+    Args:
+        vertices: (n, 3) [m].
+        faces: (m, 3) indices of vertices, in counter-clockwise order seen from outside.
     """
 
     vertices: Floats
@@ -150,13 +149,12 @@ class TriangleMesh:
 class SoundMesh(NamedTuple):
     """A mesh that was checked and repaired.
 
-    Parameters
-    ----------
-    surface : the smooth piece of it that covers most of the plan, facing up; the whole where there is none.
-    repairs : what was changed, in sentences.
-    whole : all of it between and beyond its creases, oriented alike.
-    creased : what is said of its creases; "" where it has none.
-    smooth : whether the surface has no crease within.
+    Args:
+        surface: the smooth piece of it that covers most of the plan, facing up; the whole where there is none.
+        repairs: what was changed, in sentences.
+        whole: all of it between and beyond its creases, oriented alike.
+        creased: what is said of its creases; "" where it has none.
+        smooth: whether the surface has no crease within.
     """
 
     surface: TriangleMesh
@@ -172,15 +170,13 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> SoundMesh:
     Normals may point to either side. Creases end the surface: of a half ball with its floor, or of a shell with a
     thickness, the piece that covers most of the plan is taken.
 
-    Parameters
-    ----------
-    vertices : (n, 3) [m].
-    faces : (m, 3) indices of vertices.
-    name : of the mesh, for messages.
+    Args:
+        vertices: (n, 3) [m].
+        faces: (m, 3) indices of vertices.
+        name: of the mesh, for messages.
 
-    Raises
-    ------
-    InputError : the mesh is empty, not finite, not manifold, one-sided or in several pieces; names the place.
+    Raises:
+        InputError: the mesh is empty, not finite, not manifold, one-sided or in several pieces; names the place.
     """
     _require_numbers(vertices, faces, name)
     mesh, repairs = _main_piece(_welded(vertices, faces, name), name)
@@ -260,13 +256,11 @@ def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]
 def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
     """Find equal rows.
 
-    Parameters
-    ----------
-    rows : (n, k) integers from 0 on.
+    Args:
+        rows: (n, k) integers from 0 on.
 
-    Returns
-    -------
-    Index (m,) of the first row of each kind; and the kind (n,) of each row.
+    Returns:
+        Index (m,) of the first row of each kind; and the kind (n,) of each row.
     """
     key, kinds = np.zeros(len(rows), dtype=np.int64), 1
     for column in rows.T:
@@ -290,11 +284,10 @@ def edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
 class Neighbours:
     """Neighbouring faces.
 
-    Parameters
-    ----------
-    faces : (e, 2) pairs of faces that share an edge.
-    edges : (e, 2) vertices of that edge.
-    against : (e,) whether both faces run along it in the same direction, and so face opposite sides.
+    Args:
+        faces: (e, 2) pairs of faces that share an edge.
+        edges: (e, 2) vertices of that edge.
+        against: (e,) whether both faces run along it in the same direction, and so face opposite sides.
     """
 
     faces: Ints

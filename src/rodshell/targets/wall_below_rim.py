@@ -111,9 +111,8 @@ class WalledTarget(Target):
 class RimPlan:
     """The region of the plan within a rim, a `Domain`.
 
-    Parameters
-    ----------
-    rim : of one loop, counter-clockwise seen from above.
+    Args:
+        rim: of one loop, counter-clockwise seen from above.
     """
 
     rim: Rim
@@ -173,10 +172,9 @@ class RimPlan:
 class WalledSurface(WalledTarget):
     """A mesh's smooth surface as a contact body; make one with `walled_surface`.
 
-    Parameters
-    ----------
-    rim_plan : the region of the plan within its rim.
-    level_edge : z of the rim where it is level [m], or None.
+    Args:
+        rim_plan: the region of the plan within its rim.
+        level_edge: z of the rim where it is level [m], or None.
     """
 
     surface: Target
@@ -231,15 +229,13 @@ def walled_surface(
 ) -> WalledSurface:
     """The contact body of a mesh's surface that has one edge.
 
-    Parameters
-    ----------
-    mesh : the mesh to which its field was fitted.
-    rims : the open boundary and the boundary curves, if there are any.
-    section : the rim that a plane at a height z [m] cuts out of the surface.
+    Args:
+        mesh: the mesh to which its field was fitted.
+        rims: the open boundary and the boundary curves, if there are any.
+        section: the rim that a plane at a height z [m] cuts out of the surface.
 
-    Raises
-    ------
-    InputError : it has openings or several edges, or overhangs its edge.
+    Raises:
+        InputError: it has openings or several edges, or overhangs its edge.
     """
     instead = 'use drape method "bound"'
     if surface.base is not None:

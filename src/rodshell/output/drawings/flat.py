@@ -42,18 +42,17 @@ TALL = 15.0  # text sizes from strip to strip
 class FlatPlan:
     """The content of the flat plan.
 
-    Parameters
-    ----------
-    rods, joints : as in the result [m].
-    lines : (r, 2, 2) start and end of each rod on the footprint [mm].
-    cuts : (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
-    courses : (k, 2) of each rod along it, from cut to cut [mm].
-    marks : (c, 2) the joints, in the order of `joints` [mm].
-    footprint : closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
-    boundary : closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if they
-        are not known.
-    rounding : how finely lengths are shown.
-    laths : how much lies on the rods, in words; "" where nothing does.
+    Args:
+        rods, joints: as in the result [m].
+        lines: (r, 2, 2) start and end of each rod on the footprint [mm].
+        cuts: (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
+        courses: (k, 2) of each rod along it, from cut to cut [mm].
+        marks: (c, 2) the joints, in the order of `joints` [mm].
+        footprint: closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
+        boundary: closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if
+            they are not known.
+        rounding: how finely lengths are shown.
+        laths: how much lies on the rods, in words; "" where nothing does.
     """
 
     name: str
@@ -143,9 +142,8 @@ def flat_plan(archive: Archive) -> FlatPlan:
 def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     """The flat plan [mm], its rods labelled in the size `text` [mm].
 
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
+    Args:
+        text: usual size of the texts [mm at 1:1].
     """
     pencil = Pencil()
     for outline in plan.footprint:
@@ -319,10 +317,9 @@ def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
 def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None = None) -> Drawing:
     """The strips of some rods (default: all) one below the other [mm], all starting at x = 0.
 
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
-    rods : those to be drawn; default: all.
+    Args:
+        text: usual size of the texts [mm at 1:1].
+        rods: those to be drawn; default: all.
     """
     pencil = Pencil()
     layer = {rod.id: rod.record.layer for rod in plan.rods}
@@ -337,10 +334,9 @@ def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None =
 def per_sheet(height: float, text: float) -> int:
     """How many strips find room in a height [mm].
 
-    Parameters
-    ----------
-    height : of the room on a sheet [mm].
-    text : size of the texts [mm].
+    Args:
+        height: of the room on a sheet [mm].
+        text: size of the texts [mm].
     """
     return max(int((height / text - 3) // TALL), 1)
 

@@ -49,11 +49,10 @@ _MOST_TILES = 12  # sheets that the parts of one drawing may take
 class TitleBlock:
     """What every drawing of a set says.
 
-    Parameters
-    ----------
-    entries : what it is called and what it is: project, author, date, section, material, ...
-    summary : the cut list in one line.
-    verdict : level and first reason of a verdict that is not good, with `MORE` where there are others; else "".
+    Args:
+        entries: what it is called and what it is: project, author, date, section, material, ...
+        summary: the cut list in one line.
+        verdict: level and first reason of a verdict that is not good, with `MORE` where there are others; else "".
     """
 
     name: str
@@ -76,9 +75,8 @@ class TitleBlock:
 def title_block(archive: Archive, summary: str) -> TitleBlock:
     """The title block of an archive.
 
-    Parameters
-    ----------
-    summary : the cut list in one line.
+    Args:
+        summary: the cut list in one line.
     """
     results = archive.results
     given, rod = results.drawings or Drawings(), results.rod or RodType()
@@ -141,9 +139,8 @@ def _joint(joint: Joint | None) -> str:
 def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     """The drawing with its title block and a scale bar below: for a sheet without a frame.
 
-    Parameters
-    ----------
-    block : entries and notes of the title block.
+    Args:
+        block: entries and notes of the title block.
     """
     (left, bottom), (right, _) = drawing.box()
     size, pencil = drawing.text, Pencil()
@@ -169,11 +166,10 @@ def _write_entries(
 ) -> float:
     """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line.
 
-    Parameters
-    ----------
-    left, y : baseline of the first entry [mm].
-    width : of all columns [mm].
-    size : of the texts; line : from baseline to baseline [mm].
+    Args:
+        left, y: baseline of the first entry [mm].
+        width: of all columns [mm].
+        size: of the texts; line : from baseline to baseline [mm].
     """
     step = width / COLUMNS
     for k, (label, value) in enumerate(block.entries):
@@ -187,9 +183,8 @@ def _write_entries(
 def shortened(text: str, width: float, size: float) -> str:
     """A text that takes at most a width [mm] in a size; what is cut off is shown by dots.
 
-    Parameters
-    ----------
-    width : that is available [mm]; size : of the text [mm].
+    Args:
+        width: that is available [mm]; size : of the text [mm].
     """
     letters = int(width / (LETTER * size))
     return text if len(text) <= letters else text[: letters - 1].rstrip() + "\N{HORIZONTAL ELLIPSIS}"
@@ -198,9 +193,8 @@ def shortened(text: str, width: float, size: float) -> str:
 def _bar_length(longest: float, scale: float) -> float:
     """The round length of a scale bar [mm of the sheet].
 
-    Parameters
-    ----------
-    longest, scale : as of `_scale_bar`.
+    Args:
+        longest, scale: as of `_scale_bar`.
     """
     return nice_step(scale * longest, 2) * 2 / scale
 
@@ -208,12 +202,11 @@ def _bar_length(longest: float, scale: float) -> float:
 def _scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
     """A bar of a round length of at most about `longest` [mm of the sheet], ending at `right`, at 1:`scale`.
 
-    Parameters
-    ----------
-    right, y : lower right corner [mm of the sheet].
-    longest : of the bar [mm of the sheet].
-    text : size of its numbers [mm of the sheet].
-    scale : lengths of the object over those of the sheet.
+    Args:
+        right, y: lower right corner [mm of the sheet].
+        longest: of the bar [mm of the sheet].
+        text: size of its numbers [mm of the sheet].
+        scale: lengths of the object over those of the sheet.
     """
     length = _bar_length(longest, scale)
     for k in range(4):
@@ -239,9 +232,8 @@ class Sheet:
 def room(paper: tuple[float, float]) -> tuple[Floats, Floats]:
     """Lower left and upper right corner of what a sheet has for its drawing [mm].
 
-    Parameters
-    ----------
-    paper : width and height of a sheet [mm].
+    Args:
+        paper: width and height of a sheet [mm].
     """
     return np.array([MARGIN + 4, MARGIN + BLOCK + 4]), np.array(paper) - MARGIN - 4
 
@@ -250,11 +242,10 @@ def room(paper: tuple[float, float]) -> tuple[Floats, Floats]:
 class Layout:
     """A drawing, laid out as few times as it takes: DXF and SVG show it at 1:1, sheets of paper from the same texts.
 
-    Parameters
-    ----------
-    whole : as its one sheet shows it; scale : of that sheet.
-    detail : with smaller texts where the sheet has no room for all, else the same; for files at 1:1.
-    parts : what the parts on several sheets are cut from; None: there are none.
+    Args:
+        whole: as its one sheet shows it; scale : of that sheet.
+        detail: with smaller texts where the sheet has no room for all, else the same; for files at 1:1.
+        parts: what the parts on several sheets are cut from; None: there are none.
     """
 
     whole: Drawing
@@ -280,13 +271,12 @@ def laid_out(
 
     The parts are at the smallest scale that shows all, or the largest there is.
 
-    Parameters
-    ----------
-    compose : makes the drawing for a text size [mm at 1:1].
-    extent : (2,) at least what the drawing takes without texts [mm].
-    paper : width and height of a sheet [mm].
-    finest : size of the texts with which a file at 1:1 shows all that it can [mm].
-    true_size : the parts are at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
+    Args:
+        compose: makes the drawing for a text size [mm at 1:1].
+        extent: (2,) at least what the drawing takes without texts [mm].
+        paper: width and height of a sheet [mm].
+        finest: size of the texts with which a file at 1:1 shows all that it can [mm].
+        true_size: the parts are at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
     """
     whole, scale = fitted(compose, extent, paper)
     detail, parts, of_parts = whole, None, 1.0
@@ -310,9 +300,8 @@ def laid_out(
 def fitted(compose: Compose, extent: Floats, paper: tuple[float, float]) -> tuple[Drawing, float]:
     """A drawing with the texts of a sheet, and the largest standard scale at which one sheet has room for it.
 
-    Parameters
-    ----------
-    compose, extent, paper : as of `laid_out`.
+    Args:
+        compose, extent, paper: as of `laid_out`.
     """
     low, high = room(paper)
     for scale in SCALES:
@@ -345,11 +334,10 @@ def _fits_on(extent: Floats, paper: tuple[float, float]) -> bool:
 def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
     """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where that is one or too many.
 
-    Parameters
-    ----------
-    drawing : at 1:1 [mm].
-    paper : width and height of a sheet [mm].
-    scale : lengths of the object over those of the sheet.
+    Args:
+        drawing: at 1:1 [mm].
+        paper: width and height of a sheet [mm].
+        scale: lengths of the object over those of the sheet.
     """
     low, high = room(paper)
     drawing = drawing.placed(1 / scale, np.zeros(2))
@@ -374,10 +362,9 @@ def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Ite
 def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sheet]:
     """A table over as many sheets as it takes, in as many columns side by side as fit.
 
-    Parameters
-    ----------
-    content : names of the columns, and rows of cells.
-    paper : width and height of a sheet [mm].
+    Args:
+        content: names of the columns, and rows of cells.
+        paper: width and height of a sheet [mm].
     """
     (columns, rows), (low, high) = content, room(paper)
     if not columns:
@@ -408,9 +395,8 @@ def _wrapped(words: str, unit: str, width: int) -> list[str]:
 def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: tuple[float, float]) -> list[Drawing]:
     """The sheets with frames and title blocks, numbered.
 
-    Parameters
-    ----------
-    paper : width and height of a sheet [mm].
+    Args:
+        paper: width and height of a sheet [mm].
     """
     return [
         replace(

@@ -47,9 +47,8 @@ SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, 
 def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
     """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m].
 
-    Parameters
-    ----------
-    positions : (n, 3) nodes of a state [m].
+    Args:
+        positions: (n, 3) nodes of a state [m].
     """
     return [1e3 * positions[rod.nodes] for rod in rods_of(archive) if len(rod.nodes) > 1]
 
@@ -63,9 +62,8 @@ def _stopped(archive: Archive) -> str:
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
     """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions.
 
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
+    Args:
+        text: usual size of the texts [mm at 1:1].
     """
     pencil, final = Pencil(), archive.final
     assert final is not None
@@ -91,9 +89,8 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
 
     A line through all ends shows where they are at each stage; a ring where they end.
 
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
+    Args:
+        text: usual size of the texts [mm at 1:1].
     """
     pencil, history = Pencil(), archive.states["history"]
     assert archive.results.deployment is not None
@@ -149,9 +146,8 @@ def _not_known(results: Results) -> str:
 def _thinned(curve: Floats) -> Floats:
     """A curve by about every third of its nodes, its ends kept.
 
-    Parameters
-    ----------
-    curve : (k, 2 or 3) nodes.
+    Args:
+        curve: (k, 2 or 3) nodes.
     """
     return np.asarray(curve[[*range(0, len(curve) - 1, 3), len(curve) - 1]])
 
@@ -159,9 +155,8 @@ def _thinned(curve: Floats) -> Floats:
 def apart(curves: Iterable[Floats]) -> list[Floats]:
     """Each curve once: in an elevation a rod covers its mirror image.
 
-    Parameters
-    ----------
-    curves : (k, 2) points of each [mm].
+    Args:
+        curves: (k, 2) points of each [mm].
     """
     return list({(np.rint(curve / SAME) + 0.0).tobytes(): curve for curve in curves}.values())
 
@@ -169,10 +164,9 @@ def apart(curves: Iterable[Floats]) -> list[Floats]:
 def _seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
     """The rods of the final shape, pale.
 
-    Parameters
-    ----------
-    archive : a result with a final shape.
-    text : size of the drawing's texts [mm], by which the line width is chosen.
+    Args:
+        archive: a result with a final shape.
+        text: size of the drawing's texts [mm], by which the line width is chosen.
     """
     assert archive.final is not None
     for curve in rod_curves(archive, archive.states[archive.final]):
@@ -197,10 +191,9 @@ def _span(
 def axes(pencil: Pencil, text: float) -> None:
     """Ticks of x and y [mm] along two sides of all that is there.
 
-    Parameters
-    ----------
-    pencil : draws them, around what it has drawn so far.
-    text : size of the drawing's texts [mm].
+    Args:
+        pencil: draws them, around what it has drawn so far.
+        text: size of the drawing's texts [mm].
     """
     low, high = pencil.done("", "", text).box()
     low, high = low - text, high + text
@@ -219,10 +212,9 @@ def axes(pencil: Pencil, text: float) -> None:
 def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     """Where every rod end goes, seen from above, with the direction in which its rod arrives there.
 
-    Parameters
-    ----------
-    plan : the flat plan of the archive.
-    text : usual size of the texts [mm at 1:1].
+    Args:
+        plan: the flat plan of the archive.
+        text: usual size of the texts [mm at 1:1].
     """
     pencil, final = Pencil(), archive.final
     assert final is not None
@@ -327,9 +319,8 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     Each number stands off all rods and diagonals of its cell, as large as finds room; where there is none the table
     has it.
 
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
+    Args:
+        text: usual size of the texts [mm at 1:1].
     """
     pencil, final = Pencil(), archive.final
     assert final is not None

@@ -57,9 +57,8 @@ export default {{
 def frame_html(scene: Scene) -> str:
     """The viewer with a scene as one HTML element.
 
-    Parameters
-    ----------
-    scene : see `scene_of`.
+    Args:
+        scene: see `scene_of`.
     """
     packed = _packed(scene.content())
     page = _PAGE.format(style=viewer_style(), load=_LOAD, script=_packed_script(), scene=packed)
@@ -70,13 +69,11 @@ def frame_html(scene: Scene) -> str:
 def widget_of(scene: Scene) -> "AnyWidget":
     """The viewer with a scene as a widget, whose `picked` is the id of the rod or joint that was clicked last.
 
-    Parameters
-    ----------
-    scene : see `scene_of`.
+    Args:
+        scene: see `scene_of`.
 
-    Raises
-    ------
-    InputError : anywidget is not installed.
+    Raises:
+        InputError: anywidget is not installed.
     """
     try:
         import anywidget

@@ -36,10 +36,9 @@ VERSION = 1
 class Scene:
     """What the viewer shows.
 
-    Parameters
-    ----------
-    header : names, captions, colours; arrays as {"at": first byte, "type": "u1"|"i1"|"u2"|"u4"|"f4", "count": n}.
-    data : the arrays, each beginning at a multiple of four bytes.
+    Args:
+        header: names, captions, colours; arrays as {"at": first byte, "type": "u1"|"i1"|"u2"|"u4"|"f4", "count": n}.
+        data: the arrays, each beginning at a multiple of four bytes.
     """
 
     header: Mapping[str, Any]
@@ -65,17 +64,17 @@ class Coloured:
 class Drawn:
     """What a scene is made of.
 
-    Parameters
-    ----------
-    rods : id and family of each rod.
-    nodes : (k,) nodes of all rods, one rod after the other; counts : (m,) how many each rod has.
-    joints : ids; meeting : (c, 2) entry in `nodes` of each joint on either rod.
-    shapes : in their order, with what colours them; a flat one is shown below the last, where the deployment begins.
-    outline : size of everything [m] -> (s, 2) corners of the rods' section, across and up [m].
-    target : points (p, 3) and triangles (t, 3) of the target, if there is one.
-    reactions : by shape, the forces (2 m, 3) at the start and end of each rod over the largest, and that one in words.
-    rows : of the schedules, by the kind of part.
-    widths : (k, 2) of the section at each node, across and up, over those of `outline`; None: the same everywhere.
+    Args:
+        rods: id and family of each rod.
+        nodes: (k,) nodes of all rods, one rod after the other; counts : (m,) how many each rod has.
+        joints: ids; meeting : (c, 2) entry in `nodes` of each joint on either rod.
+        shapes: in their order, with what colours them; a flat one is shown below the last, where the deployment begins.
+        outline: size of everything [m] -> (s, 2) corners of the rods' section, across and up [m].
+        target: points (p, 3) and triangles (t, 3) of the target, if there is one.
+        reactions: by shape, the forces (2 m, 3) at the start and end of each rod over the largest, and that one in
+            words.
+        rows: of the schedules, by the kind of part.
+        widths: (k, 2) of the section at each node, across and up, over those of `outline`; None: the same everywhere.
     """
 
     name: str
@@ -153,9 +152,8 @@ class Drawn:
 def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     """All shapes of an archive, the draped one among them; None where it has no shape in space.
 
-    Parameters
-    ----------
-    schedules : whether rods and joints have the rows of the schedules with them, which takes most of the time.
+    Args:
+        schedules: whether rods and joints have the rows of the schedules with them, which takes most of the time.
     """
     rods = [rod for rod in rods_of(archive) if len(rod.nodes)]
     names = [name for name in _in_order(shape_names(archive)) if rods]
