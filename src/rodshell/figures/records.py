@@ -16,9 +16,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Fail
 from pydantic_core import CoreSchema, core_schema
 
 from rodshell.arrays import Floats
+from rodshell.rods.supports import Ends as Ends
 from rodshell.validation import NAME
 
-Ends = str  # name of a support
 LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
 MOST = 10**15  # of a count
 FARTHEST = 1e6  # m between two points of a shell, and of each of its lengths

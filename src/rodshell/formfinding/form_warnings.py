@@ -4,12 +4,12 @@ from math import degrees, pi, sqrt
 
 import numpy as np
 
-from rodshell.figures.records import Ends
 from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
 from rodshell.formfinding.methods import Bound, Draped
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import NEAREST_JOINT, Trimmed
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import Ends
 from rodshell.units import length_text
 
 STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short

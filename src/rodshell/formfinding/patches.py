@@ -10,7 +10,6 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
-from rodshell.figures.records import Ends
 from rodshell.formfinding.methods import Draped
 from rodshell.formfinding.pipeline import Stages, compared, find_stages, with_pop_ups
 from rodshell.formfinding.popup import pop_up
@@ -23,7 +22,7 @@ from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.layout.mesh import side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
-from rodshell.rods.supports import BOTH, SUPPORTS, Asked, supports_of
+from rodshell.rods.supports import BOTH, SUPPORTS, Asked, Ends, supports_of
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.targets.patch_layout import PatchLayout

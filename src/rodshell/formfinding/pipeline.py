@@ -11,7 +11,6 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.figures.records import Ends
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings
 from rodshell.formfinding.form_warnings import grid_warnings, pop_up_warnings
@@ -35,7 +34,7 @@ from rodshell.layout.flatgrid import TOGETHER
 from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
-from rodshell.rods.supports import BOTH, PINNED, Asked, Support, supports_of
+from rodshell.rods.supports import BOTH, PINNED, Asked, Ends, Support, supports_of
 from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.units import length_text, percent_text

@@ -15,7 +15,6 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, OutOfTimeError
-from rodshell.figures.records import Ends
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.formfinding.supports import let_go
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
@@ -29,7 +28,7 @@ from rodshell.model.rod_sections import RodSections
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
-from rodshell.rods.supports import CLAMPED, PINNED, Support, support_of
+from rodshell.rods.supports import CLAMPED, PINNED, Ends, Support, support_of
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.grids import alone, together
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace

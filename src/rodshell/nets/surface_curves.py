@@ -200,38 +200,48 @@ def trace(target: Target, law: Law, seeds: Floats, tangents: Floats) -> SurfaceC
     """
     step, count = STEP * target.size, len(seeds)
     x, t = np.tile(seeds, (2, 1)), np.vstack([tangents, -tangents])
-    t = law(target, x, t)[0]
-    knots = [(np.arange(2 * count), x, t)]
-    going = np.arange(2 * count)
-    tolerance = ACCURACY * np.concatenate([np.full(x.size, target.size), np.ones(x.size)])
+    t, going = law(target, x, t)[0], np.arange(2 * count)
+    knots = [(going, x, t)]
     for _ in range(int(LONGEST / STEP)):
-
-        def rates(_: float, state: Floats, half: int = 3 * len(going)) -> Floats:
-            ahead, turning = law(target, state[:half].reshape(-1, 3), state[half:].reshape(-1, 3))
-            return np.concatenate([ahead.ravel(), turning.ravel()])
-
-        start = np.concatenate([x.ravel(), t.ravel()])
-        found = solve_ivp(
-            rates, (0.0, step), start, method="DOP853", rtol=1e-13, atol=tolerance[: len(start)], first_step=step
-        )
-        x, t = found.y[:, -1].reshape(2, -1, 3)
-        x = target.retract(x)
-        t = law(target, x, t)[0]
-        normal = target.on_surface(x).normal
-        t = unit(t - dot(t, normal)[:, None] * normal)
+        before, (x, t) = x, _stepped(target, law, x, t, step)
+        lost = ~(np.isfinite(x).all(axis=1) & np.isfinite(target.margin(x)))
+        if lost.any():
+            raise _off_the_end(before[int(np.argmax(lost))], "cannot be continued")
         knots.append((going, x, t))
-        margin = target.margin(x)
-        if not np.isfinite(x).all() or not np.isfinite(margin).all():
-            raise NetLimitError("a curve cannot be continued to the end of the target")
         left = target.covers(x)  # also across an opening
         going, x, t = going[left], x[left], t[left]
         if len(going) == 0:
             return _joined(target, step, count, knots)
-    px, py, pz = x[0]
-    raise NetLimitError(
-        f"a curve through ({px:.4g}, {py:.4g}, {pz:.4g}) m does not reach the end of the target within "
-        f"{LONGEST:g} times its size"
+    raise _off_the_end(x[0], f"does not arrive within {LONGEST:g} times the target's size")
+
+
+def _off_the_end(point: Floats, why: str) -> NetLimitError:
+    x, y, z = point
+    return NetLimitError(
+        f"a rod that leads through ({x:.4g}, {y:.4g}, {z:.4g}) m to the end of the target {why}: use a smaller part of "
+        "the target, or another anchor or heading"
     )
+
+
+def _stepped(target: Target, law: Law, x: Floats, tangents: Floats, step: float) -> tuple[Floats, Floats]:
+    """Points (n, 3) and unit tangents (n, 3) of curves a step further [m]; NaN where the target has no continuation."""
+    half = x.size
+
+    def rates(_: float, state: Floats) -> Floats:
+        ahead, turning = law(target, state[:half].reshape(-1, 3), state[half:].reshape(-1, 3))
+        return np.concatenate([ahead.ravel(), turning.ravel()])
+
+    found = solve_ivp(
+        rates, (0.0, step), np.concatenate([x.ravel(), tangents.ravel()]), method="DOP853", first_step=step,
+        rtol=1e-13, atol=ACCURACY * np.repeat([target.size, 1.0], half),
+    )  # fmt: skip
+    if not found.success:
+        straight = x + step * tangents
+        return np.where(np.isfinite(target.level(straight)[0])[:, None], straight, np.nan), tangents
+    x, tangents = found.y[:, -1].reshape(2, -1, 3)
+    x = target.retract(x)
+    tangents, normal = law(target, x, tangents)[0], target.on_surface(x).normal
+    return x, unit(tangents - dot(tangents, normal)[:, None] * normal)
 
 
 def _joined(target: Target, step: float, count: int, knots: list[tuple[Ints, Floats, Floats]]) -> SurfaceCurves:
