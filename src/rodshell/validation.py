@@ -30,6 +30,7 @@ LARGEST = 1e18  # of the numbers in an array, whatever their unit: see `units.RA
 _Choice = TypeVar("_Choice", bound=str)
 _Scalar = TypeVar("_Scalar", bound="np.generic")
 NAME = "[a-z0-9]{1,40}"  # of a support: it stands in names of states and files
+Ends = str  # the name of a support
 
 
 def instance(name: str, value: object, kind: type | UnionType, wanted: str = "") -> None:

@@ -16,8 +16,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Fail
 from pydantic_core import CoreSchema, core_schema
 
 from rodshell.arrays import Floats
-from rodshell.rods.supports import Ends as Ends
 from rodshell.validation import NAME
+from rodshell.validation import Ends as Ends
 
 LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
 MOST = 10**15  # of a count

@@ -9,8 +9,8 @@ from rodshell.formfinding.methods import Bound, Draped
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import NEAREST_JOINT, Trimmed
 from rodshell.rods.section import Rod
-from rodshell.rods.supports import Ends
 from rodshell.units import length_text
+from rodshell.validation import Ends
 
 STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
 ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other axis

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 SupportName = Literal["pinned", "clamped"]
 AskedName = Literal[SupportName, "both"]
-Ends = str  # the name of a support
 BOTH: Literal["both"] = "both"  # short for all supports of the table
 
 _RESERVED = (BOTH, "draped", "deployment", "stress", "mode", "buckling")  # would be ambiguous in names of states
