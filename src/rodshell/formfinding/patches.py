@@ -22,12 +22,12 @@ from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.layout.mesh import side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
-from rodshell.rods.supports import BOTH, SUPPORTS, Asked, Ends, supports_of
+from rodshell.rods.supports import BOTH, SUPPORTS, Asked, supports_of
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import shown
-from rodshell.validation import either
+from rodshell.validation import Ends, either
 
 GAP = 2.0  # spacings between the flat grids of neighbouring patches
 

@@ -34,11 +34,11 @@ from rodshell.layout.flatgrid import TOGETHER
 from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
-from rodshell.rods.supports import BOTH, PINNED, Asked, Ends, Support, supports_of
+from rodshell.rods.supports import BOTH, PINNED, Asked, Support, supports_of
 from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.units import length_text, percent_text
-from rodshell.validation import instance
+from rodshell.validation import Ends, instance
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,13 +28,13 @@ from rodshell.model.rod_sections import RodSections
 from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
-from rodshell.rods.supports import CLAMPED, PINNED, Ends, Support, support_of
+from rodshell.rods.supports import CLAMPED, PINNED, Support, support_of
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.grids import alone, together
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
 from rodshell.solve.problem import Pattern, Problem, Supports, mean_radius
 from rodshell.units import length_text
-from rodshell.validation import choice, instance, whole
+from rodshell.validation import Ends, choice, instance, whole
 
 Start = Literal["draped", "flat"]
 STARTS: tuple[Start, ...] = get_args(Start)
