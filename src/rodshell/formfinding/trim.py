@@ -14,6 +14,7 @@ from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
 from rodshell.nets import chebyshev_net
+from rodshell.targets import Target
 from rodshell.validation import array, finite, instance, whole
 
 NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
@@ -235,7 +236,7 @@ def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]
     kept, dropped = list[FlatRod](), list[tuple[str, str]]()
     for k, rod in enumerate(draped.rods):
         s = draped.mesh.stations[draped.mesh.rod_slice(k)]
-        inside = draped.target.margin(draped.positions[draped.mesh.nodes_of(k)]) > 0
+        inside = _margin(draped.target, draped.positions[draped.mesh.nodes_of(k)]) > 0
         if not inside.any():
             dropped.append((rod.name, "it never touches the target"))
             continue
@@ -247,12 +248,21 @@ def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]
     return tuple(kept), dropped
 
 
+def _margin(target: Target, x: Floats) -> Floats:
+    """As `Target.margin`, but negative on the wall below a rim, whose distance to the rim in plan is 0."""
+    margin = target.margin(x)
+    if target.base is not None:
+        return margin
+    level, gradient = target.level(x)
+    return margin + np.minimum(level / np.linalg.norm(gradient, axis=1), 0.0)
+
+
 def _crossing(draped: Draped, rod: int, before: int) -> float:
     """Material coordinate where a rod crosses the target's end, between its nodes `before` and the next."""
     nodes, s = draped.mesh.nodes_of(rod), draped.mesh.stations[draped.mesh.rod_slice(rod)]
     first = int(np.clip(before - 1, 0, len(s) - 4))
     window = slice(first, first + 4)
-    margin = draped.target.margin(draped.positions[nodes[window]])
+    margin = _margin(draped.target, draped.positions[nodes[window]])
     fit = np.polyfit(s[window] - s[before], margin, 3)
     low, high = 0.0, s[before + 1] - s[before]
     rising = np.polyval(fit, low) < 0
