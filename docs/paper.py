@@ -15,7 +15,7 @@ HEAD = """# The paper's figures
 
 HQK = W. Huang, L. Qin, M. Khalid Jawed, J. Appl. Mech. 88 (2021). Made by `make paper`; a single one by
 `rodshell paper FIGURE`, all of them by `rodshell paper all`. Differences from the paper, with their reasons,
-are in [equations.md](equations.md), E1 to E23. Times are those of one thread on one machine, beside other
+are in [equations.md](equations.md), E1 to E23. Times are those of one thread on one machine, with other
 work: only ratios within one table can be compared.
 """
 
