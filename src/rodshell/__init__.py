@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     )
     from rodshell.layout import (
         Asymptotic,
+        Curves,
         FlatGrid,
         FlatRod,
         Geodesic,
@@ -126,7 +127,7 @@ _HOMES = {
     "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": (
-        "Asymptotic", "FlatGrid", "FlatRod", "Geodesic", "GridLayout", "GridMesh", "Profile", "mesh_grid",
+        "Asymptotic", "Curves", "FlatGrid", "FlatRod", "Geodesic", "GridLayout", "GridMesh", "Profile", "mesh_grid",
         "straight_rods",
     ),
     "rodshell.loads.combinations": ("Loads",),
@@ -159,7 +160,7 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Agreement", "Archive", "Asymptotic", "Ball", "Bound", "Boundary", "Cables", "Cap", "ChebyshevNet", "Circle",
-    "ConvergenceError", "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings",
+    "ConvergenceError", "Curves", "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings",
     "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid",
     "FlatRod", "Footprint", "Form", "Freeform", "Geodesic", "GivenSection", "Gravity", "GravityForce", "GridLayout",
     "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Job",

@@ -206,6 +206,21 @@ def _polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
     return tuple(tuple(_POINT.read(point) for point in row) for row in rows)
 
 
+def _strokes(value: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
+    """Rows of points in plan or in space: [[[x, y, z], [x, y, z]], ...], or "x, y, z; x, y, z | x, y; x, y"."""
+    rows = value
+    if isinstance(value, str):
+        rows = [[point.split(",") for point in row.split(";")] for row in value.split("|")]
+    wanted = 'give rows of two points or more, of x, y or x, y, z: [[[-1, 0], [1, 0]]] or "-1, 0; 1, 0"'
+    if not isinstance(rows, list | tuple):
+        raise ValueError(wanted)
+    for row in rows:
+        sizes = {len(point) if isinstance(point, list | tuple) else 0 for point in row} if len(row) > 1 else {0}
+        if sizes not in ({2}, {3}):
+            raise ValueError(wanted)
+    return tuple(tuple(tuple(read_quantity(x, "length") for x in point) for point in row) for row in rows)
+
+
 def _line(value: object) -> tuple[tuple[float, float], ...]:
     """Points of one line: [[x, y], [x, y]], or "x, y; x, y"."""
     rows = _polylines(value if isinstance(value, str) else [value])
@@ -293,6 +308,7 @@ Ratio = Annotated[float, Value(_ratio)]
 Numbers = Annotated[tuple[float, ...], Value(_numbers)]
 Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], Value(_polylines)]
 Line = Annotated[tuple[tuple[float, float], ...], Value(_line)]
+Strokes = Annotated[tuple[tuple[tuple[float, ...], ...], ...], Value(_strokes)]
 PoissonRatio = Annotated[float, Value(_poisson_ratio, lambda name, value: number(name, value))]
 Stiffness = Annotated[
     float,

@@ -116,6 +116,7 @@ def values() -> dict[str, Call]:
     calls = {
         "Archive": Call(rs.Archive, results=own["form"].results, states={}),
         "Asymptotic": Call(rs.Asymptotic, spacing=0.1),
+        "Curves": Call(rs.Curves, lines=[[(-1.0, 0.0), (1.0, 0.1)], [(0.0, -1.0), (0.1, 1.0, )]], spacing=0.1),
         "Ball": Call(rs.Ball, mass=0.1),
         "Boundary": Call(rs.Boundary, points=np.zeros((4, 3)), tangents=np.eye(4, 3)),
         "Cables": Call(rs.Cables, rod=rod),

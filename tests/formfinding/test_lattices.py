@@ -3,12 +3,14 @@
 from functools import cache
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 
 import rodshell as rs
 from rodshell.case import load_case
 from rodshell.errors import InputError
+from rodshell.nets.surface_lattice import surface_net
 from rodshell.output.drawings import drawing_set
 from rodshell.output.grid import joints_of, rods_of, shape_names
 from rodshell.results.archive import Archive, read
@@ -194,3 +196,80 @@ def test_curves_pass_over_an_opening_and_rods_end_at_it() -> None:
     assert np.count_nonzero(radius < 1.0) >= 8
     inside = form.popped["pinned"].positions[:, :2]
     assert np.linalg.norm(inside, axis=1).min() > 0.75
+
+
+DRAWN = [[(x, -1.3), (x + 0.05, 0.0), (x, 1.3)] for x in (-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75)]
+DRAWN += [[point[::-1] for point in line] for line in DRAWN]
+
+
+def test_rods_along_given_lines_stand_and_keep_their_names_and_lengths() -> None:
+    names = [f"{letter}{k}" for letter in "AB" for k in range(1, 8)]
+    form = rs.find_form(LOW, rs.Curves(lines=DRAWN, names=names), lath(0.01), joint=rs.Pin(), ends="pinned")
+    assert form.status == "converged"
+    assert form.popped["pinned"].report.stable
+    assert form.agreement["pinned"].max_relative < 5e-3
+    assert [rod.name for rod in form.footprint.rods] == names
+    middle = form.footprint.rods[
+        names.index("A4")
+    ]  # through (0, -1.3), (0.05, 0), (0, 1.3), over the cap's base circle
+    y = np.linspace(-1.2, 1.2, 20001)
+    x = 0.05 * (1 - (y / 1.3) ** 2)
+    within = x**2 + y**2 < 4.0 - 1.6**2
+    arc = np.column_stack([x, y, np.sqrt(4.0 - x**2 - y**2)])[within]
+    assert middle.length == pytest.approx(np.linalg.norm(np.diff(arc, axis=0), axis=1).sum(), abs=3e-4)  # a step of y
+
+
+@pytest.mark.parametrize("kind", ["csv", "obj", "dxf"])
+def test_lines_are_read_from_files_and_stay_in_the_case(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rods.{kind}"
+    if kind == "csv":
+        rows = [f"S{k};{x};{y}".replace(".", ",") for k, line in enumerate(DRAWN) for x, y in 1e3 * np.array(line)]
+        path.write_text("\n".join(["rod;x;y", *rows]))
+    elif kind == "obj":
+        t = np.linspace(-1.0, 1.0, 9)
+        fine = [np.column_stack([x + 0.05 * (1 - t**2), 1.3 * t]) for (x, _), _, _ in DRAWN[:7]]  # the parabolas
+        fine += [line[:, ::-1] for line in fine]
+        points = [(x, y, np.sqrt(4.0 - x**2 - y**2)) for line in fine for x, y in line]
+        lines = [f"v {1e3 * x} {1e3 * y} {1e3 * z}" for x, y, z in points]
+        of = [" ".join(str(9 * k + j) for j in range(1, 10)) for k in range(len(DRAWN))]
+        path.write_text("\n".join([*lines, *(f"l {indices}" for indices in of)]))
+    else:
+        drawing = ezdxf.new()
+        for line in DRAWN:
+            drawing.modelspace().add_spline([(1e3 * x, 1e3 * y) for x, y in line])
+        drawing.saveas(path)
+    drawn = {"layout.kind": "curves", "layout.file": str(path), "layout.unit": "mm"}
+    case = load_case("cap", {**drawn, "target.radius": 2.0, "target.base": 1.6})
+    assert case.layout.kind == "curves"
+    assert len(case.layout.lines) == len(DRAWN)
+    assert case.layout.names[0] == ("S0" if kind == "csv" else "R01")
+    path.unlink()
+    again = load_case(case.to_toml())
+    assert again.layout == case.layout
+    crossings = surface_net(LOW, case.layout.build(LOW)).crossings
+    exact = surface_net(LOW, rs.Curves(lines=DRAWN).build(LOW)).crossings
+    np.testing.assert_array_equal(crossings.rods, exact.rods)
+    if kind == "csv":
+        np.testing.assert_allclose(crossings.at, exact.at, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ("rod,x\nA,1", "needs the columns rod, x, y"),
+        ("rod,x,y\nA,1,2", "rod 'A' has 1 point"),
+        ("rod,x,y\nA,1,two\nA,2,3", "line 2, y"),
+        ("rod,x,y\nA,1\nA,2,3", "line 2 has 2 cells, the header 3"),
+    ],
+)
+def test_a_damaged_table_of_lines_is_named(table: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "rods.csv").write_text(table)
+    with pytest.raises(InputError, match=says):
+        load_case("cap", {"layout.kind": "curves", "layout.file": str(tmp_path / "rods.csv")})
+
+
+def test_given_lines_have_no_anchor_and_must_cross() -> None:
+    with pytest.raises(InputError, match="an anchor is a point from which rods are set out"):
+        rs.find_form(LOW, rs.Curves(lines=DRAWN), lath(0.01), anchor=(0.1, 0.0))
+    with pytest.raises(InputError, match="no two rods cross on the target, on which 2 lie"):
+        rs.find_form(LOW, rs.Curves(lines=[DRAWN[0], DRAWN[3]], spacing=0.3), lath(0.01))

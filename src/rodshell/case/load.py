@@ -129,6 +129,8 @@ def load_case(
         layout = raw.get("layout", {})
         for key in ("rods", "length") if {"seams.lines", "seams.file"} & overrides.keys() else ():
             layout.pop(key, None)  # of the whole; what seams cut has them from its patches
+        for key in ("spacing", "edge") if overrides.get("layout.kind") == "curves" else ():
+            layout.pop(key, None)  # those of the paper's grid; the lines have their own
         if overrides.get("drape.method") == "paper":
             layout.pop("edge", None)  # 5 mm as the paper states; its falls had longer ones, as any fall has (E21)
     return _validated(raw, overrides, files)
@@ -213,6 +215,7 @@ def _validated(raw: _Raw, overrides: dict[str, object], files: Callable[[object]
         _table(raw, table)[key] = value
     raw["bracing"] = {key: value for key, value in raw["bracing"].items() if value is not None and value != {}}
     _read_seams(raw["seams"], files)
+    _read_drawn_rods(raw["layout"], files)
     return read(Case, raw, unknown=partial(unknown_key, raw), files=files)
 
 
@@ -271,6 +274,24 @@ def _read_seams(table: _Raw, files: Callable[[object], str] | None) -> None:
         raise InputError(f"seams.file = {shown(name)}: {reason}") from None
     del table["file"]
     table["lines"] = [*given, *(line[:, :2].tolist() for line in drawn)]
+
+
+def _read_drawn_rods(table: _Raw, files: Callable[[object], str] | None) -> None:
+    """Put the lines of a file of drawn rods into the case, which then needs the file no longer."""
+    name = table.get("file")
+    if name is None or table.get("kind") != "curves":
+        return
+    from rodshell.case.drawn_rods import read_drawn_rods  # here, as most cases have no such file
+
+    if "lines" in table or "names" in table:
+        raise InputError("layout.lines and layout.names are those of layout.file: leave out one or the other")
+    unit = _value_of(Unit, "layout.unit", table.pop("unit", 1.0))
+    try:
+        drawn = read_drawn_rods(file_path("the file", name if files is None else files(name)), unit)
+    except InputError as reason:
+        raise InputError(f"layout.file = {shown(name)}: {reason}") from None
+    del table["file"]
+    table |= {"lines": list(drawn.values()), "names": list(drawn)}
 
 
 def _value_of(hint: Any, key: str, given: object) -> Any:

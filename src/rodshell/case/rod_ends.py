@@ -1,7 +1,5 @@
 """Rods given by where their ends lie flat and where they go: read from a table, or from an earlier result."""
 
-import csv
-from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -10,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.case.csv_rows import csv_rows
 from rodshell.errors import InputError
 from rodshell.figures.form import Stiffness
 from rodshell.layout import FlatGrid, Profile, straight_rods
 from rodshell.units import length_text, parse_quantity, read_unit, shown
-from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import instance, positive
 
 COLUMNS = (
@@ -103,19 +101,7 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
         scale = None if unit is None else float(read_unit(unit, "length"))
     except ValueError as reason:
         raise InputError(f"unit = {shown(unit)}: {reason}") from None
-    lines = read_text(path, instead="give a CSV table").splitlines()
-    if len(lines) > limit(MOST_RODS):
-        raise InputError(
-            f"{path} has {len(lines)} lines, and at most {limit(MOST_RODS):.0f} are read: give one for each rod, "
-            f"{raised(MOST_RODS, len(lines))}"
-        )
-    delimiter = max(",;\t", key=lines[0].count) if lines else ","
-    reader = csv.reader(lines, delimiter=delimiter)
-    try:
-        table = [(reader.line_num, cells) for cells in reader]
-    except csv.Error as reason:
-        raise InputError(f"{path} line {reader.line_num} is not a row of a CSV table: {reason}") from None
-    header = [name.strip() for name in table[0][1]] if table else []
+    header, rows = csv_rows(path, MOST_RODS)
     columns = _columns(path, header)
     if columns != COLUMNS:
         if scale not in (None, MILLIMETRE):
@@ -124,7 +110,7 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     if scale is None:
         raise InputError("unit is missing: give the unit of the table's coordinates, such as m (--unit m)")
     names, numbers = list[str](), list[list[float]]()
-    for where, row in _rows(path, table[1:], header, delimiter):
+    for where, row in rows:
         numbers.append([parse_quantity(row[column], "number", f"{where}, {column}") for column in columns])
         names.append(row.get("id", "").strip())
     if not numbers:
@@ -153,21 +139,6 @@ def _columns(path: Path, header: list[str]) -> tuple[str, ...]:
                 f"{path}: the column {column} is missing{hint}; it needs {', '.join(COLUMNS)}, or all of them with _mm"
             )
     return COLUMNS
-
-
-def _rows(
-    path: Path, lines: list[tuple[int, list[str]]], header: list[str], delimiter: str
-) -> Iterator[tuple[str, dict[str, str]]]:
-    """Each row that is not blank, by column, and how to name it in a message."""
-    for number, cells in lines:
-        where = f"{path} line {number}"
-        if not any(cell.strip() for cell in cells):
-            continue
-        if len(cells) != len(header):
-            raise InputError(f"{where} has {len(cells)} cells, the header {len(header)}: give one for each")
-        if delimiter != ",":
-            cells = [cell if name == "id" else cell.replace(",", ".") for name, cell in zip(header, cells, strict=True)]
-        yield where, dict(zip(header, cells, strict=True))
 
 
 def _labels(path: Path, names: list[str]) -> list[str] | None:

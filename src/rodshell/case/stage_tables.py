@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from rodshell.case.held import Holding
 from rodshell.errors import InputError
-from rodshell.layout.lattices import Asymptotic, Geodesic
+from rodshell.layout.lattices import Asymptotic, Curves, Geodesic
 from rodshell.quantities import (
     Acceleration,
     Angle,
@@ -70,7 +70,22 @@ class LayoutTable(Holding):
         return GridLayout.orthogonal(**(keys | {"spacing": spacing, "rotate": rotate}))
 
 
-LayoutKinds = LayoutTable | Geodesic | Asymptotic
+@dataclass(frozen=True, kw_only=True)
+class DrawnCurves(Curves):
+    """Curves, of which a file may give the lines; a case that was read has them itself."""
+
+    file: Annotated[FileToRead | None, "CSV table (rod,x,y or rod,x,y,z), OBJ, DXF or 3dm file with a curve a rod"] = (
+        None
+    )
+    unit: Annotated[Unit, "unit of that file, such as mm; a 3dm file states its own"] = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.unit != 1.0:
+            raise InputError("layout.unit is the unit of layout.file, which is missing: leave it out, or give the file")
+
+
+LayoutKinds = LayoutTable | Geodesic | Asymptotic | DrawnCurves
 
 
 FALLING = ("height", "coupling", "C1", "C2", "time_step", "duration", "friction", "drag", "frames")

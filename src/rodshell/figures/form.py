@@ -47,7 +47,7 @@ class Target(Record):
 class Layout(Record):
     """How the rods were to be laid out."""
 
-    kind: Text | None = key("lattice: chebyshev, geodesic or asymptotic")
+    kind: Text | None = key("lattice: chebyshev, geodesic, asymptotic or curves")
     families: Whole | None = key("number of families of a geodesic or asymptotic lattice")
     rods: Text | tuple[Whole, Whole] | None = key('number of rods of families u and v, or "auto"')
     spacing: tuple[Real, Real] | None = key("distance between neighbouring rods of the first family and of others", "m")

@@ -17,7 +17,7 @@ from rodshell.geometry.frames import unit
 from rodshell.joints import Joint
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.gridlayout import piece_names
-from rodshell.layout.lattices import Asymptotic, Geodesic
+from rodshell.layout.lattices import Asymptotic, Curves, Geodesic, SurfaceLattice
 from rodshell.layout.mesh import cut_mesh
 from rodshell.model.assembly import Freedom
 from rodshell.nets.surface_lattice import SurfaceNet, surface_net
@@ -32,12 +32,11 @@ from rodshell.units import shown
 
 MOST_ITERATIONS = 100  # of the flat state: a grid that lies flat takes less than ten
 PENALTY = 8e4  # stiffness of the edges against that of bending over the size, as of a bound drape
-LETTERS = "UVW"  # of the families
 
 
 def lay(
     target: Target,
-    lattice: Geodesic | Asymptotic,
+    lattice: Geodesic | Asymptotic | Curves,
     rod: Rod,
     *,
     anchor: tuple[float, float] | None = None,
@@ -61,6 +60,10 @@ def lay(
     lattice = lattice.build(target)
     progress("net", f"following {lattice.kind} curves", 0.0)
     net = surface_net(target, lattice, anchor=anchor)
+    if not len(net.crossings):
+        raise InputError(
+            f"no two rods cross on the target, on which {len(net.names)} lie: set them closer, or draw others"
+        )
     mesh, positions = _meshed(net)
     flat = flat_state(mesh, positions, rod, progress=progress)
     mesh = replace(mesh, flat=np.column_stack([flat.positions, np.zeros(mesh.node_count)]))
@@ -76,11 +79,11 @@ def lay(
     return Draped(
         method=Bound(), target=target, layout=lattice, rod=rod, anchor=anchor, eccentricity=0.0, mesh=mesh,
         positions=positions, rods=_built(mesh.grid.rods, lattice), levels=(report,), figures=figures, flat_state=flat,
-        warnings=target.warnings,
+        warnings=(*target.warnings, *net.warnings),
     )  # fmt: skip
 
 
-def _built(rods: tuple[FlatRod, ...], lattice: Geodesic | Asymptotic) -> tuple[FlatRod, ...]:
+def _built(rods: tuple[FlatRod, ...], lattice: SurfaceLattice) -> tuple[FlatRod, ...]:
     """The rods but those that the lattice leaves out."""
     if unknown := set(lattice.left_out) - {rod.name for rod in rods}:
         raise InputError(
@@ -96,11 +99,9 @@ def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
     Curves are meshed past the ends of the target, and across its openings, and cut there.
     """
     curves, lattice, reach = net.curves, net.lattice, net.curves.reach
-    (of, ends), count = curves.pieces, dict[int, int]()
+    of, ends = curves.pieces
     lines, rods = list[FlatRod](), list[FlatRod]()
-    for k, (family, (start, stop)) in enumerate(zip(net.family.tolist(), reach.tolist(), strict=True)):
-        count[family] = count.get(family, 0) + 1
-        name = f"{LETTERS[family]}{count[family]:02d}"
+    for k, (name, (start, stop)) in enumerate(zip(net.names, reach.tolist(), strict=True)):
         lines.append(FlatRod(name, "free", 0.0, start, stop, (0.0, lattice.least_spacing * k), (1.0, 0.0)))
         pieces = ends[of == k].tolist()
         named = zip(piece_names(name, len(pieces)), pieces, strict=True)

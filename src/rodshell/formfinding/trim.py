@@ -254,7 +254,8 @@ def _margin(target: Target, x: Floats) -> Floats:
     if target.base is not None:
         return margin
     level, gradient = target.level(x)
-    return margin + np.minimum(level / np.linalg.norm(gradient, axis=1), 0.0)
+    below: Floats = np.minimum(level / np.linalg.norm(gradient, axis=1), 0.0)
+    return margin + below
 
 
 def _crossing(draped: Draped, rod: int, before: int) -> float:

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, straight_rods
     from rodshell.layout.gridlayout import GridLayout, Layout, require_chebyshev
-    from rodshell.layout.lattices import Asymptotic, Geodesic, SurfaceLattice
+    from rodshell.layout.lattices import Asymptotic, Curves, Geodesic, SurfaceLattice
     from rodshell.layout.mesh import GridMesh, mesh_grid
     from rodshell.layout.profile import Profile
 
 __all__ = [
-    "Asymptotic", "Crossings", "FlatGrid", "FlatRod", "Geodesic", "GridLayout", "GridMesh", "Layout", "Profile",
-    "SurfaceLattice", "mesh_grid", "require_chebyshev", "straight_rods",
+    "Asymptotic", "Crossings", "Curves", "FlatGrid", "FlatRod", "Geodesic", "GridLayout", "GridMesh", "Layout",
+    "Profile", "SurfaceLattice", "mesh_grid", "require_chebyshev", "straight_rods",
 ]  # fmt: skip
 
 _HOMES = {
     "flatgrid": ("Crossings", "FlatGrid", "FlatRod", "straight_rods"),
     "gridlayout": ("GridLayout", "Layout", "require_chebyshev"),
-    "lattices": ("Asymptotic", "Geodesic", "SurfaceLattice"),
+    "lattices": ("Asymptotic", "Curves", "Geodesic", "SurfaceLattice"),
     "mesh": ("GridMesh", "mesh_grid"),
     "profile": ("Profile",),
 }

@@ -11,7 +11,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod, refuse_too_many
-from rodshell.layout.lattices import EDGES_A_SPAN, Asymptotic, Geodesic
+from rodshell.layout.lattices import EDGES_A_SPAN, Asymptotic, Curves, Geodesic
 from rodshell.units import NUMBER
 from rodshell.validation import flag, instance, is_auto, number, numbers, positive, short, texts, whole
 
@@ -265,7 +265,7 @@ def piece_names(rod: str, count: int) -> list[str]:
     return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
 
 
-Layout = GridLayout | Geodesic | Asymptotic
+Layout = GridLayout | Geodesic | Asymptotic | Curves
 """How the rods of a form are laid out: in the flat grid, or along curves of the target."""
 
 

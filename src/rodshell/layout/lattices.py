@@ -1,14 +1,16 @@
-"""Lattices whose rods follow curves of the target: geodesics, for laths that lie flat, and asymptotic lines, for strips
-that stand upright."""
+"""Lattices whose rods follow curves of the target: geodesics, for laths that lie flat, asymptotic lines, for strips
+that stand upright, and curves that are given."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Protocol, Self
 
+import numpy as np
+
 from rodshell.errors import InputError
-from rodshell.quantities import Angle, LengthOrAuto, LengthsOrAuto, Names, Whole
+from rodshell.quantities import Angle, LengthOrAuto, LengthsOrAuto, Names, Strokes, Whole
 from rodshell.units import NUMBER, rounded_down
-from rodshell.validation import is_auto, number, numbers, positive, texts, whole
+from rodshell.validation import array, finite, is_auto, listed, number, numbers, positive, texts, whole
 
 EDGES_A_SPAN = 6  # edges of the mesh per spacing, where the edge is "auto"
 
@@ -139,3 +141,75 @@ class Asymptotic(SurfaceLattice):
     @property
     def family_count(self) -> int:
         return 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curves(SurfaceLattice):
+    """Rods along curves that are given, in plan or in space; they are joined wherever two of them cross.
+
+    Args:
+        lines: points (n, 2) or (n, 3) of each rod [m]: in plan, which are lifted onto the target, or near the target,
+            which are moved onto it. A smooth curve leads through the points of a rod, of two a straight one in plan. A
+            rod that leads past the end of the target ends there.
+        names: of the rods; none: R01, R02 and so on.
+        rotate: angle by which the lines are turned about the z axis [rad].
+        spacing: that is usual between the rods, on which edges and the least distance of a joint from a rod's end
+            depend [m]; "auto": twice the area that the lines cover over their length.
+
+    Raises:
+        InputError: also a line of other points; another number of names, or one that occurs twice.
+    """
+
+    lines: Annotated[Strokes, 'points of each rod, "x,y,z; x,y,z" or in plan; "|" between two rods'] = ()
+    names: Annotated[Names, "names of the rods; default: R01, R02, ..."] = ()
+
+    kind = "curves"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        lines = []
+        for k, line in enumerate(listed("layout lines", self.lines, "the points of each rod"), start=1):
+            points = array(f"line {k} of the layout", line, np.float64, None, None)
+            if len(points) < 2 or points.shape[1] not in (2, 3):
+                raise InputError(
+                    f"line {k} of the layout is of the shape {points.shape}: a rod needs two or more points, of two or "
+                    "three coordinates"
+                )
+            lines.append(tuple(map(tuple, finite(f"line {k} of the layout", points, *points.shape).tolist())))
+        object.__setattr__(self, "lines", tuple(lines))
+        names = texts("layout names", self.names, "names of rods") or tuple(f"R{k + 1:02d}" for k in range(len(lines)))
+        object.__setattr__(self, "names", names)
+        if len(names) != len(lines) or len(set(names)) != len(names):
+            raise InputError(
+                f"layout names has {len(set(names))} different names for {len(lines)} lines: give each line "
+                "its own, or leave them out"
+            )
+
+    @property
+    def family_count(self) -> int:
+        return 1
+
+    def build(self, target: Sized | None = None) -> Self:
+        """The lattice with a spacing.
+
+        Raises:
+            InputError: there are no lines.
+        """
+        if not self.lines:
+            raise InputError('a layout of kind "curves" needs lines: give layout.file, or layout.lines')
+        if self.spacing != "auto":
+            return self
+        plans = [np.array(line)[:, :2] for line in self.lines]
+        first, last = (np.concatenate([plan[part] for plan in plans]) for part in (slice(None, -1), slice(1, None)))
+        lengths = np.linalg.norm(last - first, axis=1)
+        points, weights = (
+            np.vstack([first, 0.5 * (first + last), last]),
+            np.outer([1, 4, 1], lengths).ravel(),
+        )  # Simpson
+        about = points - np.average(points, axis=0, weights=weights)
+        spread = np.linalg.det(about.T @ (weights[:, None] * about) / max(weights.sum(), 1e-300))
+        area = 12.0 * np.sqrt(max(float(spread), 0.0))  # of a rectangle, whose sides have the variances a^2 / 12
+        if not area > 1e-6 * lengths.sum() ** 2 / len(plans) ** 2:
+            raise InputError("the lines of the layout cover no area: give curves that cross each other")
+        spacing = rounded_down(2.0 * area / float(lengths.sum()))
+        return replace(self, spacing=(spacing, spacing))

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import NetLimitError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout.flatgrid import Crossings
@@ -72,6 +72,7 @@ class SurfaceCurves:
         begin: (m + 1,) where the knots of each curve begin.
         before: (m,) knots of each curve before its seed.
         points, tangents: (k, 3) of the knots, the tangents of length 1.
+        limits: (m, 2) arc lengths at which each begins and ends, wherever the target does [m]; None: nowhere else.
     """
 
     target: Target
@@ -80,6 +81,7 @@ class SurfaceCurves:
     before: Ints
     points: Floats
     tangents: Floats
+    limits: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.before)
@@ -136,15 +138,23 @@ class SurfaceCurves:
         curve = np.repeat(np.arange(len(self)), counts)
         place = np.arange(len(curve)) - (np.cumsum(counts) - counts)[curve]
         s = reach[curve, 0] + self.step / FINER * place
-        inside = self.target.margin(self.at(curve, s)[0]) > 0.0
+        inside = self._inside(curve, s)
         change = np.flatnonzero((inside[1:] != inside[:-1]) & (curve[1:] == curve[:-1]))
         of, leaves = curve[change], inside[change]
         near, far = np.where(leaves, s[change], s[change + 1]), np.where(leaves, s[change + 1], s[change])
         for _ in range(BISECTIONS):
             middle = 0.5 * (near + far)
-            within = self.target.margin(self.at(of, middle)[0]) > 0.0
+            within = self._inside(of, middle)
             near, far = np.where(within, middle, near), np.where(within, far, middle)
         return of[::2], near.reshape(-1, 2)
+
+    def _inside(self, curve: Ints, s: Floats) -> Bools:
+        """(n,) whether there is a target, and the curve, at these arc lengths."""
+        inside = self.target.margin(self.at(curve, s)[0]) > 0.0
+        if self.limits is not None:
+            low, high = self.limits[curve].T
+            inside &= (low <= s) & (s <= high)
+        return inside
 
     @cached_property
     def ends(self) -> Floats:

@@ -5,13 +5,19 @@ from math import cos, sin
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout.flatgrid import Crossings
-from rodshell.layout.lattices import Geodesic, SurfaceLattice
+from rodshell.layout.gridlayout import piece_names
+from rodshell.layout.lattices import Curves, Geodesic, SurfaceLattice
+from rodshell.nets.drawn_curves import drawn_curves
 from rodshell.nets.surface_curves import SurfaceCurves, asymptotic, geodesic, trace
 from rodshell.targets import Target
+from rodshell.units import length_text
+
+LETTERS = "UVW"  # of the families
+MOVED = 1e-3  # of the size: lines that lie further off the target are said to be moved
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -20,14 +26,16 @@ class SurfaceNet:
 
     Args:
         curves: of the rods, from past an end of the target to past another.
-        family: (m,) of each rod, from 0.
+        names: of the rods.
         crossings: of the rods, with the arc lengths of `curves`.
+        warnings: sentences.
     """
 
     lattice: SurfaceLattice
     curves: SurfaceCurves
-    family: Ints
+    names: tuple[str, ...]
     crossings: Crossings
+    warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"SurfaceNet({len(self.curves)} rods, {len(self.crossings)} crossings on {self.curves.target})"
@@ -55,6 +63,12 @@ def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float,
             the place.
         InputError: the anchor is outside the target.
     """
+    if isinstance(lattice, Curves):
+        if anchor is not None:
+            raise InputError(
+                "an anchor is a point from which rods are set out, and these are given by lines: leave it out"
+            )
+        return _of_lines(target, lattice)
     place = target.lift(np.array([anchor if anchor is not None else target.summit]))
     if not target.covers(place)[0]:
         raise InputError("the anchor is outside the target: choose a point inside its rim")
@@ -73,7 +87,22 @@ def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float,
         family += [k] * len(s)
     curves = trace(target, law, np.concatenate(points), np.concatenate(tangents))
     families = np.array(family)
-    return SurfaceNet(lattice, curves, families, curves.crossings(families))
+    names = [f"{LETTERS[k]}{number:02d}" for k in range(len(headings)) for number in range(1, family.count(k) + 1)]
+    return SurfaceNet(lattice, curves, tuple(names), curves.crossings(families))
+
+
+def _of_lines(target: Target, lattice: Curves) -> SurfaceNet:
+    """The rods along the lines that are given, each joined to every other."""
+    turn = np.eye(3)
+    turn[:2, :2] = [[cos(lattice.rotate), -sin(lattice.rotate)], [sin(lattice.rotate), cos(lattice.rotate)]]
+    lines = [np.array(line) @ turn[: len(line[0]), : len(line[0])].T for line in lattice.lines]
+    curves, line, moved = drawn_curves(target, lines, lattice.names)
+    count = np.bincount(line, minlength=len(lines))
+    names = [name for k in range(len(lines)) if count[k] for name in piece_names(lattice.names[k], int(count[k]))]
+    warnings = tuple[str, ...]()
+    if moved > MOVED * target.size:
+        warnings = (f"the lines of the rods lie up to {length_text(moved)} off the target, and were moved onto it",)
+    return SurfaceNet(lattice, curves, tuple(names), curves.crossings(line), warnings)
 
 
 def _normal(target: Target, x: Floats) -> Floats:

@@ -180,7 +180,8 @@ def _net_and_drape(results: Results, length: Length) -> Iterator[str]:
         yield f"  footprint error {length(net.error_estimate)} before extrapolation; smallest angle {angle}"
     drape, layout = results.drape, results.layout
     if drape and layout and layout.families:
-        yield f"  drape     along {layout.kind} curves, {layout.families} families; gap {length(drape.max_gap)}"
+        along = "given" if layout.kind == "curves" else f"{layout.families} families of {layout.kind}"
+        yield f"  drape     along {along} curves; gap {length(drape.max_gap)}"
     elif drape:
         work = sum(level.factorizations or 0 for level in drape.levels)
         gap = "gap" if drape.method == "bound" else "deepest node inside by"

@@ -31,7 +31,7 @@ def read_curves(path: Path, unit: float) -> list[Floats]:
     Raises:
         InputError: the file is missing or damaged, or has no closed curve.
     """
-    loops = closed_loops(_strokes(path, unit))
+    loops = closed_loops(read_strokes(path, unit))
     if not loops or not all(np.isfinite(loop).all() for loop in loops):
         raise InputError(f"{path} has no closed curve with finite coordinates: draw one polyline around the shell")
     return loops
@@ -49,14 +49,21 @@ def read_lines(path: Path, unit: float) -> list[Floats]:
     Raises:
         InputError: the file is missing or damaged, or has no curve.
     """
-    lines = join_end_to_end(_strokes(path, unit))
+    lines = join_end_to_end(read_strokes(path, unit))
     if not lines or not all(np.isfinite(line).all() for line in lines):
         raise InputError(f"{path} has no line with finite coordinates: draw a polyline along each seam")
     return lines
 
 
-def _strokes(path: Path, unit: float) -> list[Floats]:
-    """Polylines (n, 3) [m] in the order of the file."""
+def read_strokes(path: Path, unit: float) -> list[Floats]:
+    """Read the curves of an OBJ, DXF or 3dm file one by one, as polylines (n, 3) in the order of the file [m].
+
+    Args:
+        unit: length of the file's unit [m]; a 3dm file that states its own is read in that.
+
+    Raises:
+        InputError: the file is missing or damaged, of another kind, or leads too far.
+    """
     data, kind = file_bytes(path), path.suffix.lower()
     if kind not in _CURVE_FILES:
         raise InputError(f"{path}: curves are read from {', '.join(_CURVE_FILES)} files")
