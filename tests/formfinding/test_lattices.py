@@ -273,3 +273,32 @@ def test_given_lines_have_no_anchor_and_must_cross() -> None:
         rs.find_form(LOW, rs.Curves(lines=DRAWN), lath(0.01), anchor=(0.1, 0.0))
     with pytest.raises(InputError, match="no two rods cross on the target, on which 2 lie"):
         rs.find_form(LOW, rs.Curves(lines=[DRAWN[0], DRAWN[3]], spacing=0.3), lath(0.01))
+
+
+def test_broad_laths_buckle_along_given_lines_unless_they_are_curved_at_rest() -> None:
+    lines = [[(x, -3.0), (x, 3.0)] for x in np.arange(-1.0, 1.01, 0.25)]
+    lines += [[point[::-1] for point in line] for line in lines]
+    straight, curved = (
+        rs.find_form(LOW, rs.Curves(lines=lines, rest=rest), lath(0.04), joint=rs.Pin(), ends="pinned")
+        for rest in ("straight", "curved")
+    )
+    assert straight.status != "converged"
+    assert curved.popped["pinned"].report.stable
+    assert curved.agreement["pinned"].max_relative < 3e-3
+
+
+def test_on_a_plane_a_curved_lattice_is_free_of_stress() -> None:
+    """Blanks cut along the lines of a flat target."""
+    flat = rs.HeightField(function=lambda x, y: 1e-3 + 0 * x, domain=rs.Rectangle((2.0, 2.0)))
+    lines = [[(x + 0.2 * (1 - y**2), y) for y in np.linspace(-1.2, 1.2, 9)] for x in (-0.6, -0.2, 0.2, 0.6)]
+    lines += [[point[::-1] for point in line] for line in lines]
+    strains = []
+    for edge in (0.06, 0.03):
+        layout = rs.Curves(lines=lines, rest="curved", edge=edge)
+        found = rs.drape(layout, lath(0.04), flat, joint=rs.Pin()).flat_state
+        assert found is not None
+        assert found.strain is not None
+        strains.append(found.strain)
+    bent = 0.02 * 0.4  # half the breadth times the lines' curvature: what straight rods would have
+    assert strains[0] < 2e-3 * bent
+    assert strains[1] < 0.3 * strains[0]

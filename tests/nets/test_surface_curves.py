@@ -93,7 +93,7 @@ def test_asymptotic_lines_have_no_normal_curvature(name: str) -> None:
         _, points, tangents = along(net.curves, k)
         shape = target.on_surface(points).hessian
         assert np.abs(np.einsum("ni,nij,nj->n", tangents, shape, tangents)).max() < 1e-6
-    assert set(net.family) == {0, 1}
+    assert {name[0] for name in net.names} == {"U", "V"}
     assert len(net.crossings) > 100
 
 
@@ -129,7 +129,7 @@ def test_every_crossing_of_great_circles_is_found_once_and_in_its_place(families
     for a in range(len(curves)):
         for b in range(a + 1, len(curves)):
             place = crossing_of((seeds[a], tangents[a]), (seeds[b], tangents[b]))
-            if net.family[a] != net.family[b] and place[2] > 1.0:
+            if net.names[a][0] != net.names[b][0] and place[2] > 1.0:
                 expected[a, b] = place
     start, stop = curves.ends[net.crossings.rods].transpose(2, 0, 1)
     inside = net.crossings.select(((start <= net.crossings.at) & (net.crossings.at <= stop)).all(axis=1))
@@ -144,6 +144,6 @@ def test_rods_are_set_out_at_equal_arcs_across_each_family() -> None:
     net = surface_net(cap, Geodesic(spacing=0.3))
     seeds = net.curves.at(np.arange(len(net.curves)), np.zeros(len(net.curves)))[0]
     for k in (0, 1):
-        chosen = seeds[net.family == k]
+        chosen = seeds[[name[0] == "UVW"[k] for name in net.names]]
         apart = 2.0 * np.arccos(np.clip(np.einsum("ij,ij->i", chosen[1:], chosen[:-1]) / 4.0, -1.0, 1.0))
         np.testing.assert_allclose(apart, 0.3, rtol=1e-6)

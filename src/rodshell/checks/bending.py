@@ -272,9 +272,10 @@ def bending_of(
     clamps = unit(state[shell.ghosts] - state[shell.ends]) if len(shell.ghosts) else None
     components, twist, by_joints = None, None, _bent_by_joints(shell, state, rod)
     if frames := shell.frames:
-        strains = _on_entries(shell, frames.strains(state))
+        at_rest = np.column_stack([frames.natural_curvature, frames.natural_twist])
+        strains = _on_entries(shell, frames.strains(state) - at_rest)
         twist = strains[:, 2]
-        if len(set(rod.bend_stiffnesses)) > 1:
+        if len(set(rod.bend_stiffnesses)) > 1 or at_rest.any():
             components = strains[:, :2]
         elif not rod.section.round:
             directors = _mean_of_edges(mesh, edge_directors(shell, frames, state))

@@ -19,11 +19,12 @@ from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.gridlayout import piece_names
 from rodshell.layout.lattices import Asymptotic, Curves, Geodesic, SurfaceLattice
 from rodshell.layout.mesh import cut_mesh
+from rodshell.layout.rest_curve import RestCurve
 from rodshell.model.assembly import Freedom
+from rodshell.model.shell import Shell
 from rodshell.nets.surface_lattice import SurfaceNet, surface_net
 from rodshell.progress import Progress, silent
 from rodshell.rods.elements import Stretch
-from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status, find_stable
 from rodshell.solve.problem import Problem, Supports
@@ -102,7 +103,8 @@ def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
     of, ends = curves.pieces
     lines, rods = list[FlatRod](), list[FlatRod]()
     for k, (name, (start, stop)) in enumerate(zip(net.names, reach.tolist(), strict=True)):
-        lines.append(FlatRod(name, "free", 0.0, start, stop, (0.0, lattice.least_spacing * k), (1.0, 0.0)))
+        line = FlatRod(name, "free", 0.0, start, stop, (0.0, lattice.least_spacing * k), (1.0, 0.0))
+        lines.append(line._replace(curve=_at_rest(net, k)))
         pieces = ends[of == k].tolist()
         named = zip(piece_names(name, len(pieces)), pieces, strict=True)
         rods += [lines[k].cut(*piece)._replace(name=label) for label, piece in named]
@@ -113,6 +115,16 @@ def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
     positions = np.empty((whole.node_count, 3))
     positions[whole.rod_nodes] = curves.at(whole.rod_of, whole.stations)[0]
     return mesh, positions[nodes]
+
+
+def _at_rest(net: SurfaceNet, k: int) -> RestCurve | None:
+    """How the k-th rod of a net is curved at rest, seen from above."""
+    if not net.curved_at_rest:
+        return None
+    (curve, s), curves = net.curves.knots, net.curves
+    up = curves.target.on_surface(curves.points).normal[:, 2].sum()
+    here = slice(*np.searchsorted(curve, [k, k + 1]))
+    return RestCurve(tuple(s[here].tolist()), tuple((np.copysign(1.0, up) * net.bends[1][here]).tolist()))
 
 
 def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progress = silent) -> FlatState:
@@ -127,23 +139,28 @@ def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progres
     size, plane = float(np.abs(start - start.mean(axis=0)).max()), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     first, second = mesh.edges[np.argmin(np.linalg.norm(start[mesh.edges].mean(axis=1) - start.mean(axis=0), axis=1))]
     along = unit(start[second] - start[first])
-    free = Freedom.free(mesh.node_count).with_directions(np.arange(mesh.node_count), *plane)
+    shell = Shell.of(replace(mesh, flat=start), rod, isotropic=False, twist=True)
+    free = Freedom.free(len(shell.like)).with_directions(np.arange(len(shell.like)))  # frames stay upright
+    free = free.with_directions(np.arange(mesh.node_count), *plane)
     free = free.with_directions(np.array([first])).with_directions(np.array([second]), tuple(along.tolist()))
     weight = PENALTY * (size / float(mesh.edge_lengths.mean())) ** 2 / size**2
-    bends = IsotropicBend(mesh.bends, 1.0 / mesh.voronoi_lengths)
+    frames = shell.frames
+    assert frames is not None
+    bends = frames.with_stiffness(np.repeat(1.0 / mesh.voronoi_lengths[:, None], 3, axis=1))
     problem = Problem(
         elements=(bends,),
         stretch=Stretch.elastic(mesh.edges, mesh.edge_lengths, np.full(len(mesh.edges), weight)),
         constraint=Supports(free),
         length=size,
         inextensible=True,
-        flat_coordinates=start[:, :2],
+        flat_coordinates=shell.flat_coordinates,
     )
     found = find_stable(
-        problem, start, np.zeros(len(mesh.edges)), limit_steps=True, most_iterations=MOST_ITERATIONS,
+        problem, shell.state(start), np.zeros(len(mesh.edges)), limit_steps=True, most_iterations=MOST_ITERATIONS,
         progress=lambda k, step: progress("drape", f"flat state, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
     if not found.report.converged:
         return FlatState(start[:, :2], None, found.report)
-    curvature = bends.strains(found.state)[:, 0] / mesh.voronoi_lengths
-    return FlatState(found.state[:, :2], 0.5 * rod_breadth(rod) * float(curvature.max(initial=0.0)), found.report)
+    turned = np.abs(bends.strains(found.state)[:, 1] - bends.natural_curvature[:, 1]) / mesh.voronoi_lengths
+    strain = 0.5 * rod_breadth(rod) * float(turned.max(initial=0.0))
+    return FlatState(found.state[: mesh.node_count, :2], strain, found.report)

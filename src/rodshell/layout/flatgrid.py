@@ -14,6 +14,7 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout.profile import Profile
+from rodshell.layout.rest_curve import RestCurve
 from rodshell.untrusted import limit, raised
 from rodshell.validation import LARGEST, finite, instance, listed, number, short, texts
 
@@ -40,6 +41,7 @@ class FlatRod(NamedTuple):
         direction: unit vector along the rod.
         virtual: whether the line only shapes the net and is not built.
         profile: how its section changes along it; None: not at all.
+        curve: the curvature that it has at rest; None: it is straight.
     """
 
     name: str
@@ -51,6 +53,7 @@ class FlatRod(NamedTuple):
     direction: tuple[float, float]
     virtual: bool = False
     profile: Profile | None = None
+    curve: RestCurve | None = None
 
     @staticmethod
     def u(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
@@ -92,7 +95,7 @@ class FlatRod(NamedTuple):
             start, end: material coordinates of the new ends [m].
         """
         line = self.name, self.family, self.offset, start, end, self.origin, self.direction
-        return FlatRod(*line, self.virtual, self.profile)
+        return FlatRod(*line, self.virtual, self.profile, self.curve)
 
 
 def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:

@@ -3,15 +3,16 @@ that stand upright, and curves that are given."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Protocol, Self
+from typing import Annotated, ClassVar, Literal, Protocol, Self, get_args
 
 import numpy as np
 
 from rodshell.errors import InputError
 from rodshell.quantities import Angle, LengthOrAuto, LengthsOrAuto, Names, Strokes, Whole
 from rodshell.units import NUMBER, rounded_down
-from rodshell.validation import array, finite, is_auto, listed, number, numbers, positive, texts, whole
+from rodshell.validation import array, choice, finite, is_auto, listed, number, numbers, positive, texts, whole
 
+Rest = Literal["straight", "curved"]
 EDGES_A_SPAN = 6  # edges of the mesh per spacing, where the edge is "auto"
 
 
@@ -152,6 +153,8 @@ class Curves(SurfaceLattice):
             which are moved onto it. A smooth curve leads through the points of a rod, of two a straight one in plan. A
             rod that leads past the end of the target ends there.
         names: of the rods; none: R01, R02 and so on.
+        rest: "straight"; or "curved", as the line is when the target's surface along it is unrolled, so that a lath
+            does not bend about its strong axis where it lies on the target.
         rotate: angle by which the lines are turned about the z axis [rad].
         spacing: that is usual between the rods, on which edges and the least distance of a joint from a rod's end
             depend [m]; "auto": twice the area that the lines cover over their length.
@@ -162,6 +165,7 @@ class Curves(SurfaceLattice):
 
     lines: Annotated[Strokes, 'points of each rod, "x,y,z; x,y,z" or in plan; "|" between two rods'] = ()
     names: Annotated[Names, "names of the rods; default: R01, R02, ..."] = ()
+    rest: Annotated[Rest, "rods are straight at rest, or cut so that none bends within the surface"] = "straight"
 
     kind = "curves"
 
@@ -177,6 +181,7 @@ class Curves(SurfaceLattice):
                 )
             lines.append(tuple(map(tuple, finite(f"line {k} of the layout", points, *points.shape).tolist())))
         object.__setattr__(self, "lines", tuple(lines))
+        choice("layout rest", self.rest, get_args(Rest))
         names = texts("layout names", self.names, "names of rods") or tuple(f"R{k + 1:02d}" for k in range(len(lines)))
         object.__setattr__(self, "names", names)
         if len(names) != len(lines) or len(set(names)) != len(names):

@@ -214,6 +214,15 @@ class GridMesh:
         """The same mesh of rods whose sections change along them; arguments as of `FlatGrid.with_profiles`."""
         return replace(self, grid=self.grid.with_profiles(profiles))
 
+    @cached_property
+    def rest_curvatures(self) -> Floats:
+        """(k,) of the rods at rest at each entry of `rod_nodes`, positive to the left in the plane [1/m]."""
+        result = np.zeros(len(self.rod_nodes))
+        for k, rod in enumerate(self.grid.rods):
+            if rod.curve is not None:
+                result[self.rod_slice(k)] = rod.curve.at(self.stations[self.rod_slice(k)])
+        return result
+
     def tributary_lengths(self) -> Floats:
         """Rod length (n,) that each node represents: half of every edge at the node [m]."""
         total = np.zeros(self.node_count)
@@ -583,7 +592,7 @@ def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
         return rod._replace(name=label, origin=(float(x), float(y)))
     make, across = (FlatRod.u, shift[1]) if rod.family == "u" else (FlatRod.v, shift[0])
     moved = make(label, rod.offset + float(across), rod.start + by, rod.end + by)
-    return moved._replace(profile=rod.profile)
+    return moved._replace(profile=rod.profile, curve=rod.curve)
 
 
 def _merged(meshes: list[GridMesh]) -> GridMesh:

@@ -325,7 +325,9 @@ class _Builder:
         self.mesh, self.coupling = mesh, coupling
         self.sections = RodSections.of(mesh, self.rods)
         self.stiffness = self.sections.nodes
-        self.isotropic = isotropic is not False and bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
+        self.curved = any(line.curve is not None for line in mesh.grid.rods)
+        alike = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
+        self.isotropic = isotropic is not False and alike and not self.curved
         needed = not self.isotropic or any(item.turns_frames for item in self.joints)
         self.twist = needed if twist is None else twist
         if needed and not self.twist:
@@ -367,7 +369,8 @@ class _Builder:
         round_rods = np.logical_and.reduceat(self.stiffness[:, 0] == self.stiffness[:, 1], self.mesh.rod_start)
         holding = self._of_joints(lambda joint: joint.holds_normals, bool)
         held = np.unique(self.mesh.grid.crossings.rods[holding])
-        loose = np.setdiff1d(np.flatnonzero(round_rods), held)
+        bent = [k for k, line in enumerate(self.mesh.grid.rods) if line.curve is not None]
+        loose = np.setdiff1d(np.flatnonzero(round_rods), [*held, *bent])
         return self.first_angle + np.searchsorted(self.mesh.edge_rods, loose)
 
     def _bends(self) -> tuple[Elements, ...]:
@@ -402,7 +405,14 @@ class _Builder:
             rows[::2], pairs[::2] = rows[::2, ::-1], pairs[::2, ::-1]
             nodes, angles = np.vstack([nodes, rows]), np.vstack([angles, pairs])
             per_length = np.vstack([per_length, at_clamps])
-        return (self._bend_twist(nodes, angles, per_length[:, :2], per_length[:, 2]),)
+        bend_twist = self._bend_twist(nodes, angles, per_length[:, :2], per_length[:, 2])
+        if not self.curved:
+            return (bend_twist,)
+        at_rest = mesh.rest_curvatures.compress(inner) * mesh.voronoi_lengths
+        if len(self.ghosts):
+            at_rest = np.append(at_rest, mesh.rest_curvatures[ends] * 0.5 * last_edges(mesh))
+        turned = -2.0 * np.tan(0.5 * at_rest)  # m2 = t x z is on the right
+        return (replace(bend_twist, natural_curvature=np.column_stack([0.0 * turned, turned])),)
 
     def _bend_twist(self, nodes: Ints, angles: Ints, bend: Floats, twist: Floats) -> BendTwist:
         blocks = np.column_stack([nodes[:, 0], angles[:, 0], nodes[:, 1], angles[:, 1], nodes[:, 2]])

@@ -124,6 +124,12 @@ class SurfaceCurves:
         return result
 
     @property
+    def knots(self) -> tuple[Ints, Floats]:
+        """The curve (k,) of each knot and its arc length (k,) [m]."""
+        curve = np.repeat(np.arange(len(self)), np.diff(self.begin))
+        return curve, self.step * (np.arange(len(curve)) - (self.begin[:-1] + self.before)[curve])
+
+    @property
     def reach(self) -> Floats:
         """(m, 2) arc lengths of the first and the last knot of each curve, which lie past the target's end [m]."""
         first = -self.before
@@ -169,8 +175,7 @@ class SurfaceCurves:
         Args:
             family: (m,) of each curve.
         """
-        curve = np.repeat(np.arange(len(self)), np.diff(self.begin))
-        s = self.step * (np.arange(len(self.points)) - (self.begin[:-1] + self.before)[curve])
+        curve, s = self.knots
         near = cKDTree(self.points).query_pairs(1.01 * self.step, output_type="ndarray")
         of = curve[near]
         near = np.where((of[:, 0] < of[:, 1])[:, None], near, near[:, ::-1])

@@ -1,6 +1,7 @@
 """The rods of a lattice of geodesics or asymptotic lines on a target, and their joints."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, sin
 
 import numpy as np
@@ -42,13 +43,24 @@ class SurfaceNet:
 
     @property
     def curvatures(self) -> tuple[Floats, Floats]:
-        """(k,) normal and (k,) geodesic curvatures of the rods at the knots of their curves on the target [1/m]."""
+        """Curvatures by which the rods bend on the target at their knots, (k,) out of it and (k,) within it [1/m]."""
+        curve, s = self.curves.knots
+        ends = self.curves.ends[curve]
+        built = (ends[:, 0] <= s) & (s <= ends[:, 1])  # and across openings
+        normal, geodesic = self.bends
+        return normal[built], geodesic[built] * (0.0 if self.curved_at_rest else 1.0)
+
+    @property
+    def curved_at_rest(self) -> bool:
+        """Whether the rods are curved at rest as the lines on the target are."""
+        return isinstance(self.lattice, Curves) and self.lattice.rest == "curved"
+
+    @cached_property
+    def bends(self) -> tuple[Floats, Floats]:
+        """(k,) normal and (k,) geodesic curvatures of the curves at all their knots [1/m]."""
         curves = self.curves
-        curve = np.repeat(np.arange(len(curves)), np.diff(curves.begin))
-        s = curves.step * (np.arange(len(curve)) - (curves.begin[:-1] + curves.before)[curve])
-        built = (curves.ends[curve, 0] <= s) & (s <= curves.ends[curve, 1])  # and across openings
-        bends, normal = curves.bends[built], _normal(curves.target, curves.points[built])
-        return dot(bends, normal), dot(bends, cross(normal, curves.tangents[built]))
+        normal = _normal(curves.target, curves.points)
+        return dot(curves.bends, normal), dot(curves.bends, cross(normal, curves.tangents))
 
 
 def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float, float] | None = None) -> SurfaceNet:
