@@ -124,7 +124,7 @@ def _clamped(coordinate: Jet, limit: float) -> Jet:
 
 
 def _put(parts: Floats, where: Any, jet: Jet) -> None:
-    for row, part in zip(parts, (jet.value, jet.dx, jet.dy, jet.dxx, jet.dxy, jet.dyy), strict=True):
+    for row, part in zip(parts, jet.parts, strict=True):
         row[where] = part
 
 
@@ -253,8 +253,7 @@ def relative_radius(domain: _Region, x: Floats, y: Floats) -> Floats:
 def _evaluated(heights: Heights, xy: Floats) -> Floats:
     """(8, n) x, y and all parts of the jet at points (2, n)."""
     jet = heights.jet(xy[0], xy[1])
-    parts = (jet.value, jet.dx, jet.dy, jet.dxx, jet.dxy, jet.dyy)
-    return np.stack([*xy, *(np.broadcast_to(np.asarray(part, dtype=float), xy[0].shape) for part in parts)])
+    return np.stack([*xy, *(np.broadcast_to(np.asarray(part, dtype=float), xy[0].shape) for part in jet.parts)])
 
 
 def _edge(domain: _Region) -> Floats:
