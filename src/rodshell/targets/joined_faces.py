@@ -62,11 +62,11 @@ def _evenly(face: Nurbs, count: int) -> Floats:
     """Points (n, n, 3) of a face that are at equal distances along its edges, whatever its parameters."""
     u, v = face.lattice((FINER * count, FINER * count))
     share = np.linspace(0.0, 1.0, count + 1)
-    across, along = face.points(u[[0, -1]], v), face.points(u, v[[0, -1]]).transpose(1, 0, 2)
+    across, along = face.at(u[[0, -1], None], v), face.at(u, v[[0, -1], None])
     v0, v1, u0, u1 = (_even(t, x, share) for t, x in ((v, across[0]), (v, across[1]), (u, along[0]), (u, along[1])))
     at_u = u0[:, None] + (u1 - u0)[:, None] * share
     at_v = v0 + (v1 - v0) * share[:, None]
-    return np.array([face.at(*row) for row in zip(at_u, at_v, strict=True)])
+    return face.at(at_u, at_v)
 
 
 def _inwards(grid: Floats) -> list[Floats]:
