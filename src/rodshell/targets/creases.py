@@ -17,7 +17,7 @@ from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import dot, unit
 from rodshell.targets.patch import Seam, nearest
 from rodshell.targets.rim import CORNER
-from rodshell.targets.trianglemesh import Neighbours, TriangleMesh, edge_counts
+from rodshell.targets.trianglemesh import Neighbours, TriangleMesh
 
 KINK = radians(3.0)  # an edge that turns by less belongs to no crease
 RISE = 2.0  # times what the curvature on both sides explains: an edge that turns by more belongs to one
@@ -154,9 +154,8 @@ class Creases:
 def _without_pinches(mesh: TriangleMesh) -> TriangleMesh:
     """The mesh without the faces at vertices in which two parts of it touch, as where a seam cuts faces off."""
     while True:
-        a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-        outer = edge_counts(a, b, len(mesh.vertices)) == 1
-        pinched: Bools = np.bincount(a[outer], minlength=len(mesh.vertices)) > 1
+        outer = mesh.sides.start[mesh.sides.shared == 1]
+        pinched: Bools = np.bincount(outer, minlength=len(mesh.vertices)) > 1
         if not pinched.any():
             return mesh
         mesh = mesh.only(np.asarray(~pinched[mesh.faces].any(axis=1)))
