@@ -23,6 +23,7 @@ from rodshell.targets import Target
 from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 
+SURELY = 0.96  # of the margin: the ends of two nets in different steps differ slightly
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 _STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # steps of the first march, from the anchor each way
@@ -289,16 +290,8 @@ def _steps(offsets: Floats, edge: float) -> Ints:
     return np.where(edges < _FEWEST_STEPS, 2 * np.maximum(_FEWEST_STEPS // 2, edges), edges + edges % 2)
 
 
-@njit()
-def _divided(offsets, steps):  # type: ignore[no-untyped-def]
+def _divided(offsets: Floats, steps: Ints) -> Floats:
     """Material coordinates of nodes, in `steps` (n - 1,) from each of the `offsets` (n,) to the next."""
-    result, filled = np.empty(steps.sum() + 1), 0
-    for k in range(len(steps)):
-        for n in range(steps[k]):
-            result[filled] = offsets[k] + (offsets[k + 1] - offsets[k]) * n / steps[k]
-            filled += 1
-    result[filled] = offsets[len(steps)]
-    return result
-
-
-SURELY = 0.96  # of the margin: the ends of two nets in different steps differ slightly
+    part, count = np.repeat(np.arange(len(steps)), steps), int(steps.sum())
+    step = np.arange(count) - (np.cumsum(steps) - steps)[part]
+    return np.append(offsets[part] + np.diff(offsets)[part] * step / steps[part], offsets[-1])
