@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import solveh_banded
+from scipy.sparse import diags_array, eye_array
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
@@ -264,14 +265,9 @@ def smoothed(grey: Floats, step: float) -> Floats:
 def _splined(values: Floats, weight: float) -> Floats:
     """The z (n, m) that minimise |z - values|^2 + weight |second differences of z along the columns|^2."""
     count = len(values)
-    bands = np.zeros((3, count))  # of weight D^T D, D the second differences; the upper ones
-    for k, factor in enumerate((1.0, -2.0, 1.0)):
-        bands[2, k : count - 2 + k] += factor**2
-    bands[1, 1:-1] -= 2.0
-    bands[1, 2:] -= 2.0
-    bands[0, 2:] += 1.0
-    bands *= weight
-    bands[2] += 1.0
+    second = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(count - 2, count))
+    system = eye_array(count) + weight * (second.T @ second)
+    bands = [np.append(np.zeros(k), system.diagonal(k)) for k in (2, 1, 0)]
     return np.asarray(solveh_banded(bands, values))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import unit
-from rodshell.targets.target import Gap, Implicit, Target
+from rodshell.targets.target import Implicit, Target
 from rodshell.validation import LARGEST, short
 
 ON_CREST = 1e-4  # of its length: points this close to a crease in plan are on it
@@ -212,15 +212,3 @@ class Patch(Target):
 
     def height_at(self, xy: Floats) -> Floats:
         return self.surface.height_at(xy)
-
-    def retract(self, x: Floats, steps: int = 4) -> Floats:
-        return self.surface.retract(x, steps)
-
-    def on_surface(self, x: Floats) -> Gap:
-        return self.surface.on_surface(x)
-
-    def closest(self, x: Floats) -> Floats:
-        return self.surface.closest(x)
-
-    def gap(self, x: Floats) -> Gap:
-        return self.surface.gap(x)
