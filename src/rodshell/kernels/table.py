@@ -166,7 +166,6 @@ KERNELS: dict[str, dict[str, str]] = {
         "_level": "f2 f1 f f",
     },
     "targets.rim": {
-        "_distance": "f2 f2 f2 i1 i1 i1 f2 f1 f1",
         "_feet": "f2 f2 i1 i1 i1 f2 f1 i1 f1",
         "_find_roots": "f2 f1 f f1",
     },

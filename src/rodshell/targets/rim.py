@@ -285,9 +285,10 @@ class Rim:
 
     def distance(self, x: Floats) -> Floats:
         """Signed distance (n,) [m] of points `x` (n, 3) near the surface to the nearest loop, positive inside."""
-        result = np.empty(len(x))
-        _distance(x, self.points, self.inward, self.after, self._before, *self._balls, result)
-        return result
+        edge, share = self.feet(x)
+        other = np.where(share <= 0.0, self._before[edge], np.where(share >= 1.0, self.after[edge], edge))
+        inward = self.inward[edge] + self.inward[other]  # at a corner the mean of both sides decides
+        return dot(x - self.at(edge, share), inward) / np.sqrt(dot(inward, inward))
 
     def feet(self, x: Floats) -> tuple[Ints, Floats]:
         """The closest points of the rim, as `at` takes them.
@@ -310,25 +311,6 @@ class Rim:
         """Points (n, 3) [m] on the edges (n,), at fractions `share` (n,) of their lengths."""
         first = self.points[edge]
         return np.asarray(first + share[:, None] * (self.points[self.after[edge]] - first))
-
-
-@njit(error_model="numpy")
-def _distance(x, points, inward, after, before, start, centres, radii, result):  # type: ignore[no-untyped-def]
-    """Distances from the nearest edge; from the mean of both edges where a corner is nearest."""
-    edge = 0
-    for n in range(len(x)):
-        edge, along = _nearest(x, n, points, after, before, start, centres, radii, edge)
-        ex, ey, ez = _edge(points, edge, after[edge])
-        ix, iy, iz = inward[edge]
-        if along <= 0.0 or along >= 1.0:
-            other = before[edge] if along <= 0.0 else after[edge]
-            ix, iy, iz = ix + inward[other, 0], iy + inward[other, 1], iz + inward[other, 2]
-        ox, oy, oz = (
-            x[n, 0] - along * ex - points[edge, 0],
-            x[n, 1] - along * ey - points[edge, 1],
-            x[n, 2] - along * ez - points[edge, 2],
-        )
-        result[n] = (ox * ix + oy * iy + oz * iz) / np.sqrt(ix * ix + iy * iy + iz * iz)
 
 
 @njit(error_model="numpy")
