@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.jet import Jet, differences
 from rodshell.targets.rim import Disc, Rectangle
@@ -59,7 +59,7 @@ class Heights:
         with np.errstate(all="ignore"):
             if self.trusted is None:
                 return self._inside(x, y)
-            out = np.flatnonzero(self._beyond(self.trusted, x, y))
+            out = np.flatnonzero(relative_radius(self.trusted, x, y) > 1.0)
             if len(out) == 0:
                 return self._inside(x, y)
             inside = np.ones(len(x), dtype=bool)
@@ -91,13 +91,6 @@ class Heights:
             return differences(self.function, x, y, DIFFERENCE * self.size)
         jet = self.function(*Jet.variables(x, y))
         return jet if isinstance(jet, Jet) else Jet(jet)
-
-    @staticmethod
-    def _beyond(trusted: _Region, x: Floats, y: Floats) -> Bools:
-        a, b = trusted.half_extent
-        if isinstance(trusted, Disc):
-            return x * x + y * y > a * a
-        return (np.abs(x) > a) | (np.abs(y) > b)
 
     def _outside(self, trusted: _Region, x: Jet, y: Jet) -> Jet:
         a, b = trusted.half_extent
