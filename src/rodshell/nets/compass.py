@@ -65,23 +65,6 @@ class Axes(NamedTuple):
     tangents: Floats
 
 
-def march(
-    target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats, *, heights: Heights = ON_SURFACE
-) -> Net:
-    """March the net from its two axes.
-
-    Args:
-        u, v: ascending material coordinates of the lines, both containing 0 [m].
-        anchor, heading: see `axes`.
-        heights: see `Net`.
-    """
-    points = np.full((len(u), len(v), 3), np.nan)
-    net = Net(u, v, points, heights=heights)
-    lay_axes(target, net, axes(target, anchor, heading))
-    fill_quadrants(target, net)
-    return net
-
-
 def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERANCE) -> None:
     """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
 

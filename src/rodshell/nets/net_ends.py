@@ -27,11 +27,6 @@ class Cuts(NamedTuple):
     line: Ints
     ends: Floats
 
-    def of_line(self, line: int) -> list[list[float]]:
-        """Start and end of each part of one line."""
-        parts: list[list[float]] = self.ends[self.line == line].tolist()
-        return parts
-
 
 def inside_nodes(target: Target, net: Net) -> Bools:
     """Nodes inside the target's end that are connected with the anchor through inside nodes.

@@ -51,10 +51,10 @@ def march_near(
     heights: Heights = ON_SURFACE,
     converged: float = CONVERGED,
 ) -> Net:
-    """March a net as `march` does, starting from a similar net; a bad guess costs time, not accuracy.
+    """March a net from its two axes, starting from a similar net; a bad guess costs time, not accuracy.
 
     Args:
-        target, u, v, heights: see `march`.
+        u, v, heights: see `Net`.
         coarser: the same net as `near` in longer steps, from which the start is extrapolated.
         wanted: (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
         converged: the last motion of nodes, relative to the target's size; the error that is left is its third power.
