@@ -17,7 +17,7 @@ from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import dot, unit
 from rodshell.targets.patch import Seam, nearest
 from rodshell.targets.rim import CORNER
-from rodshell.targets.trianglemesh import Neighbours, TriangleMesh
+from rodshell.targets.trianglemesh import Neighbours, TriangleMesh, chains
 
 KINK = radians(3.0)  # an edge that turns by less belongs to no crease
 RISE = 2.0  # times what the curvature on both sides explains: an edge that turns by more belongs to one
@@ -135,7 +135,7 @@ class Creases:
         edges = self.edges
         for seam in apart_from:
             edges = edges[np.abs(seam.distance(self.mesh.vertices[edges].mean(axis=1))) > NEAR * self.extent]
-        rows = [self.mesh.vertices[chain, :2] for chain in _chains(edges)]
+        rows = [self.mesh.vertices[chain, :2] for chain in chains(edges)]
         rows = _joined([x for x in rows if _length(x) > SHORT * self.extent], BRIDGED * self.extent)
         lines = [_simplified(x, ROUGH * self.extent) for x in rows]
         least = [max(LINKED * _length(x), LONG * self.extent) for x in rows]
@@ -168,25 +168,6 @@ def _angle(a: Floats, b: Floats) -> Floats:
 
 def _length(line: Floats) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-
-
-def _chains(edges: Ints) -> list[Ints]:
-    """Vertices of the rows into which edges (e, 2) fall at vertices where other than two of them meet."""
-    at: dict[int, set[int]] = {}
-    for a, b in edges.tolist():
-        at.setdefault(a, set()).add(b)
-        at.setdefault(b, set()).add(a)
-    ends = {k for k in at if len(at[k]) != 2}
-    chains = list[Ints]()
-    for first in [*ends, *at]:  # rings, which have no end, last
-        while at[first]:
-            chain = [first, at[first].pop()]
-            at[chain[1]].remove(first)
-            while chain[-1] not in ends and at[chain[-1]]:
-                chain.append(at[chain[-1]].pop())
-                at[chain[-1]].remove(chain[-2])
-            chains.append(np.array(chain, dtype=np.intp))
-    return chains
 
 
 def _joined(lines: list[Floats], reach: float) -> list[Floats]:

@@ -402,19 +402,20 @@ def _placed(
     path: Path, read: Callable[[], FileSurface], base: float | None, boundary: File | None, placement: Placement,
     source: dict[str, object], progress: Progress,
 ) -> Freeform:  # fmt: skip
-    """The target of the surface that is `read` from a file, with all that a case says of its `source`."""
+    """The target of the surface that is `read` from a file, with what a case says of its `source`."""
     if base is not None:
         number("target base", base, "m")
     instance("placement", placement, Placement)
     require_progress(progress)
     progress("preparing", f"reading {shown(path.name)}", 0.0)
     surface = read()
-    curves, drawn = list(surface.trims), None
+    curves = list(surface.trims)
     if boundary is not None:
         drawn = file_path("boundary", boundary)
         curves += read_curves(drawn, surface.unit or 1.0)
-    told = {"unit": surface.unit, "boundary": drawn and str(drawn.resolve()), "file": str(path.resolve()), "base": base}
-    chosen = {key: value for key, value in (source | told | placement.parameters()).items() if value is not None}
+        source["boundary"] = str(drawn.resolve())
+    source |= {"unit": surface.unit, "file": str(path.resolve()), "base": base, **placement.parameters()}
+    chosen = {key: value for key, value in source.items() if value is not None}
     usual: Literal["z", "y"] = "y" if path.suffix.lower() in IN_METRES else "z"
     turned = placement if placement.up is not None else replace(placement, up=usual)
     placed = tuple(turned(curve) for curve in curves)

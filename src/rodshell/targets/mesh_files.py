@@ -43,7 +43,7 @@ class FileSurface(NamedTuple):
         vertices: (n, 3) in the file's unit.
         faces: (m, 3) triangles.
         notes: for the user, in sentences.
-        trims: closed polylines (n, 3) at which it ends, besides its open boundary.
+        trims: closed polylines (n, 3) at which it ends, in addition to its open boundary.
         unit: length of the file's unit [m]; None where the file does not state it, or its format fixes it.
     """
 

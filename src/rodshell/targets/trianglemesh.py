@@ -147,18 +147,7 @@ class TriangleMesh:
         first, kind = unique_rows(ends.astype(np.int64))
         low, high = self.vertices[ends[first].T]
         points = low + ((z - low[:, 2]) / (high[:, 2] - low[:, 2]))[:, None] * (high - low)
-        neighbours: list[list[int]] = [[] for _ in points]
-        for first_end, second_end in kind.reshape(-1, 2).tolist():
-            neighbours[first_end].append(second_end)
-            neighbours[second_end].append(first_end)
-        loops, left = list[Floats](), set(range(len(points)))
-        while left:
-            loop = [left.pop()]
-            while onward := [k for k in neighbours[loop[-1]] if k in left]:
-                loop.append(onward[0])
-                left.remove(onward[0])
-            loops.append(points[loop])
-        return loops
+        return [points[chain[:-1]] for chain in chains(kind.reshape(-1, 2))]
 
     def length(self, loop: Ints) -> float:
         """Length of a closed loop of vertices [m]."""
@@ -295,6 +284,26 @@ def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
         key, kinds = key * more + column, kinds * more
     _, first, kind = np.unique(key, return_index=True, return_inverse=True)
     return first, kind.reshape(-1)
+
+
+def chains(edges: Ints) -> list[Ints]:
+    """Vertices of the rows into which edges (e, 2) fall at vertices where other than two of them meet; the
+    last of a ring is its first."""
+    at: dict[int, set[int]] = {}
+    for a, b in edges.tolist():
+        at.setdefault(a, set()).add(b)
+        at.setdefault(b, set()).add(a)
+    ends = {k for k in at if len(at[k]) != 2}
+    found = list[Ints]()
+    for first in [*ends, *at]:  # rings, which have no end, last
+        while at[first]:
+            chain = [first, at[first].pop()]
+            at[chain[1]].remove(first)
+            while chain[-1] not in ends and at[chain[-1]]:
+                chain.append(at[chain[-1]].pop())
+                at[chain[-1]].remove(chain[-2])
+            found.append(np.array(chain, dtype=np.intp))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
