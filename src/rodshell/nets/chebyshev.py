@@ -66,15 +66,8 @@ class ChebyshevNet:
     warnings: tuple[str, ...]
 
     def positions(self, rod: FlatRod, s: Floats) -> Floats:
-        """Interpolate the net along a rod, by local cubics.
-
-        Args:
-            rod: one of `rods`, or a piece of one.
-            s: (n,) material coordinates [m].
-
-        Returns:
-            (n, 3) points [m].
-        """
+        """Points (n, 3) [m] at the material coordinates `s` (n,) [m] of one of `rods`, or of a piece of one, by local
+        cubics."""
         return self._along((rod,), np.zeros(1, dtype=np.intp), s, np.arange(len(s)), len(s))
 
     def node_positions(self, mesh: GridMesh) -> Floats:

@@ -353,12 +353,6 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
     gradient g, to be subtracted from P; and the volume of the three gradients, see `sine_of`.
 
     `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers.
-
-    Args:
-        x, y: vectors from A and from B to P [m].
-        by_x, by_y: gradients of x^2/2 and y^2/2 by P [m].
-        g: gradient of f at P.
-        from_a, from_b: wanted lengths of x and y [m].
     """
     inverse = inverse_of(by_x, by_y, g)
     return solution(inverse, past(x, from_a), past(y, from_b), level), inverse[3]
@@ -401,12 +395,8 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
     """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers.
 
     Args:
-        p: the point P of the surface [m].
-        a, b: points A and B of their layers [m].
-        g: gradient of f at P.
         hessian: (3, 3) second derivatives of f at P.
         heights: (2,) h_u and h_v, of the layers above the surface [m].
-        from_a, from_b: wanted lengths of x and y [m].
     """
     steep = np.sqrt(dot(g, g))
     n = (g[0] / steep, g[1] / steep, g[2] / steep)

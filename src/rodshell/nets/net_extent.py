@@ -43,14 +43,7 @@ class Covering(Net):
     inside: Bools
 
     def reach(self, past: int) -> Floats:
-        """How far the inside nodes reach towards -u, +u, -v and +v.
-
-        Args:
-            past: number of nodes that are added each way.
-
-        Returns:
-            (4,) [m].
-        """
+        """How far (4,) [m] the inside nodes, and `past` nodes more, reach towards -u, +u, -v and +v."""
         result = list[float]()
         for s, touched in ((self.u, self.inside.any(axis=1)), (self.v, self.inside.any(axis=0))):
             on = np.flatnonzero(touched)
@@ -78,9 +71,7 @@ def march_covering(
     Args:
         u, v: (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
         margin: (2,) along u and v [m].
-        near: the net in longer steps.
-        coarser: the same net in yet longer steps, see `march_near`.
-        heights: see `Net`.
+        near, coarser: the net in longer steps, and in yet longer ones, see `march_near`.
         converged: see `march_near`.
     """
     wanted = wanted_nodes(near, 1, u, v, margin)
@@ -93,16 +84,13 @@ def march_covering(
 
 
 def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
-    """Nodes inside the target's end or within a margin of it, and all between these and the axes.
+    """Nodes (nu, nv) inside the target's end or within a margin of it, and all between these and the axes.
 
     Args:
         near: a net in longer steps; if it has no inside nodes, all nodes are wanted.
         past: the end may be so many of its nodes past the inside ones.
         u, v: (nu,), (nv,) material coordinates of the lines [m].
         margin: (2,) along u and v [m].
-
-    Returns:
-        (nu, nv) booleans.
     """
     wanted = np.zeros((len(u), len(v)), dtype=bool)
     _want_nodes(near, past, u, v, margin, wanted)
@@ -174,15 +162,11 @@ def find_lines(
     parts: int,
     heights: Heights = ON_SURFACE,
 ) -> tuple[LatticeLines, Covering]:
-    """Find the lattice lines that can touch the target, and `MARGIN` spacings more.
+    """The lattice lines that can touch the target, and `MARGIN` spacings more; and the march that found them.
 
     Args:
         near: a net that may be similar, or None.
         parts: steps of the march per spacing.
-        heights: see `Net`.
-
-    Returns:
-        The lines, and the march that found them.
 
     Raises:
         InputError: there would be too many lines or nodes, or none inside the target.
@@ -256,13 +240,10 @@ def march_lines(
     *near: Covering,
     heights: Heights = ON_SURFACE,
 ) -> Covering:
-    """March the net of lines at some of its nodes.
+    """March the net of lines at every node, or at every second.
 
     Args:
-        lines: see `find_lines`.
-        every: 1 for all nodes, 2 for every second node.
         near: one or two nets in longer steps, the finer first.
-        heights: see `Net`.
     """
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
     return march_covering(target, u, v, start, MARGIN * _across(layout), *near, heights=heights)

@@ -94,14 +94,8 @@ def _add_change(near, coarser, share):  # type: ignore[no-untyped-def]
 
 
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
-    """Interpolate a net by local cubics both ways, which also extrapolate a little past its last nodes.
-
-    Args:
-        u, v: (nu,), (nv,) material coordinates wanted [m].
-
-    Returns:
-        (nu, nv, 3) points [m]; NaN further away.
-    """
+    """Points (nu, nv, 3) [m] of a net at the material coordinates `u` (nu,), `v` (nv,) [m], by local cubics both ways,
+    which also extrapolate a little past its last nodes; NaN further away."""
     i0, j0 = net.origin
     return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
 

@@ -25,19 +25,16 @@ class _Exchanges(NamedTuple):
 
 @np.errstate(all="ignore")  # triangles without area have no normal, and points may not be finite
 def along_creases(points: Floats, triangles: Ints, face: Ints) -> Ints:
-    """Exchange diagonals that cross a crease for those that run along it.
+    """The triangles in the order of their faces, with diagonals that cross a crease exchanged for those that run along
+    it.
 
     The angles by which two triangles of a face turn at their diagonal and towards their neighbours are summed [Dyn,
     Levin and Rippa 1990]. The other diagonal is taken where it leaves clearly less, and most of that at itself. Finely
     meshed smooth surfaces turn too little to change.
 
     Args:
-        points: (n, 3).
         triangles: (t, 3), oriented alike within each face.
         face: (t,) of which each triangle is a part.
-
-    Returns:
-        (t, 3) the triangles in the order of their faces.
     """
     if not (np.diff(np.sort(face)) == 0).any():
         return triangles

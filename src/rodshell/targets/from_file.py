@@ -63,15 +63,11 @@ HALVINGS = 12
 
 
 def read_heights(path: Path, size: tuple[float, float], height: float | None) -> FileSurface:
-    """Read heights on a lattice and mesh them; empty cells and "nan" are holes.
+    """Read heights on a lattice and mesh them, in metres and centred on the origin; empty cells and "nan" are holes.
 
     Args:
-        path: a file of one of the kinds in `GRID_FILES`.
         size: width along x and depth along y [m]; the file's first row is at the largest y, depth / 2.
         height: of a table the factor of its numbers; of an image the height of white, black being 0 [m]; None for 1.
-
-    Returns:
-        The surface in metres, centred on the origin.
 
     Raises:
         InputError: the file is missing or damaged, or its numbers are not a lattice.
@@ -207,11 +203,8 @@ def _is_coordinates(table: Floats) -> bool:
 
 
 def read_image(path: Path) -> tuple[Floats, float | None]:
-    """Read a grey image as heights; where it has few grey levels, its terraces are smoothed away within one level.
-
-    Returns:
-        Heights (rows, columns), black being 0 and white 1; and the step between grey levels where that is coarse, or
-        None.
+    """Heights (rows, columns) of a grey image, black being 0 and white 1, and the step between grey levels where that
+    is coarse, or None: then terraces are smoothed away within one level.
 
     Raises:
         InputError: the file is missing or damaged, or has too many pixels (found before they are decoded).
@@ -241,13 +234,10 @@ def read_image(path: Path) -> tuple[Floats, float | None]:
 
 
 def smoothed(grey: Floats, step: float) -> Floats:
-    """Smooth an image by no more than the rounding to its levels explains.
+    """Heights (n, m), in multiples of `step`, smoothed by no more than the rounding to its levels explains.
 
-    A smoothing spline along both axes [Eilers and Marx 1996], which keeps planes. Its weight is the largest that
+    It is a smoothing spline along both axes [Eilers and Marx 1996], which keeps planes. Its weight is the largest that
     changes heights by the rms error of rounding, and none by more than a step.
-
-    Args:
-        grey: (n, m) heights, in multiples of `step`.
     """
     low, high = -3.0, 8.0  # powers of ten; at the largest a bend of a hundred pixels is still followed
     best = grey

@@ -48,14 +48,8 @@ class Heights:
     trusted: _Region | None = None
 
     def jet(self, x: Floats, y: Floats) -> Jet:
-        """Evaluate z with its first and second derivatives.
-
-        Args:
-            x, y: (n,) points of the plan [m].
-
-        Returns:
-            A jet, whose parts are (n,), or single floats where they are constant.
-        """
+        """z with its first and second derivatives at points `x`, `y` (n,) of the plan [m]; parts that are constant are
+        floats."""
         with np.errstate(all="ignore"):
             if self.trusted is None:
                 return self._inside(x, y)
@@ -122,13 +116,9 @@ def _put(parts: Floats, where: Any, jet: Jet) -> None:
 
 
 def sample(heights: Heights, domain: _Region) -> Floats:
-    """Sample a height function on a lattice up to the domain's edge.
+    """(8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy on a lattice up to the domain's edge.
 
-    Args:
-        domain: rows of the lattice of a disc are circles, from the centre to the edge.
-
-    Returns:
-        (8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy.
+    The rows of the lattice of a disc are circles, from the centre to the edge.
     """
     a, b = domain.half_extent
     if isinstance(domain, Disc):
@@ -141,10 +131,6 @@ def sample(heights: Heights, domain: _Region) -> Floats:
 
 def require_smooth(heights: Heights, domain: _Region, samples: Floats, name: str) -> None:
     """Refuse a function without finite height, slope and curvature everywhere in the domain, or with steps or creases.
-
-    Args:
-        samples: as `sample` returns them.
-        name: of the target, for the message.
 
     Raises:
         InputError: names the place and a remedy.
@@ -171,16 +157,10 @@ def require_smooth(heights: Heights, domain: _Region, samples: Floats, name: str
 
 
 def trusted_region(heights: Heights, domain: _Region, samples: Floats, name: str) -> _Region | None:
-    """The largest region around the domain in which the function can be evaluated as it is.
+    """The largest region around the domain in which the function can be evaluated as it is; None for 1.6 times the
+    domain.
 
     There it is finite, and not steeper than slope 4 or twice its steepest inside.
-
-    Args:
-        samples: as `sample` returns them.
-        name: of the target, for the message.
-
-    Returns:
-        None where that is all of 1.6 times the domain.
 
     Raises:
         InputError: a function without exact derivatives cannot be continued, and needs to be.
@@ -201,11 +181,7 @@ def trusted_region(heights: Heights, domain: _Region, samples: Floats, name: str
 
 
 def climb(heights: Heights, domain: _Region) -> Floats:
-    """Climb from many samples to local peaks.
-
-    Returns:
-        Points (n, 2) of the domain and its edge [m] without a higher point nearby; the highest is among them.
-    """
+    """Local peaks (n, 2) of the domain and its edge [m], climbed to from many samples; the highest is among them."""
     at = sample(heights, domain).reshape(8, -1)
     a, b = domain.half_extent
     pitch = max(a, b) * max(2 * np.pi / COLUMNS, 1 / ROWS)

@@ -20,16 +20,11 @@ PART = 0.1  # of an edge: as much of it may be close to others, as at a corner
 
 
 def joined(faces: list[Nurbs], name: str) -> tuple[Floats, Ints, float]:
-    """Faces in triangles, joined along their shared edges.
+    """Vertices (k, 3) and triangles (m, 3) of faces that are joined along their shared edges; and the largest angle at
+    which two of them meet [rad].
 
     All have equally many quads each way, whose corners lie at equal distances along the edges and so meet. Where faces
     meet at an angle, the mesh is creased.
-
-    Args:
-        name: of the file, for the message.
-
-    Returns:
-        Vertices (k, 3), triangles (m, 3) and the largest angle at which two faces meet [rad].
 
     Raises:
         InputError: a face shares a part of an edge only.

@@ -126,7 +126,6 @@ def require_size(path: Path, extent: Floats, unit: float, *, instead: str = ANOT
     """Refuse a size that no gridshell has; one that is not finite is left to other checks.
 
     Args:
-        path: of the file, for the message.
         extent: (k,) widths along x, y and perhaps z in the file's unit.
         unit: length of the file's unit [m].
 
@@ -241,11 +240,7 @@ _TRIANGLES = {".obj": _of_obj, ".off": _of_off, ".ply": _of_ply}
 
 
 def read_with(path: Path, format: str, reader: Callable[[], Content]) -> Content:
-    """What a reader finds; a damaged file can break it anywhere.
-
-    Args:
-        path: of the file, for messages.
-        format: as it is called in messages.
+    """What a reader of a `format`, as it is called in messages, finds; a damaged file can break it anywhere.
 
     Raises:
         InputError: the reader fails.

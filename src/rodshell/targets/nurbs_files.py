@@ -72,7 +72,6 @@ def rhino_content(path: Path, data: bytes, **request: object) -> dict[str, Any]:
     """What `opennurbs` finds in a 3dm file.
 
     Args:
-        path: of the file, for messages.
         request: the `name` of a surface; or the `most` curves that are read.
 
     Raises:

@@ -79,14 +79,7 @@ class Seam:
         return x
 
     def distance(self, x: Floats) -> Floats:
-        """Signed distance in plan, positive to the left of the seam's direction.
-
-        Args:
-            x: (n, 2) or (n, 3) points [m].
-
-        Returns:
-            (n,) [m].
-        """
+        """Signed distance (n,) [m] of points `x` (n, 2 or 3) in plan, positive to the left of the seam's direction."""
         k, share, off = self._nearest(x)
         edge = np.diff(self._corners, axis=0)
         left = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]

@@ -51,25 +51,12 @@ class Domain(Protocol):
         ...
 
     def holds(self, xy: Floats) -> Bools:
-        """Whether points of the plan are inside or on the edge.
-
-        Args:
-            xy: (n, 2) points [m].
-
-        Returns:
-            (n,) booleans.
-        """
+        """Whether (n,) points `xy` (n, 2) of the plan are inside or on the edge."""
         ...
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distance to the edge, negative inside.
-
-        Args:
-            xy: (n, 2) points [m].
-
-        Returns:
-            Distance (n,) [m], its gradient (n, 2) [-] and its Hessian (n, 2, 2) [1/m].
-        """
+        """Signed distance (n,) [m] of points `xy` (n, 2) to the edge, negative inside, its gradient (n, 2) and Hessian
+        (n, 2, 2) [1/m]."""
         ...
 
 
@@ -291,14 +278,8 @@ class Rim:
         return dot(x - self.at(edge, share), inward) / np.sqrt(dot(inward, inward))
 
     def feet(self, x: Floats) -> tuple[Ints, Floats]:
-        """The closest points of the rim, as `at` takes them.
-
-        Args:
-            x: (n, 3) points [m].
-
-        Returns:
-            Index (n,) of the nearest edge, and the fraction (n,) of it before the closest point.
-        """
+        """The closest points of the rim to `x` (n, 3), as `at` takes them: the index (n,) of the nearest edge, and the
+        fraction (n,) of it before the closest point."""
         edge, share = np.empty(len(x), dtype=np.intp), np.empty(len(x))
         _feet(x, self.points, self.after, self._before, *self._balls, edge, share)
         return edge, share
@@ -403,18 +384,15 @@ def _stops(turn: Floats, length: Floats) -> Bools:
 
 
 def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
-    """Smooth the jagged parts of a mesh's edge, such as missing faces leave.
+    """The loop (n, 3) with the jagged parts smoothed, such as missing faces leave; None if no part is jagged.
 
-    The result is a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink a circle. It is
-    the smoothest whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain.
-    Vertices outside of jagged parts do not move.
+    It is a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink a circle: the smoothest
+    whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain. Vertices
+    outside of jagged parts do not move.
 
     Args:
         loop: (n, 3) closed polyline [m].
         normals: (n, 3) of the surface there.
-
-    Returns:
-        (n, 3) the smoothed loop, or None if no part is jagged.
     """
     free = _jagged(loop, normals)
     if not free.any():

@@ -179,15 +179,10 @@ class SoundMesh(NamedTuple):
 
 
 def sound_mesh(vertices: Floats, faces: Ints, name: str) -> SoundMesh:
-    """Check and repair a mesh.
+    """Check and repair a mesh: vertices (n, 3) [m] and faces (m, 3).
 
     Normals may point to either side. Creases end the surface: of a half ball with its floor, or of a shell with a
     thickness, the piece that covers most of the plan is taken.
-
-    Args:
-        vertices: (n, 3) [m].
-        faces: (m, 3) indices of vertices.
-        name: of the mesh, for messages.
 
     Raises:
         InputError: the mesh is empty, not finite, not manifold, one-sided or in several pieces; names the place.
@@ -267,14 +262,7 @@ def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]
 
 
 def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
-    """Find equal rows.
-
-    Args:
-        rows: (n, k) integers from 0 on.
-
-    Returns:
-        Index (m,) of the first row of each kind; and the kind (n,) of each row.
-    """
+    """Of rows (n, k) of integers from 0 on: the index (m,) of the first of each kind, and the kind (n,) of each."""
     key, kinds = np.zeros(len(rows), dtype=np.int64), 1
     for column in rows.T:
         more = int(column.max(initial=0)) + 1

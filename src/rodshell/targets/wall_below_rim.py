@@ -230,7 +230,6 @@ def walled_surface(
     """The contact body of a mesh's surface that has one edge.
 
     Args:
-        mesh: the mesh to which its field was fitted.
         rims: the open boundary and the boundary curves, if there are any.
         section: the rim that a plane at a height z [m] cuts out of the surface.
 
