@@ -66,12 +66,7 @@ class Axes(NamedTuple):
 
 
 def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERANCE) -> None:
-    """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
-
-    Args:
-        net: whose points on the axes are set.
-        tolerance: see `geodesics`.
-    """
+    """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer; see `geodesics`."""
     i0, j0 = net.origin
     anchor, tangents = start
     net.points[i0, j0] = anchor

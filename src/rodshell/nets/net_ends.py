@@ -219,14 +219,11 @@ def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[
 
 
 def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: Floats) -> Floats:
-    """Where cubics through four nodes each cross the target's end, to round-off.
+    """Where cubics through four nodes each (n, 4, 3) at `knots` (n, 4) [m] cross the target's end, to round-off,
+    between the places `outer` and `inner` (n,) outside and inside of it.
 
-    By false position (Illinois): an end of the bracket that does not move twice is weighted by half in the next step.
-    A root that was found is not evaluated again.
-
-    Args:
-        knots, points: (n, 4), (n, 4, 3) places of the nodes on their line [m], and the nodes [m].
-        outer, inner: (n,) places outside and inside the end [m].
+    By false position (Illinois): an end of the bracket that does not move twice is weighted by half in the next step. A
+    root that was found is not evaluated again.
     """
     below = np.minimum(target.margin(lagrange(knots, points, outer)), 0.0)
     above = target.margin(lagrange(knots, points, inner))

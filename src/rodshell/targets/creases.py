@@ -40,12 +40,7 @@ ON_SEAM = 1e-4  # vertices closer to a seam are on it
 
 
 class Creases:
-    """The creases of a mesh that are seen from above.
-
-    Args:
-        mesh: with all faces oriented alike.
-        name: of the mesh, for messages.
-    """
+    """The creases of a mesh that are seen from above. All faces of the mesh are oriented alike."""
 
     def __init__(self, mesh: TriangleMesh, name: str) -> None:
         self.mesh, self.neighbours = mesh, Neighbours.of(mesh, name)
@@ -110,11 +105,8 @@ class Creases:
     def pieces(self, seams: Sequence[Seam], bridged: Sequence[bool]) -> dict[tuple[int, ...], TriangleMesh]:
         """The parts of the mesh by the sides of the seams on which they are; see `Patch`.
 
-        A face that a seam crosses is in both parts where the mesh is smooth; in neither where it bridges a crease.
-
-        Args:
-            seams: the lines at which it is cut.
-            bridged: which of them run along creases that faces bridge.
+        A face that a seam crosses is in both parts where the mesh is smooth; in neither where it bridges a crease, as
+        along the `bridged` seams.
         """
         within = dict[tuple[int, int], Bools]()
         for k, (seam, bridge) in enumerate(zip(seams, bridged, strict=True)):

@@ -301,7 +301,6 @@ class Freeform(Target):
         return self._body.contact(x)
 
     def height_at(self, xy: Floats) -> Floats:
-        """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         z = self._heights_of_facets(xy)
         beside = np.flatnonzero(np.isnan(z) & np.isfinite(xy).all(axis=1))

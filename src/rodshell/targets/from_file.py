@@ -382,7 +382,7 @@ def heights_from(
         positive("height", height, "m")
     if path.suffix.lower() not in GRID_FILES:
         raise InputError(f"{path} is not a file of heights: use one of {', '.join(GRID_FILES)}")
-    source = {"kind": "heights", "size": [width, depth], "height": height}
+    source: dict[str, object] = {"kind": "heights", "size": [width, depth], "height": height}
     return _placed(
         path, lambda: read_heights(path, (width, depth), height), base, boundary, placement, source, progress
     )

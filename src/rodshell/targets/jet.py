@@ -266,12 +266,8 @@ _RULES: dict[np.ufunc, Callable[..., Any]] = {
 
 
 def differences(function: Callable[[Any, Any], Any], x: Floats, y: Floats, step: float) -> Jet:
-    """Differentiate a function of plain arrays by central differences of fourth order.
-
-    Args:
-        function: z(x, y) of arrays; it is called once with all 17 points of the stencil.
-        x, y: (n,) points.
-    """
+    """z(x, y), a function of plain arrays, and its derivatives at points `x`, `y` (n,), by central differences of
+    fourth order; it is called once with all 17 points of the stencil."""
     near, far = np.array([[1], [-1]]), np.array([[2], [-2]])
     zero = np.zeros((2, 1))
     corner = np.array([[1], [1], [-1], [-1]]), np.array([[1], [-1], [1], [-1]])

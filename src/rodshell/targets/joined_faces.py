@@ -82,12 +82,8 @@ def _even(t: Floats, x: Floats, share: Floats) -> Floats:
 
 
 def _require_whole_edges(sides: Floats, free: set[int], extent: float, name: str) -> None:
-    """Refuse faces that meet along a part of an edge, where the mesh would have a crack.
-
-    Args:
-        sides: (4 m, n, 3) points of the edges of m faces.
-        free: those that have a length and are not the edge of another face.
-    """
+    """Refuse faces that meet along a part of an edge, where the mesh would have a crack. `sides` (4 m, n, 3) are the
+    points of the edges of m faces; those that are `free` have a length and are not the edge of another face."""
     share = np.linspace(0.0, 1.0, FINER + 1)[:, None, None]
     dense = {i: (sides[i][:-1] + share * np.diff(sides[i], axis=0)).reshape(-1, 3) for i in free}
     for i in free:

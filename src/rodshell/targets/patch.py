@@ -32,10 +32,7 @@ class Seam:
 
     @staticmethod
     def of(points: ArrayLike) -> "Seam":
-        """Make a seam of points.
-
-        Args:
-            points: (n, 2), or (n, 3), whose z is ignored [m].
+        """Make a seam of points (n, 2), or (n, 3), whose z is ignored [m].
 
         Raises:
             InputError: fewer than two different points, or one that is not finite.

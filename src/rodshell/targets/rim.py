@@ -48,16 +48,13 @@ class Domain(Protocol):
     @property
     def half_extent(self) -> tuple[float, float]:
         """Half the width along x and along y [m]."""
-        ...
 
     def holds(self, xy: Floats) -> Bools:
         """Whether (n,) points `xy` (n, 2) of the plan are inside or on the edge."""
-        ...
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
         """Signed distance (n,) [m] of points `xy` (n, 2) to the edge, negative inside, its gradient (n, 2) and Hessian
         (n, 2, 2) [1/m]."""
-        ...
 
 
 @dataclass(frozen=True)

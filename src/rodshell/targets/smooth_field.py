@@ -267,12 +267,7 @@ class SmoothField:
         return distance[:, 0], index[:, 0]
 
     def implicit(self, x: Floats, *, second: bool = True) -> Implicit:
-        """Evaluate F and its derivatives.
-
-        Args:
-            x: (n, 3) points [m].
-            second: whether second derivatives are wanted; without them the Hessian is empty.
-        """
+        """F and its derivatives at points `x` (n, 3) [m]; without the `second` ones the Hessian is empty."""
         distance, nearest = self.nearest(x)
         value, gradient, hessian = np.empty(len(x)), np.empty((len(x), 3)), np.empty((len(x) if second else 0, 3, 3))
         width2 = (WIDTH * self.spacing) ** 2

@@ -50,11 +50,8 @@ class Gap(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """Distance of a surface from the vertices of the mesh that it was fitted to.
-
-    Args:
-        max, rms: the largest, and the root of the mean square [m].
-    """
+    """Distance of a surface from the vertices of the mesh that it was fitted to [m]: the largest, and the root of the
+    mean square."""
 
     max: float
     rms: float
@@ -153,12 +150,8 @@ class Target(ABC):
         return self.margin(x) > 0
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
-        """Move points onto the surface along its gradient, which for small gaps leads near the closest points.
-
-        Args:
-            x: (n, 3) points [m].
-            steps: of Newton's method, at most.
-        """
+        """Move points `x` (n, 3) [m] onto the surface along its gradient, by at most as many steps of Newton's method;
+        for small gaps this leads near the closest points."""
         x = np.ascontiguousarray(x)
         for _ in range(steps):
             x, furthest = along_gradient(x, *self.level(x))

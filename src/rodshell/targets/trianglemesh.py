@@ -41,7 +41,7 @@ class Sides(NamedTuple):
     def twins(self) -> Ints:
         """(e, 2) the two sides of each edge between two triangles."""
         order = np.argsort(self.edge, kind="stable")
-        return order[self.shared[order] == 2].reshape(-1, 2)
+        return np.asarray(order[self.shared[order] == 2].reshape(-1, 2))
 
 
 @dataclass(frozen=True, eq=False)
