@@ -10,9 +10,10 @@ from rodshell.layout.mesh import side_by_side
 from rodshell.layout.transfer import corresponding_rods, transferred_edges, transferred_nodes
 from rodshell.nets import net_refinement
 from rodshell.nets.chebyshev import chebyshev_net
-from rodshell.nets.compass import axes, march
+from rodshell.nets.compass import axes
 from rodshell.nets.net_refinement import march_near
 from tests.formfinding.altered import at_positions
+from tests.nets.whole_march import march
 
 SIZE = 0.2
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))

@@ -178,7 +178,7 @@ def test_faces_of_three_to_six_corners_are_read_from_every_format(kind, tmp_path
     x, faces = mixed()
     path = tmp_path / f"dome.{kind}"
     path.write_bytes(MIXED[kind](x, faces))
-    vertices, triangles, notes = read_mesh(path, 1.0)
+    vertices, triangles, notes, *_ = read_mesh(path)
     assert notes == ()
     np.testing.assert_array_equal(vertices, x)
     np.testing.assert_array_equal(
@@ -190,13 +190,13 @@ def test_faces_of_three_to_six_corners_are_read_from_every_format(kind, tmp_path
 def test_indices_of_an_obj_may_count_from_the_end_and_lines_go_on(tmp_path):
     text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2\\\n -1\nv 0 1 0\nf 1 3 4\n"
     (tmp_path / "two.obj").write_text(text)
-    assert read_mesh(tmp_path / "two.obj", 1.0)[1].tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert read_mesh(tmp_path / "two.obj")[1].tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
 @pytest.mark.parametrize("kind", ["obj", "off"])
 def test_a_byte_order_mark_hides_no_first_line(kind, tmp_path):
     (tmp_path / f"dome.{kind}").write_bytes(b"\xef\xbb\xbf" + WRITERS[kind](*dome()))
-    np.testing.assert_allclose(read_mesh(tmp_path / f"dome.{kind}", 1.0)[0], dome()[0], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(read_mesh(tmp_path / f"dome.{kind}")[0], dome()[0], rtol=1e-6, atol=1e-6)
 
 
 ROOF_AND_BOX = (
@@ -208,7 +208,7 @@ ROOF_AND_BOX = (
 @pytest.mark.parametrize(("name", "faces"), [("roof", 4), ("box of wood", 3), ("side", 2), ("top side", 1), (None, 7)])
 def test_objects_and_groups_of_an_obj_are_chosen_by_their_names(name, faces, tmp_path):
     (tmp_path / "objects.obj").write_text(ROOF_AND_BOX)
-    assert len(read_mesh(tmp_path / "objects.obj", 1.0, name)[1]) == faces
+    assert len(read_mesh(tmp_path / "objects.obj", name)[1]) == faces
 
 
 def test_a_name_that_is_not_there_is_answered_by_those_that_are(tmp_path):
@@ -216,17 +216,17 @@ def test_a_name_that_is_not_there_is_answered_by_those_that_are(tmp_path):
     with pytest.raises(
         rs.InputError, match=r'no object named "door": it has "roof", "box of wood", "side", "top side"$'
     ):
-        read_mesh(tmp_path / "objects.obj", 1.0, "door")
+        read_mesh(tmp_path / "objects.obj", "door")
     (tmp_path / "dome.ply").write_bytes(WRITERS["ply"](*dome()))
     with pytest.raises(rs.InputError, match='no object named "door": none in it has a name'):
-        read_mesh(tmp_path / "dome.ply", 1.0, "door")
+        read_mesh(tmp_path / "dome.ply", "door")
 
 
 def test_vertices_that_belong_to_no_face_are_told_and_do_not_matter(tmp_path):
     x, faces = dome()
     kept = faces[np.linalg.norm(x[faces].mean(axis=1)[:, :2] - [1, 2], axis=1) > 1.5]
     (tmp_path / "hole.obj").write_bytes(WRITERS["obj"](x, kept).rstrip(b"\n"))
-    _, triangles, (note,) = read_mesh(tmp_path / "hole.obj", 1.0)
+    _, triangles, (note,), *_ = read_mesh(tmp_path / "hole.obj")
     assert len(triangles) == len(kept)
     loose = len(x) - len(np.unique(kept))
     assert note == f"{loose} of the 336 vertices of hole.obj belong to no face: if it lacks any, export it again"
@@ -236,4 +236,4 @@ def test_a_file_whose_last_line_is_not_whole_is_truncated(tmp_path):
     whole = WRITERS["obj"](*dome())
     (tmp_path / "cut.obj").write_bytes(whole[: int(0.6 * len(whole))])
     with pytest.raises(rs.InputError, match="truncated: its last line is not complete, and faces are missing"):
-        read_mesh(tmp_path / "cut.obj", 1.0)
+        read_mesh(tmp_path / "cut.obj")

@@ -1,7 +1,7 @@
 """Contact: rods that touch or run into each other where they should not, and how near the others come.
 
 Each edge of a rod is a prism of the rod's section; edges much shorter than the rod is thick are taken together. Pairs
-of edges that can be near are found by cells about their middles. Two prisms are apart by the widest gap between them,
+of edges that can be near are found by a tree of their middles. Two prisms are apart by the widest gap between them,
 seen along any of a few directions: from one axis to the other where these are nearest, along both axes and across both,
 and along the sides of both sections. A gap along any direction keeps them apart, so that no contact is missed; it is
 the distance of round rods that run side by side, and otherwise a lower bound of it.
@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.checks.bending import edge_directors, shell_normals
 from rodshell.figures.checks import Clearance
 from rodshell.geometry.frames import adapted, cross, dot, unit
-from rodshell.geometry.near_pairs import near_pairs
 from rodshell.layout import GridMesh
 from rodshell.layout.flatgrid import Crossings
 from rodshell.model import Shell
@@ -133,7 +133,8 @@ def _by_design(mesh: GridMesh, positions: Floats, outline: _Outline) -> Crossing
         return grids[0]
     firsts = np.cumsum([0, *(len(grid.grid.rods) for grid in mesh.grids)])
     ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
-    together, of_ends = near_pairs(ends, outline.near), np.repeat(mesh.grid_of_rods, 2)
+    together = cKDTree(ends).query_pairs(outline.near, output_type="ndarray")
+    of_ends = np.repeat(mesh.grid_of_rods, 2)
     together = together[of_ends[together[:, 0]] != of_ends[together[:, 1]]]
     return Crossings(
         np.concatenate([*(found.rods + by for found, by in zip(grids, firsts, strict=False)), together // 2]),
@@ -186,7 +187,7 @@ class _Edges:
         they count as near [m]; crossing rods, and parts of one rod, only when they touch away from there."""
         reach = self.outline.reach
         radius = np.linalg.norm(self.stop - self.start, axis=1).max() + 2 * reach + self.outline.near
-        found = near_pairs(0.5 * (self.start + self.stop), float(radius))
+        found = cKDTree(0.5 * (self.start + self.stop)).query_pairs(radius, output_type="ndarray")
         first, second = found[:, 0], found[:, 1]  # the first comes first in the order of the rods
         rods = self.rods[first], self.rods[second]
         same_rod = rods[0] == rods[1]

@@ -56,17 +56,11 @@ def _units(a):  # type: ignore[no-untyped-def]
 
 
 def parallel_transport(vectors: Floats, start: Floats, end: Floats) -> Floats:
-    """Rotate vectors by the smallest rotation that takes one unit tangent to another.
+    """Rotate `vectors` (..., 3) by the smallest rotation that takes the unit tangents `start` (..., 3) to `end` (...,
+    3).
 
     It consists of two reflections, which need neither an angle nor an axis. For opposite tangents the smallest rotation
     is not unique, and the result is not finite.
-
-    Args:
-        vectors: (..., 3) to be rotated.
-        start, end: (..., 3) unit tangents.
-
-    Returns:
-        (..., 3) the rotated vectors.
     """
     middle = start + end
     share = dot(middle, vectors) / (1.0 + dot(start, end))
@@ -74,11 +68,7 @@ def parallel_transport(vectors: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def adapted(directors: Floats, tangents: Floats) -> Floats:
-    """Make directors perpendicular to tangents, and scale them to length 1.
-
-    Args:
-        directors: (..., 3).
-        tangents: (..., 3) unit vectors.
+    """Directors (..., 3) made perpendicular to unit `tangents` (..., 3), and scaled to length 1.
 
     Raises:
         InputError: a director is parallel to its tangent, or zero.
@@ -93,14 +83,11 @@ def adapted(directors: Floats, tangents: Floats) -> Floats:
 
 
 def directors_along(tangents: Floats, first: Floats) -> Floats:
-    """Transport a director in parallel along a rod: a frame without twist.
+    """Unit directors (n, 3) of a frame without twist: a director transported in parallel along a rod.
 
     Args:
         tangents: (n, 3) unit tangents of the rod's edges, in their order.
         first: (3,) director of the first edge; its part perpendicular to the edge is used.
-
-    Returns:
-        (n, 3) unit directors.
     """
     with np.errstate(divide="ignore"):
         weights = 1.0 / (1.0 + dot(tangents[:-1], tangents[1:]))
@@ -114,13 +101,6 @@ def directors_along(tangents: Floats, first: Floats) -> Floats:
 
 
 def signed_angle(start: Floats, end: Floats, axis: Floats) -> Floats:
-    """Signed angles between vectors, about an axis.
-
-    Args:
-        start, end: (..., 3) vectors perpendicular to the axis.
-        axis: (..., 3) unit vectors.
-
-    Returns:
-        (...) angles from `start` to `end` in (-pi, pi] [rad].
-    """
+    """Signed angles (...) in (-pi, pi] [rad] from vectors `start` to `end` (..., 3) about unit vectors `axis` (..., 3),
+    to which they are perpendicular."""
     return np.asarray(np.arctan2(dot(axis, cross(start, end)), dot(start, end)))

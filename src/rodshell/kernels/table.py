@@ -78,7 +78,6 @@ KERNELS: dict[str, dict[str, str]] = {
         "_stretches": "f1 f1 b2 f2 f",
     },
     "nets.chebyshev": {
-        "_columns": "f3 b2 i1",
         "_interpolate": "f1 f1 f3 i1 b1 i1 f1 i1 f2",
         "_sharpest": "f3 b2",
     },
@@ -102,7 +101,6 @@ KERNELS: dict[str, dict[str, str]] = {
         "_squares": "f3 f1 f1",
     },
     "nets.net_extent": {
-        "_divided": "f1 i1",
         "_want": "b2 f1 f1 i f1 f1 f f b2",
     },
     "nets.net_refinement": {
@@ -168,7 +166,6 @@ KERNELS: dict[str, dict[str, str]] = {
         "_level": "f2 f1 f f",
     },
     "targets.rim": {
-        "_distance": "f2 f2 f2 i1 i1 i1 f2 f1 f1",
         "_feet": "f2 f2 i1 i1 i1 f2 f1 i1 f1",
         "_find_roots": "f2 f1 f f1",
     },

@@ -53,11 +53,9 @@ class _Family:
     """The lines of one family, and its rods on them. A stretch of a line ends where the net has no node.
 
     Args:
-        name: "u" or "v".
         stations: (n,) where the lines are crossed [m].
         offsets: (m,) of the lines [m].
         live: (m, n) where the net has nodes.
-        clearance: see `with_apron` [m].
 
     Attributes:
         joints: (m, n) the nodes of all rods, and of `RINGS` more past their ends.

@@ -66,15 +66,8 @@ class ChebyshevNet:
     warnings: tuple[str, ...]
 
     def positions(self, rod: FlatRod, s: Floats) -> Floats:
-        """Interpolate the net along a rod, by local cubics.
-
-        Args:
-            rod: one of `rods`, or a piece of one.
-            s: (n,) material coordinates [m].
-
-        Returns:
-            (n, 3) points [m].
-        """
+        """Points (n, 3) [m] at the material coordinates `s` (n,) [m] of one of `rods`, or of a piece of one, by local
+        cubics."""
         return self._along((rod,), np.zeros(1, dtype=np.intp), s, np.arange(len(s)), len(s))
 
     def node_positions(self, mesh: GridMesh) -> Floats:
@@ -316,7 +309,8 @@ def _extrapolate(
     sets = list[Lines]()
     for net in nets:
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
-        sets.append(Lines(net.u, *_columns(net.points, net.inside, column)))
+        points, inside = net.points[:, column].swapaxes(0, 1), net.inside[:, column].T
+        sets.append(Lines(net.u, np.ascontiguousarray(points), np.ascontiguousarray(inside)))
         sets.append(Lines(net.v, net.points.take(row, axis=0), net.inside.take(row, axis=0)))
     cuts = cut_lines(target, sets, depth=_GRAZING * spacing)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
@@ -338,18 +332,6 @@ def _at_joints(cuts: Cuts, stations: Floats, layout: GridLayout) -> Cuts:
     """The cuts of one family's lines, those next to one of the `stations` (n,) where they are crossed moved to it."""
     joints = stations[_nearest(stations, cuts.ends)]
     return Cuts(cuts.line, np.where(np.abs(cuts.ends - joints) < _AT_JOINT * layout.edge, joints, cuts.ends))
-
-
-@njit()
-def _columns(points, inside, columns):  # type: ignore[no-untyped-def]
-    """The nodes (m, n, 3) in some columns of a net (n, k, 3), and which of them are inside (m, n)."""
-    nodes, within = np.empty((len(columns), len(points), 3)), np.empty((len(columns), len(points)), dtype=np.bool_)
-    for m in range(len(columns)):
-        for n in range(len(points)):
-            within[m, n] = inside[n, columns[m]]
-            for k in range(3):
-                nodes[m, n, k] = points[n, columns[m], k]
-    return nodes, within
 
 
 def _name_rods(

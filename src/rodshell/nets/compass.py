@@ -65,30 +65,8 @@ class Axes(NamedTuple):
     tangents: Floats
 
 
-def march(
-    target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats, *, heights: Heights = ON_SURFACE
-) -> Net:
-    """March the net from its two axes.
-
-    Args:
-        u, v: ascending material coordinates of the lines, both containing 0 [m].
-        anchor, heading: see `axes`.
-        heights: see `Net`.
-    """
-    points = np.full((len(u), len(v), 3), np.nan)
-    net = Net(u, v, points, heights=heights)
-    lay_axes(target, net, axes(target, anchor, heading))
-    fill_quadrants(target, net)
-    return net
-
-
 def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERANCE) -> None:
-    """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
-
-    Args:
-        net: whose points on the axes are set.
-        tolerance: see `geodesics`.
-    """
+    """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer; see `geodesics`."""
     i0, j0 = net.origin
     anchor, tangents = start
     net.points[i0, j0] = anchor
@@ -370,12 +348,6 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
     gradient g, to be subtracted from P; and the volume of the three gradients, see `sine_of`.
 
     `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers.
-
-    Args:
-        x, y: vectors from A and from B to P [m].
-        by_x, by_y: gradients of x^2/2 and y^2/2 by P [m].
-        g: gradient of f at P.
-        from_a, from_b: wanted lengths of x and y [m].
     """
     inverse = inverse_of(by_x, by_y, g)
     return solution(inverse, past(x, from_a), past(y, from_b), level), inverse[3]
@@ -418,12 +390,8 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
     """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers.
 
     Args:
-        p: the point P of the surface [m].
-        a, b: points A and B of their layers [m].
-        g: gradient of f at P.
         hessian: (3, 3) second derivatives of f at P.
         heights: (2,) h_u and h_v, of the layers above the surface [m].
-        from_a, from_b: wanted lengths of x and y [m].
     """
     steep = np.sqrt(dot(g, g))
     n = (g[0] / steep, g[1] / steep, g[2] / steep)

@@ -27,19 +27,11 @@ class Cuts(NamedTuple):
     line: Ints
     ends: Floats
 
-    def of_line(self, line: int) -> list[list[float]]:
-        """Start and end of each part of one line."""
-        parts: list[list[float]] = self.ends[self.line == line].tolist()
-        return parts
-
 
 def inside_nodes(target: Target, net: Net) -> Bools:
-    """Nodes inside the target's end that are connected with the anchor through inside nodes.
+    """Nodes (nu, nv) inside the target's end that are connected with the anchor through inside nodes.
 
     If the anchor is in an opening, they are connected with the first inside nodes along the axes.
-
-    Returns:
-        (nu, nv) booleans.
     """
     region = _region(target, net)
     runs, reached = _runs(region), np.zeros_like(region)
@@ -152,14 +144,12 @@ class Lines(NamedTuple):
 
 
 def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> list[Cuts]:
-    """Cut lines of nets at the target's end, to fourth order between nodes.
+    """For each set the pieces of its lines inside the target's end, which cuts them to fourth order between nodes; none
+    of a line without inside nodes.
 
     Args:
         sets: lines of one family of one net each.
         depth: pieces that are nowhere further inside than this only graze the end and are ignored [m].
-
-    Returns:
-        For each set the pieces of its lines; none of a line without inside nodes.
     """
     runs = _deep(target, sets, [_runs(lines.inside) for lines in sets], depth)
     count = 2 * sum(len(run) for run in runs)
@@ -229,14 +219,11 @@ def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[
 
 
 def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: Floats) -> Floats:
-    """Where cubics through four nodes each cross the target's end, to round-off.
+    """Where cubics through four nodes each (n, 4, 3) at `knots` (n, 4) [m] cross the target's end, to round-off,
+    between the places `outer` and `inner` (n,) outside and inside of it.
 
-    By false position (Illinois): an end of the bracket that does not move twice is weighted by half in the next step.
-    A root that was found is not evaluated again.
-
-    Args:
-        knots, points: (n, 4), (n, 4, 3) places of the nodes on their line [m], and the nodes [m].
-        outer, inner: (n,) places outside and inside the end [m].
+    By false position (Illinois): an end of the bracket that does not move twice is weighted by half in the next step. A
+    root that was found is not evaluated again.
     """
     below = np.minimum(target.margin(lagrange(knots, points, outer)), 0.0)
     above = target.margin(lagrange(knots, points, inner))
@@ -287,18 +274,15 @@ def _narrow(value, knots, points, found, index, bracket, there, first):  # type:
 
 
 def extrapolated(coarse: Cuts, fine: Cuts, lines: int, step: float) -> tuple[Cuts, Floats]:
-    """Extrapolate the cuts of lines from two marches (Richardson).
+    """The cuts of lines, extrapolated from two marches (Richardson); and for each line a bound (lines,) of the finer
+    march's error [m].
 
     Each end is matched with the nearest of its kind in the coarse march: where a line grazes the end of the target, the
     marches may find different pieces. An end that only the finer march finds is kept; its error is at most about half
     the gap or piece that the other march does not find, or the distance to its nearest end.
 
     Args:
-        coarse, fine: cuts of the lines from the two marches.
         step: distance within which ends are matched [m].
-
-    Returns:
-        The cuts, and for each line a bound (lines,) of the finer march's error [m].
     """
     ends, errors = fine.ends.copy(), np.zeros(lines)
     _extrapolate(coarse.line, coarse.ends, fine.line, fine.ends, step, ends, errors)

@@ -23,6 +23,7 @@ from rodshell.targets import Target
 from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 
+SURELY = 0.96  # of the margin: the ends of two nets in different steps differ slightly
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 _STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # steps of the first march, from the anchor each way
@@ -42,14 +43,7 @@ class Covering(Net):
     inside: Bools
 
     def reach(self, past: int) -> Floats:
-        """How far the inside nodes reach towards -u, +u, -v and +v.
-
-        Args:
-            past: number of nodes that are added each way.
-
-        Returns:
-            (4,) [m].
-        """
+        """How far (4,) [m] the inside nodes, and `past` nodes more, reach towards -u, +u, -v and +v."""
         result = list[float]()
         for s, touched in ((self.u, self.inside.any(axis=1)), (self.v, self.inside.any(axis=0))):
             on = np.flatnonzero(touched)
@@ -77,9 +71,7 @@ def march_covering(
     Args:
         u, v: (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
         margin: (2,) along u and v [m].
-        near: the net in longer steps.
-        coarser: the same net in yet longer steps, see `march_near`.
-        heights: see `Net`.
+        near, coarser: the net in longer steps, and in yet longer ones, see `march_near`.
         converged: see `march_near`.
     """
     wanted = wanted_nodes(near, 1, u, v, margin)
@@ -92,16 +84,13 @@ def march_covering(
 
 
 def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
-    """Nodes inside the target's end or within a margin of it, and all between these and the axes.
+    """Nodes (nu, nv) inside the target's end or within a margin of it, and all between these and the axes.
 
     Args:
         near: a net in longer steps; if it has no inside nodes, all nodes are wanted.
         past: the end may be so many of its nodes past the inside ones.
         u, v: (nu,), (nv,) material coordinates of the lines [m].
         margin: (2,) along u and v [m].
-
-    Returns:
-        (nu, nv) booleans.
     """
     wanted = np.zeros((len(u), len(v)), dtype=bool)
     _want_nodes(near, past, u, v, margin, wanted)
@@ -173,15 +162,11 @@ def find_lines(
     parts: int,
     heights: Heights = ON_SURFACE,
 ) -> tuple[LatticeLines, Covering]:
-    """Find the lattice lines that can touch the target, and `MARGIN` spacings more.
+    """The lattice lines that can touch the target, and `MARGIN` spacings more; and the march that found them.
 
     Args:
         near: a net that may be similar, or None.
         parts: steps of the march per spacing.
-        heights: see `Net`.
-
-    Returns:
-        The lines, and the march that found them.
 
     Raises:
         InputError: there would be too many lines or nodes, or none inside the target.
@@ -255,13 +240,10 @@ def march_lines(
     *near: Covering,
     heights: Heights = ON_SURFACE,
 ) -> Covering:
-    """March the net of lines at some of its nodes.
+    """March the net of lines at every node, or at every second.
 
     Args:
-        lines: see `find_lines`.
-        every: 1 for all nodes, 2 for every second node.
         near: one or two nets in longer steps, the finer first.
-        heights: see `Net`.
     """
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
     return march_covering(target, u, v, start, MARGIN * _across(layout), *near, heights=heights)
@@ -289,16 +271,8 @@ def _steps(offsets: Floats, edge: float) -> Ints:
     return np.where(edges < _FEWEST_STEPS, 2 * np.maximum(_FEWEST_STEPS // 2, edges), edges + edges % 2)
 
 
-@njit()
-def _divided(offsets, steps):  # type: ignore[no-untyped-def]
+def _divided(offsets: Floats, steps: Ints) -> Floats:
     """Material coordinates of nodes, in `steps` (n - 1,) from each of the `offsets` (n,) to the next."""
-    result, filled = np.empty(steps.sum() + 1), 0
-    for k in range(len(steps)):
-        for n in range(steps[k]):
-            result[filled] = offsets[k] + (offsets[k + 1] - offsets[k]) * n / steps[k]
-            filled += 1
-    result[filled] = offsets[len(steps)]
-    return result
-
-
-SURELY = 0.96  # of the margin: the ends of two nets in different steps differ slightly
+    part, count = np.repeat(np.arange(len(steps)), steps), int(steps.sum())
+    step = np.arange(count) - (np.cumsum(steps) - steps)[part]
+    return np.append(offsets[part] + np.diff(offsets)[part] * step / steps[part], offsets[-1])

@@ -51,10 +51,10 @@ def march_near(
     heights: Heights = ON_SURFACE,
     converged: float = CONVERGED,
 ) -> Net:
-    """March a net as `march` does, starting from a similar net; a bad guess costs time, not accuracy.
+    """March a net from its two axes, starting from a similar net; a bad guess costs time, not accuracy.
 
     Args:
-        target, u, v, heights: see `march`.
+        u, v, heights: see `Net`.
         coarser: the same net as `near` in longer steps, from which the start is extrapolated.
         wanted: (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
         converged: the last motion of nodes, relative to the target's size; the error that is left is its third power.
@@ -94,14 +94,8 @@ def _add_change(near, coarser, share):  # type: ignore[no-untyped-def]
 
 
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
-    """Interpolate a net by local cubics both ways, which also extrapolate a little past its last nodes.
-
-    Args:
-        u, v: (nu,), (nv,) material coordinates wanted [m].
-
-    Returns:
-        (nu, nv, 3) points [m]; NaN further away.
-    """
+    """Points (nu, nv, 3) [m] of a net at the material coordinates `u` (nu,), `v` (nv,) [m], by local cubics both ways,
+    which also extrapolate a little past its last nodes; NaN further away."""
     i0, j0 = net.origin
     return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
 

@@ -34,12 +34,8 @@ numpy.savez(sys.argv[3], **found)
 
 
 def read_apart(reader: Path, path: Path, data: bytes, format: str, **request: object) -> dict[str, Any]:
-    """What a reader finds in a file.
-
-    Args:
-        path: of the file, for messages.
-        format: as it is called in messages.
-        request: further values for the reader.
+    """What a reader finds in a file; messages call it by its `path` and `format`, and `request` is what the reader
+    needs.
 
     Raises:
         InputError: the reader fails, or needs too long.

@@ -157,10 +157,7 @@ class Creased(Freeform):
 def cut_at(target: Target, seams: Sequence[Seam], progress: Progress = silent) -> Target:
     """A target as seams cut it: where a mesh is creased along them, in smooth pieces that meet there.
 
-    Args:
-        target: of any kind; one that was cut before is cut again.
-        seams: lines in plan; the creases near them are taken.
-        progress: called at each step of the fit of each piece.
+    A target that was cut before is cut again. Creases near the seams are taken.
 
     Raises:
         InputError: the mesh is creased where there is no seam, or a piece between them is not smooth; names lines that

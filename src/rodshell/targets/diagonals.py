@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.geometry.frames import cross, dot, unit
-from rodshell.targets.trianglemesh import unique_rows
+from rodshell.geometry.frames import dot, unit
+from rodshell.targets.trianglemesh import Sides, TriangleMesh
 
 LESS = 0.75  # of the folds: of a crease between flat sides a quarter is left, the curvature of its sides adds to both
 MAIN = 0.5  # of the folds that are left: the crease itself
@@ -25,30 +25,29 @@ class _Exchanges(NamedTuple):
 
 @np.errstate(all="ignore")  # triangles without area have no normal, and points may not be finite
 def along_creases(points: Floats, triangles: Ints, face: Ints) -> Ints:
-    """Exchange diagonals that cross a crease for those that run along it.
+    """The triangles in the order of their faces, with diagonals that cross a crease exchanged for those that run along
+    it.
 
     The angles by which two triangles of a face turn at their diagonal and towards their neighbours are summed [Dyn,
     Levin and Rippa 1990]. The other diagonal is taken where it leaves clearly less, and most of that at itself. Finely
     meshed smooth surfaces turn too little to change.
 
     Args:
-        points: (n, 3).
         triangles: (t, 3), oriented alike within each face.
         face: (t,) of which each triangle is a part.
-
-    Returns:
-        (t, 3) the triangles in the order of their faces.
     """
     if not (np.diff(np.sort(face)) == 0).any():
         return triangles
     place, triangles = np.unique(points, axis=0, return_inverse=True)[1].reshape(-1), triangles.copy()
     for _ in range(ROUNDS):
-        twin = _twins(place[triangles])
+        pairs = Sides.of(place[triangles]).twins
+        twin = np.full(triangles.size, -1, dtype=np.intp)  # of each side; -1 where no triangle or several are beyond it
+        twin[pairs] = pairs[:, ::-1]
         found = _exchanges(points, place, triangles, face, twin)
         rank = np.argsort(np.argsort(found.gain, kind="stable"), kind="stable")
         best = np.full(len(triangles) + 1, -1)  # of the exchanges of a triangle; the last is beyond an open edge
         np.maximum.at(best, found.pairs, rank[:, None])
-        near = np.maximum(best[:-1], best[np.where(twin < 0, -1, twin // 3)].max(axis=1))
+        near = np.maximum(best[:-1], best[np.where(twin < 0, -1, twin // 3)].reshape(-1, 3).max(axis=1))
         now = (near[found.pairs] <= rank[:, None]).all(axis=1)  # none that touch, as each changes the other's folds
         if not now.any():
             break
@@ -56,37 +55,23 @@ def along_creases(points: Floats, triangles: Ints, face: Ints) -> Ints:
     return triangles
 
 
-def _twins(corners: Ints) -> Ints:
-    """(t, 3) the side, 3 t + k, that is the same edge as the k-th of triangle t; -1 where no triangle or several are.
-
-    Side k runs from corner k to the next.
-    """
-    a, b = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    _, edge = unique_rows(np.column_stack([np.minimum(a, b), np.maximum(a, b)]).astype(np.int64))
-    sides = np.argsort(edge, kind="stable")
-    sides = sides[np.bincount(edge)[edge[sides]] == 2].reshape(-1, 2)
-    twin = np.full(len(a), -1, dtype=np.intp)
-    twin[sides] = sides[:, ::-1]
-    return twin.reshape(-1, 3)
-
-
 def _exchanges(points: Floats, place: Ints, triangles: Ints, face: Ints, twin: Ints) -> _Exchanges:
     """The diagonals that should be exchanged."""
-    starts, across = triangles.ravel(), twin.ravel()
+    starts, across = triangles.ravel(), twin
     other = across // 3
     inner = np.flatnonzero((across > np.arange(len(across))) & (np.repeat(face, 3) == face[other]))
     inner = inner[starts[inner] != starts[across[inner]]]
     first, second = inner // 3, other[inner]
     k, m = inner % 3, across[inner] % 3
     a, b, c, d = starts[inner], starts[across[inner]], triangles[first, (k + 2) % 3], triangles[second, (m + 2) % 3]
-    normals = unit(_doubled(points, triangles))
+    normals = unit(TriangleMesh(points, triangles).doubled)
     against = place[starts] == place[starts[across]]  # the neighbour faces the other side
     beyond = np.where(against[:, None], -1.0, 1.0) * normals[other]
     beyond[across < 0] = np.nan
     bc, ca = beyond[3 * first + (k + 1) % 3], beyond[3 * first + (k + 2) % 3]
     ad, db = beyond[3 * second + (m + 1) % 3], beyond[3 * second + (m + 2) % 3]
     cad, dbc = np.column_stack([c, a, d]), np.column_stack([d, b, c])
-    p, q, r, s = normals[first], normals[second], unit(_doubled(points, cad)), unit(_doubled(points, dbc))
+    p, q, r, s = normals[first], normals[second], *(unit(TriangleMesh(points, those).doubled) for those in (cad, dbc))
     before = _angle(p, q) + _angle(p, bc) + _angle(p, ca) + _angle(q, ad) + _angle(q, db)
     ridge = _angle(r, s)
     after = ridge + _angle(r, ca) + _angle(r, ad) + _angle(s, bc) + _angle(s, db)
@@ -97,12 +82,6 @@ def _exchanges(points: Floats, place: Ints, triangles: Ints, face: Ints, twin: I
     )
 
 
-def _doubled(points: Floats, triangles: Ints) -> Floats:
-    """Normals (t, 3), twice as long as the areas are large."""
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    return cross(b - a, c - a)
-
-
 def _angle(a: Floats, b: Floats) -> Floats:
     """Angles (n,) between unit vectors (n, 3) [rad]; none where one is missing."""
     return np.nan_to_num(np.arccos(np.clip(dot(a, b), -1.0, 1.0)))
@@ -110,6 +89,6 @@ def _angle(a: Floats, b: Floats) -> Floats:
 
 def _well_shaped(points: Floats, triangles: Ints, up: Floats) -> Bools:
     """Which triangles (t, 3) are seen from `up` (t, 3) and not slivers."""
-    x, doubled = points[triangles], _doubled(points, triangles)
+    x, doubled = points[triangles], TriangleMesh(points, triangles).doubled
     squares = np.sum((np.roll(x, -1, axis=1) - x) ** 2, axis=(1, 2))
     return np.asarray((dot(doubled, up) > 0) & (squares < SLIVER * np.sqrt(dot(doubled, doubled))))

@@ -114,16 +114,14 @@ def _crossed(mesh: TriangleMesh, samples: Samples, reach: float) -> Ints:
 def fit_field(
     samples: Samples, spacing: float, *, past: float, reach: float, each_ring: Callable[[], None] = lambda: None
 ) -> tuple[SmoothField, int]:
-    """Fit a smooth field to samples of a surface, by weighted least squares.
+    """A smooth field fitted to samples of a surface, by weighted least squares; and the number of its cubics that are
+    on the surface (or fill an opening), which come first.
 
     Args:
         spacing: distance between cubics [m], see `cubic_spacing`.
         past: how far the field is continued past an open rim [m].
         reach: distance from the cubics up to which the field is defined [m].
         each_ring: called before each ring of cubics past the rim.
-
-    Returns:
-        The field; and the number of its cubics that are on the surface (or fill an opening), which come first.
     """
     points = CellList.of(samples.points, spacing)
     chosen = points.spread(spacing)

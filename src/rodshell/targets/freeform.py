@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -23,9 +22,6 @@ from rodshell.targets.wall_below_rim import WalledSurface, walled_surface
 from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 from rodshell.validation import array, number
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
 
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 OTHER_UNIT = 8.0  # times as wide as the surface: such a boundary is drawn in another unit
@@ -305,7 +301,6 @@ class Freeform(Target):
         return self._body.contact(x)
 
     def height_at(self, xy: Floats) -> Floats:
-        """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         z = self._heights_of_facets(xy)
         beside = np.flatnonzero(np.isnan(z) & np.isfinite(xy).all(axis=1))
@@ -314,7 +309,7 @@ class Freeform(Target):
         return np.where(np.abs(smooth - z) < 0.1 * self._extent, smooth, np.nan)
 
     @cached_property
-    def _facets_by_size(self) -> "list[tuple[cKDTree, Ints, float]]":
+    def _facets_by_size(self) -> list[tuple[cKDTree, Ints, float]]:
         """Trees of facets' centres in plan, one for each power of two of their widths; the facets; and that width."""
         plan = self.surface.vertices[self.surface.faces, :2]
         low, high = plan.min(axis=1), plan.max(axis=1)

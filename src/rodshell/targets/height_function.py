@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.jet import Jet, differences
 from rodshell.targets.rim import Disc, Rectangle
@@ -48,18 +48,12 @@ class Heights:
     trusted: _Region | None = None
 
     def jet(self, x: Floats, y: Floats) -> Jet:
-        """Evaluate z with its first and second derivatives.
-
-        Args:
-            x, y: (n,) points of the plan [m].
-
-        Returns:
-            A jet, whose parts are (n,), or single floats where they are constant.
-        """
+        """z with its first and second derivatives at points `x`, `y` (n,) of the plan [m]; parts that are constant are
+        floats."""
         with np.errstate(all="ignore"):
             if self.trusted is None:
                 return self._inside(x, y)
-            out = np.flatnonzero(self._beyond(self.trusted, x, y))
+            out = np.flatnonzero(relative_radius(self.trusted, x, y) > 1.0)
             if len(out) == 0:
                 return self._inside(x, y)
             inside = np.ones(len(x), dtype=bool)
@@ -92,13 +86,6 @@ class Heights:
         jet = self.function(*Jet.variables(x, y))
         return jet if isinstance(jet, Jet) else Jet(jet)
 
-    @staticmethod
-    def _beyond(trusted: _Region, x: Floats, y: Floats) -> Bools:
-        a, b = trusted.half_extent
-        if isinstance(trusted, Disc):
-            return x * x + y * y > a * a
-        return (np.abs(x) > a) | (np.abs(y) > b)
-
     def _outside(self, trusted: _Region, x: Jet, y: Jet) -> Jet:
         a, b = trusted.half_extent
         if isinstance(trusted, Disc):
@@ -124,18 +111,14 @@ def _clamped(coordinate: Jet, limit: float) -> Jet:
 
 
 def _put(parts: Floats, where: Any, jet: Jet) -> None:
-    for row, part in zip(parts, (jet.value, jet.dx, jet.dy, jet.dxx, jet.dxy, jet.dyy), strict=True):
+    for row, part in zip(parts, jet.parts, strict=True):
         row[where] = part
 
 
 def sample(heights: Heights, domain: _Region) -> Floats:
-    """Sample a height function on a lattice up to the domain's edge.
+    """(8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy on a lattice up to the domain's edge.
 
-    Args:
-        domain: rows of the lattice of a disc are circles, from the centre to the edge.
-
-    Returns:
-        (8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy.
+    The rows of the lattice of a disc are circles, from the centre to the edge.
     """
     a, b = domain.half_extent
     if isinstance(domain, Disc):
@@ -148,10 +131,6 @@ def sample(heights: Heights, domain: _Region) -> Floats:
 
 def require_smooth(heights: Heights, domain: _Region, samples: Floats, name: str) -> None:
     """Refuse a function without finite height, slope and curvature everywhere in the domain, or with steps or creases.
-
-    Args:
-        samples: as `sample` returns them.
-        name: of the target, for the message.
 
     Raises:
         InputError: names the place and a remedy.
@@ -178,16 +157,10 @@ def require_smooth(heights: Heights, domain: _Region, samples: Floats, name: str
 
 
 def trusted_region(heights: Heights, domain: _Region, samples: Floats, name: str) -> _Region | None:
-    """The largest region around the domain in which the function can be evaluated as it is.
+    """The largest region around the domain in which the function can be evaluated as it is; None for 1.6 times the
+    domain.
 
     There it is finite, and not steeper than slope 4 or twice its steepest inside.
-
-    Args:
-        samples: as `sample` returns them.
-        name: of the target, for the message.
-
-    Returns:
-        None where that is all of 1.6 times the domain.
 
     Raises:
         InputError: a function without exact derivatives cannot be continued, and needs to be.
@@ -208,11 +181,7 @@ def trusted_region(heights: Heights, domain: _Region, samples: Floats, name: str
 
 
 def climb(heights: Heights, domain: _Region) -> Floats:
-    """Climb from many samples to local peaks.
-
-    Returns:
-        Points (n, 2) of the domain and its edge [m] without a higher point nearby; the highest is among them.
-    """
+    """Local peaks (n, 2) of the domain and its edge [m], climbed to from many samples; the highest is among them."""
     at = sample(heights, domain).reshape(8, -1)
     a, b = domain.half_extent
     pitch = max(a, b) * max(2 * np.pi / COLUMNS, 1 / ROWS)
@@ -253,8 +222,7 @@ def relative_radius(domain: _Region, x: Floats, y: Floats) -> Floats:
 def _evaluated(heights: Heights, xy: Floats) -> Floats:
     """(8, n) x, y and all parts of the jet at points (2, n)."""
     jet = heights.jet(xy[0], xy[1])
-    parts = (jet.value, jet.dx, jet.dy, jet.dxx, jet.dxy, jet.dyy)
-    return np.stack([*xy, *(np.broadcast_to(np.asarray(part, dtype=float), xy[0].shape) for part in parts)])
+    return np.stack([*xy, *(np.broadcast_to(np.asarray(part, dtype=float), xy[0].shape) for part in jet.parts)])
 
 
 def _edge(domain: _Region) -> Floats:

@@ -156,55 +156,47 @@ class _Compiler:
         done: dict[ast.expr, _Operand] = {}
         stack = [root]
         while stack:
-            waiting = [child for child in self._operands(stack[-1]) if child not in done]
+            function, parts = self._read(stack[-1])
+            waiting = [part for part in parts if part not in done]
             if waiting:
                 stack.extend(reversed(waiting))
             else:
                 node = stack.pop()
-                done[node] = self._operand(node, done)
+                done[node] = self._apply(node, function, [done[part] for part in parts]) if parts else function()
         return done[root]
 
-    def _operands(self, node: ast.expr) -> list[ast.expr]:
+    def _read(self, node: ast.expr) -> tuple[Callable[..., Any], list[ast.expr]]:
+        """The function of a node, and its operands; of a number or a name one without operands."""
         match node:
             case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
-                return [left, right]
-            case ast.UnaryOp(ast.USub() | ast.UAdd(), inner):
-                return [inner]
+                return _OPERATORS[type(op)], [left, right]
+            case ast.UnaryOp(ast.USub() | ast.UAdd() as op, inner):
+                return operator.neg if isinstance(op, ast.USub) else operator.pos, [inner]
             case ast.Call(ast.Name(name), args, []) if name in _FUNCTIONS:
                 if len(args) != 1:
                     raise self._wrong(node, f"has {len(args)} values: write {name}(...) with one")
-                return args
+                return _FUNCTIONS[name], args
             case ast.Name(name) if name in _FUNCTIONS:
                 raise self._wrong(node, f"has no value: write {name}(...)")
             case ast.Name(name) if name in ("x", "y") or name in _CONSTANTS:
-                return []
-            case ast.Constant(value) if type(value) in (int, float):
-                return []
+                return lambda: _CONSTANTS.get(name, name), []
+            case ast.Constant(int() | float() as value) if type(value) is not bool:
+                return lambda: self._finite(node, _number(value)), []
         raise _refusal(self.text, self._piece(node), _meant(node))
 
-    def _operand(self, node: ast.expr, done: dict[ast.expr, _Operand]) -> _Operand:
-        function: Callable[..., Any]
-        operands: tuple[_Operand, ...]
-        match node:
-            case ast.Name(name):
-                return _CONSTANTS.get(name, name)
-            case ast.UnaryOp(ast.UAdd(), inner):
-                return done[inner]
-            case ast.Constant(int() | float() as value):
-                function, operands = float, (_number(value),)
-            case ast.UnaryOp(_, inner):
-                function, operands = operator.neg, (done[inner],)
-            case ast.BinOp(left, op, right):
-                function, operands = _OPERATORS[type(op)], (done[left], done[right])
-                if function is operator.truediv and operands[1] == 0.0:
-                    raise self._wrong(node, "divides by zero: write a divisor other than 0")
-            case ast.Call(ast.Name(name), [inner]):
-                function, operands = _FUNCTIONS[name], (done[inner],)
+    def _apply(self, node: ast.expr, function: Callable[..., Any], operands: list[_Operand]) -> _Operand:
+        """A step of the program, or a number where all operands are numbers."""
+        if function is operator.truediv and operands[1] == 0.0:
+            raise self._wrong(node, "divides by zero: write a divisor other than 0")
+        if function is operator.pos:
+            return operands[0]
         numbers = [np.float64(operand) for operand in operands if isinstance(operand, float)]
         if len(numbers) < len(operands):
             return self._step(function, *operands)
         with np.errstate(all="ignore"):
-            value = float(function(*numbers))
+            return self._finite(node, float(function(*numbers)))
+
+    def _finite(self, node: ast.expr, value: float) -> float:
         if not isfinite(value):
             raise self._wrong(node, "is not a finite number: change it")
         return value

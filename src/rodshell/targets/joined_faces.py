@@ -20,16 +20,11 @@ PART = 0.1  # of an edge: as much of it may be close to others, as at a corner
 
 
 def joined(faces: list[Nurbs], name: str) -> tuple[Floats, Ints, float]:
-    """Faces in triangles, joined along their shared edges.
+    """Vertices (k, 3) and triangles (m, 3) of faces that are joined along their shared edges; and the largest angle at
+    which two of them meet [rad].
 
     All have equally many quads each way, whose corners lie at equal distances along the edges and so meet. Where faces
     meet at an angle, the mesh is creased.
-
-    Args:
-        name: of the file, for the message.
-
-    Returns:
-        Vertices (k, 3), triangles (m, 3) and the largest angle at which two faces meet [rad].
 
     Raises:
         InputError: a face shares a part of an edge only.
@@ -62,11 +57,11 @@ def _evenly(face: Nurbs, count: int) -> Floats:
     """Points (n, n, 3) of a face that are at equal distances along its edges, whatever its parameters."""
     u, v = face.lattice((FINER * count, FINER * count))
     share = np.linspace(0.0, 1.0, count + 1)
-    across, along = face.points(u[[0, -1]], v), face.points(u, v[[0, -1]]).transpose(1, 0, 2)
+    across, along = face.at(u[[0, -1], None], v), face.at(u, v[[0, -1], None])
     v0, v1, u0, u1 = (_even(t, x, share) for t, x in ((v, across[0]), (v, across[1]), (u, along[0]), (u, along[1])))
     at_u = u0[:, None] + (u1 - u0)[:, None] * share
     at_v = v0 + (v1 - v0) * share[:, None]
-    return np.array([face.at(*row) for row in zip(at_u, at_v, strict=True)])
+    return face.at(at_u, at_v)
 
 
 def _inwards(grid: Floats) -> list[Floats]:
@@ -87,12 +82,8 @@ def _even(t: Floats, x: Floats, share: Floats) -> Floats:
 
 
 def _require_whole_edges(sides: Floats, free: set[int], extent: float, name: str) -> None:
-    """Refuse faces that meet along a part of an edge, where the mesh would have a crack.
-
-    Args:
-        sides: (4 m, n, 3) points of the edges of m faces.
-        free: those that have a length and are not the edge of another face.
-    """
+    """Refuse faces that meet along a part of an edge, where the mesh would have a crack. `sides` (4 m, n, 3) are the
+    points of the edges of m faces; those that are `free` have a length and are not the edge of another face."""
     share = np.linspace(0.0, 1.0, FINER + 1)[:, None, None]
     dense = {i: (sides[i][:-1] + share * np.diff(sides[i], axis=0)).reshape(-1, 3) for i in free}
     for i in free:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import NdBSpline
 
 from rodshell.arrays import Floats, Ints
 
@@ -41,16 +42,9 @@ class Nurbs:
             return f"its control points are not finite, or beyond {MOST:g}"
         return "" if (self.controls[..., 3] > 0).all() else "a control point has no positive weight"
 
-    def points(self, u: Floats, v: Floats) -> Floats:
-        """Points (k, l, 3) of the surface at the parameters `u` (k,) and `v` (l,)."""
-        along, across = (splines(k, p, t) for k, p, t in zip(self.knots, self.degrees, (u, v), strict=True))
-        x = np.einsum("ki,ijd,lj->kld", along, self.controls, across, optimize=True)
-        return np.asarray(x[..., :3] / x[..., 3:])
-
     def at(self, u: Floats, v: Floats) -> Floats:
-        """The point (k, 3) for each pair of parameters `u` (k,) and `v` (k,)."""
-        along, across = (splines(k, p, t) for k, p, t in zip(self.knots, self.degrees, (u, v), strict=True))
-        x = np.einsum("ki,ijd,kj->kd", along, self.controls, across, optimize=True)
+        """Points (..., 3) of the surface at parameters `u` and `v` (...)."""
+        x = NdBSpline(self.knots, self.controls, self.degrees)(np.stack(np.broadcast_arrays(u, v), axis=-1))
         return np.asarray(x[..., :3] / x[..., 3:])
 
     @property
@@ -71,30 +65,9 @@ class Nurbs:
     def triangles(self) -> tuple[Floats, Ints]:
         """The whole surface in triangles: vertices (k, 3) and faces (m, 3)."""
         along, across = (max(GRID, count) for count in self.quads)
-        x = self.points(*self.lattice((along, across)))
+        u, v = self.lattice((along, across))
+        x = self.at(u[:, None], v)
         return x.reshape(-1, 3), grid_triangles(along + 1, across + 1)
-
-
-def splines(knots: Floats, degree: int, t: Floats) -> Floats:
-    """Evaluate all B-splines of a degree, by the recursion of Cox and de Boor.
-
-    Args:
-        knots: (m + degree + 1,), ascending.
-        t: (k,) parameters.
-
-    Returns:
-        (k, m) values.
-    """
-    last = np.flatnonzero(knots < knots[-degree - 1])[-1]  # the end belongs to this span
-    span = np.clip(np.searchsorted(knots, t, side="right") - 1, degree, last)
-    values: Floats = (np.arange(len(knots) - 1) == span[:, None]).astype(np.float64)
-    for p in range(1, degree + 1):
-        low, high = knots[: -p - 1], knots[p + 1 :]
-        rising, falling = knots[p:-1] - low, high - knots[1:-p]
-        up = (t[:, None] - low) / np.where(rising > 0, rising, 1.0)
-        down = (high - t[:, None]) / np.where(falling > 0, falling, 1.0)
-        values = up * values[:, :-1] + down * values[:, 1:]
-    return values
 
 
 def grid_triangles(rows: int, columns: int) -> Ints:

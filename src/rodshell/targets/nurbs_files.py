@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.curves import closed_loops
 from rodshell.targets.apart import read_apart
 from rodshell.targets.joined_faces import joined
-from rodshell.targets.mesh_files import Notes, file_bytes
+from rodshell.targets.mesh_files import FileSurface, file_bytes
 from rodshell.targets.nurbs import FINEST, GRID, PER_SPAN, Nurbs, grid_triangles
 from rodshell.units import shown
 
@@ -29,22 +28,17 @@ RHINO_UNITS = {
     "Inches": 0.0254, "Feet": 0.3048, "Yards": 0.9144,
 }  # fmt: skip
 
-STEP_FILES = (".step", ".stp")
 MILLIMETRE = 1e-3  # m: OpenCASCADE converts every unit to millimetres
 _LAST_LINE = b"END-ISO-10303-21"
 _ABSURD = re.compile(rb"-?\d\.\d*E\+?\d{3,}")  # OpenCASCADE does not terminate with such coordinates
 READERS = Path(__file__).parent
 
 
-def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Floats], float | None, Notes]:
+def read_3dm(path: Path, name: str | None = None) -> FileSurface:
     """Read one surface of a 3dm file; the untrimmed faces of a polysurface are joined.
 
     Args:
         name: object or layer name, or the surface's number from 1 on, if the file has several surfaces.
-
-    Returns:
-        Vertices (n, 3), triangles (m, 3) and trims (closed polylines) in the file's unit; that unit [m], or None;
-        and notes for the user, in sentences.
 
     Raises:
         InputError: the file is missing or damaged; rhino3dm is not installed; the file has no such face, or several.
@@ -53,16 +47,15 @@ def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Fl
     if "surfaces" not in found:
         raise _no_single_surface(path, json.loads(str(found["names"])), name, json.loads(str(found["others"])))
     surfaces = [_nurbs(path, found, k) for k in range(int(found["surfaces"]))]
-    loops, unit, notes = closed_loops(found["trims"]), RHINO_UNITS.get(str(found["unit"])), Notes()
+    trims, unit = tuple(closed_loops(found["trims"])), RHINO_UNITS.get(str(found["unit"]))
     if len(surfaces) == 1:
-        return *surfaces[0].triangles(), loops, unit, notes
+        return FileSurface(*surfaces[0].triangles(), trims=trims, unit=unit)
     vertices, triangles, bend = joined(surfaces, str(path))
-    if bend > KINK:
-        notes = (
-            f"faces of {path.name} meet at angles of up to {degrees(bend):.0f} degrees: a seam along such an edge "
-            "keeps the crease, which is rounded off otherwise",
-        )
-    return vertices, triangles, loops, unit, notes
+    note = (
+        f"faces of {path.name} meet at angles of up to {degrees(bend):.0f} degrees: a seam along such an edge "
+        "keeps the crease, which is rounded off otherwise"
+    )
+    return FileSurface(vertices, triangles, (note,) if bend > KINK else (), trims, unit)
 
 
 def _nurbs(path: Path, found: dict[str, Any], k: int) -> Nurbs:
@@ -79,7 +72,6 @@ def rhino_content(path: Path, data: bytes, **request: object) -> dict[str, Any]:
     """What `opennurbs` finds in a 3dm file.
 
     Args:
-        path: of the file, for messages.
         request: the `name` of a surface; or the `most` curves that are read.
 
     Raises:
@@ -112,26 +104,23 @@ def _no_single_surface(
             f"{path}: the surface has {faces[0]} faces, of which at most {MOST_JOINED} are joined, and only untrimmed "
             "ones: merge them, or export a mesh"
         )
-    listed = [
-        f"{k}, {shown(label or layer)}" if label or layer else f"{k}"
-        for k, (label, layer, _) in enumerate(surfaces[:_LISTED], start=1)
-    ]
-    what = "surfaces" if name is None else f"surfaces named {shown(name)}"
-    more = "; ..." if len(surfaces) > _LISTED else ""
-    return InputError(
-        f"{path} has {len(faces)} {what}: choose one by its number, or by its object or layer name (available: "
-        f"{'; '.join(listed)}{more})"
-    )
+    names = [[label or layer] if label or layer else [] for label, layer, _ in surfaces]
+    return _choose_one(path, f"{len(faces)} surfaces", names, name, "its number, or by its object or layer name")
 
 
-def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Floats]]:
-    """Read one face of a STEP file, in a separate process (see `opencascade`).
+def _choose_one(path: Path, found: str, parts: list[list[str]], name: str | None, by: str) -> InputError:
+    """What is said of a file that has none or several parts of a name; it lists all `parts`, each with its names."""
+    named = "" if name is None else f" named {shown(name)}"
+    listed = [", ".join([str(k), *map(shown, names)]) for k, names in enumerate(parts[:_LISTED], start=1)]
+    available = "; ".join(listed) + ("; ..." if len(parts) > _LISTED else "")
+    return InputError(f"{path} has {found}{named}: choose one by {by} (available: {available})")
+
+
+def read_step(path: Path, name: str | None = None) -> FileSurface:
+    """Read one face of a STEP file, in metres, in a separate process (see `opencascade`).
 
     Args:
         name: of the face or of its shell or solid, or the face's number from 1 on, if the file has several.
-
-    Returns:
-        Vertices (n, 3) [m], triangles (m, 3) and trims (closed polylines) [m].
 
     Raises:
         InputError: the file is missing or damaged; OpenCASCADE is not installed; the file has no such face, or several.
@@ -146,18 +135,11 @@ def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[F
     samples = {"grid": GRID, "per_span": PER_SPAN, "finest": FINEST, "along_edges": _ALONG_EDGES}
     parts = read_apart(READERS / "opencascade.py", path, data, "STEP", name=name, **samples)
     if "points" not in parts:
-        raise _no_single_face(path, json.loads(str(parts["names"])), name)
+        faces = json.loads(str(parts["names"]))
+        if not faces:
+            raise InputError(f"{path} has no face: export the surface, not its edges or its mesh, as STEP")
+        count = sum(name is None or name in names for names in faces)
+        raise _choose_one(path, f"{count} faces", faces, name, "its name or number")
     rows, columns, _ = parts["points"].shape
     vertices, triangles = MILLIMETRE * parts["points"].reshape(-1, 3), grid_triangles(rows, columns)
-    return vertices, triangles, closed_loops(MILLIMETRE * parts["trims"])
-
-
-def _no_single_face(path: Path, faces: list[list[str]], name: str | None) -> InputError:
-    if not faces:
-        return InputError(f"{path} has no face: export the surface, not its edges or its mesh, as STEP")
-    what = f"{len(faces)} faces"
-    if name is not None:
-        what = f"{sum(name in names for names in faces)} faces named {shown(name)}"
-    listed = [", ".join([str(k), *map(shown, names)]) for k, names in enumerate(faces[:_LISTED], start=1)]
-    available = "; ".join(listed) + ("; ..." if len(faces) > _LISTED else "")
-    return InputError(f"{path} has {what}: choose one by its name or number (available: {available})")
+    return FileSurface(vertices, triangles, trims=tuple(closed_loops(MILLIMETRE * parts["trims"])))

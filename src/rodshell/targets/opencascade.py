@@ -50,13 +50,8 @@ def parts(whole: Any, kind: Any) -> Iterator[Any]:
 
 
 def _points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
-    """Points (k, l, 3) of a surface on a lattice of its parameters [mm].
-
-    Args:
-        grid: intervals each way, at least.
-        per_span: intervals for each span of the surface.
-        finest: intervals each way, at most.
-    """
+    """Points (k, l, 3) [mm] of a surface on a lattice of its parameters, with at least `grid` intervals each way,
+    `per_span` for each span of the surface, and at most `finest`."""
     from OCP.GeomAbs import GeomAbs_CN
 
     sides = []

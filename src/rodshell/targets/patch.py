@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import unit
-from rodshell.targets.target import Gap, Implicit, Target
+from rodshell.targets.target import Implicit, Target
 from rodshell.validation import LARGEST, short
 
 ON_CREST = 1e-4  # of its length: points this close to a crease in plan are on it
@@ -32,10 +32,7 @@ class Seam:
 
     @staticmethod
     def of(points: ArrayLike) -> "Seam":
-        """Make a seam of points.
-
-        Args:
-            points: (n, 2), or (n, 3), whose z is ignored [m].
+        """Make a seam of points (n, 2), or (n, 3), whose z is ignored [m].
 
         Raises:
             InputError: fewer than two different points, or one that is not finite.
@@ -79,14 +76,7 @@ class Seam:
         return x
 
     def distance(self, x: Floats) -> Floats:
-        """Signed distance in plan, positive to the left of the seam's direction.
-
-        Args:
-            x: (n, 2) or (n, 3) points [m].
-
-        Returns:
-            (n,) [m].
-        """
+        """Signed distance (n,) [m] of points `x` (n, 2 or 3) in plan, positive to the left of the seam's direction."""
         k, share, off = self._nearest(x)
         edge = np.diff(self._corners, axis=0)
         left = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
@@ -212,15 +202,3 @@ class Patch(Target):
 
     def height_at(self, xy: Floats) -> Floats:
         return self.surface.height_at(xy)
-
-    def retract(self, x: Floats, steps: int = 4) -> Floats:
-        return self.surface.retract(x, steps)
-
-    def on_surface(self, x: Floats) -> Gap:
-        return self.surface.on_surface(x)
-
-    def closest(self, x: Floats) -> Floats:
-        return self.surface.closest(x)
-
-    def gap(self, x: Floats) -> Gap:
-        return self.surface.gap(x)

@@ -40,9 +40,6 @@ class Polygons:
 
         A crease that crosses faces from corner to corner runs along their diagonals, not across them.
 
-        Args:
-            name: of the file, for the message.
-
         Raises:
             InputError: a face has a corner that is not there; faces have so many corners that to split them takes
                 minutes.

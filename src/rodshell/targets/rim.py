@@ -48,29 +48,13 @@ class Domain(Protocol):
     @property
     def half_extent(self) -> tuple[float, float]:
         """Half the width along x and along y [m]."""
-        ...
 
     def holds(self, xy: Floats) -> Bools:
-        """Whether points of the plan are inside or on the edge.
-
-        Args:
-            xy: (n, 2) points [m].
-
-        Returns:
-            (n,) booleans.
-        """
-        ...
+        """Whether (n,) points `xy` (n, 2) of the plan are inside or on the edge."""
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distance to the edge, negative inside.
-
-        Args:
-            xy: (n, 2) points [m].
-
-        Returns:
-            Distance (n,) [m], its gradient (n, 2) [-] and its Hessian (n, 2, 2) [1/m].
-        """
-        ...
+        """Signed distance (n,) [m] of points `xy` (n, 2) to the edge, negative inside, its gradient (n, 2) and Hessian
+        (n, 2, 2) [1/m]."""
 
 
 @dataclass(frozen=True)
@@ -285,19 +269,14 @@ class Rim:
 
     def distance(self, x: Floats) -> Floats:
         """Signed distance (n,) [m] of points `x` (n, 3) near the surface to the nearest loop, positive inside."""
-        result = np.empty(len(x))
-        _distance(x, self.points, self.inward, self.after, self._before, *self._balls, result)
-        return result
+        edge, share = self.feet(x)
+        other = np.where(share <= 0.0, self._before[edge], np.where(share >= 1.0, self.after[edge], edge))
+        inward = self.inward[edge] + self.inward[other]  # at a corner the mean of both sides decides
+        return dot(x - self.at(edge, share), inward) / np.sqrt(dot(inward, inward))
 
     def feet(self, x: Floats) -> tuple[Ints, Floats]:
-        """The closest points of the rim, as `at` takes them.
-
-        Args:
-            x: (n, 3) points [m].
-
-        Returns:
-            Index (n,) of the nearest edge, and the fraction (n,) of it before the closest point.
-        """
+        """The closest points of the rim to `x` (n, 3), as `at` takes them: the index (n,) of the nearest edge, and the
+        fraction (n,) of it before the closest point."""
         edge, share = np.empty(len(x), dtype=np.intp), np.empty(len(x))
         _feet(x, self.points, self.after, self._before, *self._balls, edge, share)
         return edge, share
@@ -310,25 +289,6 @@ class Rim:
         """Points (n, 3) [m] on the edges (n,), at fractions `share` (n,) of their lengths."""
         first = self.points[edge]
         return np.asarray(first + share[:, None] * (self.points[self.after[edge]] - first))
-
-
-@njit(error_model="numpy")
-def _distance(x, points, inward, after, before, start, centres, radii, result):  # type: ignore[no-untyped-def]
-    """Distances from the nearest edge; from the mean of both edges where a corner is nearest."""
-    edge = 0
-    for n in range(len(x)):
-        edge, along = _nearest(x, n, points, after, before, start, centres, radii, edge)
-        ex, ey, ez = _edge(points, edge, after[edge])
-        ix, iy, iz = inward[edge]
-        if along <= 0.0 or along >= 1.0:
-            other = before[edge] if along <= 0.0 else after[edge]
-            ix, iy, iz = ix + inward[other, 0], iy + inward[other, 1], iz + inward[other, 2]
-        ox, oy, oz = (
-            x[n, 0] - along * ex - points[edge, 0],
-            x[n, 1] - along * ey - points[edge, 1],
-            x[n, 2] - along * ez - points[edge, 2],
-        )
-        result[n] = (ox * ix + oy * iy + oz * iz) / np.sqrt(ix * ix + iy * iy + iz * iz)
 
 
 @njit(error_model="numpy")
@@ -421,18 +381,15 @@ def _stops(turn: Floats, length: Floats) -> Bools:
 
 
 def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
-    """Smooth the jagged parts of a mesh's edge, such as missing faces leave.
+    """The loop (n, 3) with the jagged parts smoothed, such as missing faces leave; None if no part is jagged.
 
-    The result is a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink a circle. It is
-    the smoothest whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain.
-    Vertices outside of jagged parts do not move.
+    It is a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink a circle: the smoothest
+    whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain. Vertices
+    outside of jagged parts do not move.
 
     Args:
         loop: (n, 3) closed polyline [m].
         normals: (n, 3) of the surface there.
-
-    Returns:
-        (n, 3) the smoothed loop, or None if no part is jagged.
     """
     free = _jagged(loop, normals)
     if not free.any():

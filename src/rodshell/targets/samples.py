@@ -43,16 +43,13 @@ _Parts = tuple[Floats, Floats, Floats]  # points, normals and areas
 
 
 def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
-    """Sample the smooth surface that a mesh represents, densely enough to fit cubics to.
+    """Sample the smooth surface that a mesh represents, densely enough to fit cubics to that are a `spacing` [m] apart.
 
     The samples are the vertices, and points on triangles that are large against the spacing or long and thin; where one
-    is narrower than samples are apart, those along its longest edge. Between
-    its vertices the surface is taken as a cubic that meets their normals [Vlachos et al. 2001, Curved PN triangles]: a
-    long triangle of a vault lies below the arch that it spans. Vertices of the rim come first, so that cubics are
-    placed there: beyond the rim there is nothing to fit to.
-
-    Args:
-        spacing: distance between the cubics that will be fitted [m].
+    is narrower than samples are apart, those along its longest edge. Between its vertices the surface is taken as a
+    cubic that meets their normals [Vlachos et al. 2001, Curved PN triangles]: a long triangle of a vault lies below the
+    arch that it spans. Vertices of the rim come first, so that cubics are placed there: beyond the rim there is nothing
+    to fit to.
     """
     faces, corners = mesh.faces, mesh.vertices[mesh.faces]
     edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
@@ -113,9 +110,6 @@ def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Sampl
     The net continues there, although rods do not. Without a cap the surface would be continued into a door from three
     sides, and would meet itself there in a crease. A cap is the interpolant of |r|^3 through the surface around the
     opening: its bending energy is the smallest [Duchon 1977].
-
-    Args:
-        spacing: distance between the cubics that will be fitted [m].
     """
     points, normals = [samples.points], [samples.normals]
     outer, *openings = [mesh.vertices[loop] for loop in mesh.loops] or [np.empty((0, 3))]

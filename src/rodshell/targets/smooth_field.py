@@ -62,31 +62,17 @@ class CellList:
         return self.points, self.low, self.shape, self.cell, self.start, self.order
 
     def nearest(self, x: Floats, count: int = 1, limit: float = np.inf) -> tuple[Floats, Ints]:
-        """The nearest points, nearest first.
+        """Distances (n, count) [m] and indices (n, count) of the points nearest to `x` (n, 3), nearest first.
 
-        Args:
-            x: (n, 3) points whose neighbours are wanted [m].
-            limit: neighbours further away need not be found; their distance is then infinite [m].
-
-        Returns:
-            Distances (n, count) [m] and indices (n, count).
+        Those further away than the `limit` [m] need not be found; their distance is then infinite.
         """
         distance, index = np.full(len(x) * count, np.inf), np.zeros(len(x) * count, dtype=np.intp)
         _nearest(x, *self._lattice, count, limit, distance, index)
         return np.sqrt(distance).reshape(-1, count), index.reshape(-1, count)
 
     def within(self, x: Floats, radius: float, *, ordered: bool = False) -> tuple[Ints, Ints, Floats]:
-        """All points within a radius.
-
-        Args:
-            x: (m, 3) points whose neighbours are wanted [m].
-            radius: [m].
-            ordered: whether the nearest come first.
-
-        Returns:
-            Where the list of each point begins (m + 1,), the lists one after the other (k,), and the distances (k,)
-            [m].
-        """
+        """All points within a radius [m] of each of `x` (m, 3), if `ordered` the nearest first: where the list of each
+        begins (m + 1,), the lists one after the other (k,), and the distances (k,) [m]."""
         most = _most_within(x, *self._lattice, radius)
         begin, near, away = np.zeros(len(x) + 1, dtype=np.intp), np.empty(most, dtype=np.intp), np.empty(most)
         _within(x, *self._lattice, radius, ordered, begin, near, away)
@@ -281,12 +267,7 @@ class SmoothField:
         return distance[:, 0], index[:, 0]
 
     def implicit(self, x: Floats, *, second: bool = True) -> Implicit:
-        """Evaluate F and its derivatives.
-
-        Args:
-            x: (n, 3) points [m].
-            second: whether second derivatives are wanted; without them the Hessian is empty.
-        """
+        """F and its derivatives at points `x` (n, 3) [m]; without the `second` ones the Hessian is empty."""
         distance, nearest = self.nearest(x)
         value, gradient, hessian = np.empty(len(x)), np.empty((len(x), 3)), np.empty((len(x) if second else 0, 3, 3))
         width2 = (WIDTH * self.spacing) ** 2

@@ -50,11 +50,8 @@ class Gap(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """Distance of a surface from the vertices of the mesh that it was fitted to.
-
-    Args:
-        max, rms: the largest, and the root of the mean square [m].
-    """
+    """Distance of a surface from the vertices of the mesh that it was fitted to [m]: the largest, and the root of the
+    mean square."""
 
     max: float
     rms: float
@@ -123,11 +120,7 @@ class Target(ABC):
 
     @abstractmethod
     def implicit(self, x: Floats) -> Implicit:
-        """Evaluate the implicit function, also past the end.
-
-        Args:
-            x: (n, 3) points [m].
-        """
+        """Evaluate the implicit function at points `x` (n, 3) [m], also past the end."""
 
     def level(self, x: Floats) -> tuple[Floats, Floats]:
         """F (n,) [m] and its gradient (n, 3) at the points `x` (n, 3) [m], without second derivatives."""
@@ -136,14 +129,7 @@ class Target(ABC):
 
     @abstractmethod
     def height_at(self, xy: Floats) -> Floats:
-        """Height of the surface over points of the plan; that of the uppermost part where there are several.
-
-        Args:
-            xy: (n, 2) points of the plan [m].
-
-        Returns:
-            (n,) z [m]; NaN where there is no surface.
-        """
+        """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
 
     @property
     @abstractmethod
@@ -156,26 +142,16 @@ class Target(ABC):
 
     @abstractmethod
     def margin(self, x: Floats) -> Floats:
-        """Distance to the end, positive inside; the shell is cut where it is 0.
-
-        Args:
-            x: (n, 3) points on or near the surface [m].
-
-        Returns:
-            (n,) [m].
-        """
+        """Distance (n,) [m] of points `x` (n, 3) on or near the surface to the end, positive inside; 0 where the shell
+        is cut."""
 
     def covers(self, x: Floats) -> Bools:
         """Whether a net can start at the points `x` (n, 3) of the surface: inside the end, or in a filled opening."""
         return self.margin(x) > 0
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
-        """Move points onto the surface along its gradient, which for small gaps leads near the closest points.
-
-        Args:
-            x: (n, 3) points [m].
-            steps: of Newton's method, at most.
-        """
+        """Move points `x` (n, 3) [m] onto the surface along its gradient, by at most as many steps of Newton's method;
+        for small gaps this leads near the closest points."""
         x = np.ascontiguousarray(x)
         for _ in range(steps):
             x, furthest = along_gradient(x, *self.level(x))
@@ -259,10 +235,8 @@ class Target(ABC):
         return np.zeros(len(x), dtype=bool)
 
     def contact(self, x: Floats) -> Gap:
-        """Signed distance to the body on which a grid falls: the surface and a wall below its rim.
-
-        Args:
-            x: (n, 3) points [m].
+        """Signed distance of points `x` (n, 3) [m] to the body on which a grid falls: the surface and a wall below its
+        rim.
 
         Raises:
             InputError: this target has no such body.
@@ -270,13 +244,7 @@ class Target(ABC):
         raise InputError(f'a grid cannot fall on a target of kind "{self.name}": use drape method "bound"')
 
     def lift(self, xy: Floats) -> Floats:
-        """Lift points of the plan onto the surface.
-
-        Args:
-            xy: (n, 2) points of the plan [m].
-
-        Returns:
-            (n, 3) points of the surface [m].
+        """Points (n, 3) [m] of the surface over the points `xy` (n, 2) of the plan [m].
 
         Raises:
             InputError: there is no surface over a point.
@@ -293,15 +261,8 @@ Target._check_points()
 
 @njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
-    """Hessians of the distance at points away from a surface, S (I + d S)^-1.
-
-    Args:
-        shape: (n, 3, 3) shape operators S at the closest points [1/m].
-        distance: (n,) signed distances d of the points [m].
-
-    Returns:
-        (n, 3, 3) [1/m].
-    """
+    """Hessians (n, 3, 3) [1/m] of the distance at points away from a surface, S (I + d S)^-1, from the shape operators
+    S (n, 3, 3) at the closest points [1/m] and the signed distances d (n,) [m]."""
     result, a, adjugate = np.empty_like(shape), np.empty((3, 3)), np.empty((3, 3))
     for m in range(len(shape)):
         for i in range(3):
@@ -374,12 +335,7 @@ def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, sl
 
 @njit(error_model="numpy")
 def along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
-    """One step of Newton from points x (n, 3) to F = 0 along the gradient, and the largest |F| before it.
-
-    Args:
-        x: (n, 3) [m].
-        value, gradient: (n,), (n, 3) F there, see `Implicit`.
-    """
+    """One step of Newton from points x (n, 3) [m] to F = 0 along the gradient, and the largest |F| before it."""
     result, furthest = np.empty((len(x), 3)), 0.0
     for m in range(len(x)):
         gx, gy, gz = gradient[m, 0], gradient[m, 1], gradient[m, 2]
