@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from warnings import warn
 
 from rodshell.errors import InputError, OutOfTimeError, OutputWarning
+from rodshell.output.schedules import SCHEDULES, table_csv
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results.archive import Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
@@ -216,24 +217,9 @@ def _pdf(content: Content) -> Files:
 
 
 def _csv(content: Content) -> Files:
-    from rodshell.output import schedules
-
-    archive, results = content.archive, content.archive.results
-    fabrication = results.fabrication
-    tables: dict[str, Callable[[Archive], schedules.Table]] = {
-        "rods": schedules.rods_table,
-        "joints": schedules.joints_table,
-        "supports": schedules.supports_table,
-    }
-    tables |= {"bracing": schedules.bracing_table} if fabrication and fabrication.bracing else {}
-    tables |= {"foundations": schedules.foundations_table} if results.loads else {}
-    tables |= {"stock": schedules.stock_table} if fabrication and fabrication.stock else {}
-    tables |= {"sections": schedules.sections_table} if any(rod.stiffness for rod in results.rods) else {}
-    tables |= {"seams": schedules.seams_table} if results.seams else {}
-    tables |= {"end_paths": schedules.end_paths_table} if "history" in archive.states else {}
-    for name, table in tables.items():
-        columns, rows = table(archive)
-        yield f"schedule/{name}.csv", schedules.csv_text([columns, *rows])
+    for name, schedule in SCHEDULES.items():
+        if schedule.known(content.archive):
+            yield f"schedule/{name}.csv", table_csv(schedule.table(content.archive))
 
 
 def _obj(content: Content) -> Files:
@@ -315,7 +301,6 @@ KINDS: dict[str, Callable[[Content], Files]] = {
 DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another package
 
 _DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
-_SCHEDULES = ("rods", "joints", "supports", "foundations", "bracing", "stock", "sections", "seams", "end_paths")
 _STAGES = ("flat", "stage_[0-9]*", f"{POPPED}*")
 
 _SHELLS = (DRAPED, f"{POPPED}*")
@@ -324,7 +309,7 @@ NAMES: dict[str, list[str]] = {
     "dxf": [f"drawings/{name}.dxf" for name in _DRAWINGS],
     "svg": [f"drawings/{name}.svg" for name in _DRAWINGS],
     "pdf": ["drawings/drawings.pdf"],
-    "csv": [f"schedule/{name}.csv" for name in _SCHEDULES],
+    "csv": [f"schedule/{name}.csv" for name in SCHEDULES],
     "obj": [f"model/{state}.obj" for state in _SHELLS],
     "gltf": [f"model/{state}.glb" for state in _SHELLS],
     "vtp": [

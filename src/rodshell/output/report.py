@@ -5,7 +5,7 @@ and draws nothing between them.
 """
 
 import base64
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -21,9 +21,7 @@ from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
 from rodshell.output.grid import caption_of, shape_names
 from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
-from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
-from rodshell.output.schedules import joints_table as joints
-from rodshell.output.schedules import supports_table as supports
+from rodshell.output.schedules import SCHEDULES, Table, heading
 from rodshell.output.section_profiles import profiles_svg
 from rodshell.output.svg import SCALE, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
@@ -67,7 +65,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     def shown(svg: str) -> Markup:
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
-    results, tables = archive.results, _tables(archive)
+    results = archive.results
     shown_as = ("flat", *shells_among(archive.states))
     states = [name for name in shape_names(archive) if name in shown_as and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
@@ -90,7 +88,8 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         plan=shown(_on_page(files["plan"])) if "plan" in files else "",
         drawings=[(drawings[name].title, shown(_on_page(files[name]))) for name in IN_PAGE if name in drawings],
         tables=[
-            (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
+            (title, [heading(column) for column in table], zip(*table.values(), strict=True), note)
+            for title, table, note in _tables(archive)
         ],
         case=shown_case(archive.case_toml, archive.inputs),
         version=results.version_rodshell or "unknown",
@@ -131,25 +130,20 @@ def _note(archive: Archive) -> str:
     return (PARTLY if unknown else FOLLOWED).format(share=whole_percent(unknown), gaps=gaps)
 
 
-def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
+def _tables(archive: Archive) -> Iterator[tuple[str, Table, str]]:
     """Title, table and note of the schedules in the page."""
-    tables = [
-        ("Rods", rods_table(archive, brief=True), "Where each joint is on its rods: schedule/rods.csv, joints.csv."),
-        ("Joints", joints(archive, brief=True), "Named by the rods that meet, a/b. Final: in the popped-up shell."),
-    ]
-    if archive.results.boundary:
-        tables.append(
-            (
-                "Supports",
-                supports(archive, brief=True),
-                "With the reactions of the unloaded shell: schedule/supports.csv.",
-            )
-        )
-    if archive.results.seams:
-        tables.append(("Seams", seams_table(archive), "Forces: the sum of both rods' support forces."))
-    if archive.results.fabrication and (stock := archive.results.fabrication.stock):
-        tables.append(("Stock", stock_table(archive), _plan_of(stock)))
-    return tables
+    fabrication = archive.results.fabrication
+    notes = {
+        "rods": "Where each joint is on its rods: schedule/rods.csv, joints.csv.",
+        "joints": "Named by the rods that meet, a/b. Final: in the popped-up shell.",
+        "supports": "With the reactions of the unloaded shell: schedule/supports.csv.",
+        "seams": "Forces: the sum of both rods' support forces.",
+        "stock": _plan_of(fabrication.stock) if fabrication and fabrication.stock else "",
+    }
+    for name, note in notes.items():
+        table = SCHEDULES[name].brief(archive)
+        if any(table.values()):
+            yield SCHEDULES[name].title, table, note
 
 
 def _plan_of(stock: Stock) -> str:

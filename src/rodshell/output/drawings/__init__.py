@@ -1,5 +1,7 @@
 """The drawing set: each drawing laid out once, at 1:1 for DXF and SVG, all of them on sheets for the PDF."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from rodshell.arrays import Floats
@@ -26,15 +28,7 @@ from rodshell.output.drawings.shell import (
     supports_drawing,
 )
 from rodshell.output.grid import lies_flat, supported
-from rodshell.output.schedules import (
-    bracing_table,
-    joints_table,
-    rods_table,
-    seams_table,
-    sections_table,
-    stock_table,
-    supports_table,
-)
+from rodshell.output.schedules import SCHEDULES
 from rodshell.output.settings import PAPERS
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
@@ -59,24 +53,23 @@ def drawing_set(archive: Archive) -> dict[str, Drawing]:
 
 def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
     """All sheets in mm of paper, and the paper's size."""
-    results, plan, paper = archive.results, flat_plan(archive), _paper(archive)
-    layouts, checked = dict(_layouts(archive)), _checked(results)
+    plan, paper, layouts = flat_plan(archive), _paper(archive), dict(_layouts(archive))
+    checked = _checked(archive.results)
+    about = {"supports": _held(archive), "bracing": checked, "rods": checked}
+
+    def schedule(name: str) -> Iterator[Sheet]:
+        found = SCHEDULES[name]
+        return table(found.title + about.get(name, ""), found.brief(archive), paper)
+
     first = layouts.pop("plan").sheets(paper) if "plan" in layouts else ()
     sheets = [*first, *_strips(plan, paper)]
     for name, layout in layouts.items():
         sheets += layout.sheets(paper)
-        if name == "supports":
-            sheets += table(f"Supports{_held(archive)}", supports_table(archive, brief=True), paper)
-        elif name == "bracing":
-            sheets += table(f"Bracing{checked}", bracing_table(archive, brief=True), paper)
-    sheets += table(f"Rods{checked}", rods_table(archive, brief=True), paper)
-    sheets += table("Joints", joints_table(archive, brief=True), paper)
-    if any(rod.stiffness for rod in results.rods):
-        sheets += table("Sections along the rods", sections_table(archive), paper)
-    if results.seams:
-        sheets += table("Seams", seams_table(archive), paper)
-    if results.fabrication and results.fabrication.stock:
-        sheets += table("Stock", stock_table(archive), paper)
+        if name in SCHEDULES:
+            sheets += schedule(name)
+    for name in ("rods", "joints", "sections", "seams", "stock"):
+        if SCHEDULES[name].known(archive):
+            sheets += schedule(name)
     return bound(sheets, title_block(archive, plan.summary), paper), paper
 
 

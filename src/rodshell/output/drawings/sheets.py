@@ -363,14 +363,13 @@ def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sh
     """A table over as many sheets as it takes, in as many columns side by side as fit.
 
     Args:
-        content: names of the columns, and rows of cells.
         paper: width and height of a sheet [mm].
     """
-    (columns, rows), (low, high) = content, room(paper)
-    if not columns:
+    if not content:
         return
-    cells = [max((len(row[k]) for row in rows), default=0) for k in range(len(columns))]
-    heads = [_wrapped(*head(column), width) for column, width in zip(columns, cells, strict=True)]
+    (low, high), rows = room(paper), list(zip(*content.values(), strict=True))
+    cells = [max(map(len, column), default=0) for column in content.values()]
+    heads = [_wrapped(*head(name), width) for name, width in zip(content, cells, strict=True)]
     widths = [max(width, *map(len, words)) for width, words in zip(cells, heads, strict=True)]
     steps = FINE * (LETTER * np.array(widths) + 1.2)
     width = float(steps.sum()) + 2 * FINE

@@ -21,7 +21,7 @@ from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
 from rodshell.output.grid import GridJoint, GridRod, Shape, along, joints_of, laid_out, rods_of, shape_names, shape_of
 from rodshell.output.models import section_outline, widths_along
 from rodshell.output.pictures import FAMILIES
-from rodshell.output.schedules import Table, heading, joints_table, rods_table
+from rodshell.output.schedules import SCHEDULES, Table, heading
 from rodshell.results import Archive, wording
 from rodshell.results.wording import nice_ticks, rounding_of
 
@@ -160,7 +160,7 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     if len(names) < 2:
         return None
     joints, shapes = _drawn_joints(archive, rods), [shape_of(archive, name) for name in names]
-    tables = {"rod": rods_table(archive, brief=True), "joint": joints_table(archive, brief=True)} if schedules else {}
+    tables = {kind: SCHEDULES[f"{kind}s"].brief(archive) for kind in ("rod", "joint") if schedules}
     target = archive.states.get("target_points")
     return Drawn(
         archive.name,
@@ -345,5 +345,5 @@ def _reactions(archive: Archive, rods: list[GridRod]) -> dict[str, tuple[Floats,
 
 def _rows(table: Table) -> dict[str, Any]:
     """A schedule by the name in its first column."""
-    columns, rows = table
-    return {"columns": [heading(column) for column in columns], "rows": {row[0]: row for row in rows}}
+    rows = zip(*table.values(), strict=True)
+    return {"columns": [heading(column) for column in table], "rows": {row[0]: row for row in rows}}
