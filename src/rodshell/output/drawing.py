@@ -17,6 +17,7 @@ _Anchor = Literal["start", "middle", "end"]
 T = TypeVar("T", float, Floats)
 
 INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"
+FAMILIES = ("#1f5f8b", "#a8552a", "#2b7a4b")  # of the rods of a grid's first, second and third family
 LETTER = 0.62  # width of a capital or digit over the text size
 TEXT = 3.43  # mm: size of usual texts on paper, whose capitals are 2.5 mm high, the usual nominal size of ISO 3098
 SMALL = 0.75  # size of the smallest texts over the usual one: where capitals are 2.5 mm high, these have 1.9 mm

@@ -25,7 +25,17 @@ from rodshell.figures.form import Section, Stiffness
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.drawings.flat import FlatPlan
-from rodshell.output.grid import STAGE, Shape, deployed_shape, joint_places, joints_of, rods_of, shape_names, shape_of
+from rodshell.output.grid import (
+    STAGE,
+    GridRod,
+    Shape,
+    deployed_shape,
+    joint_places,
+    joints_of,
+    meshed_rods,
+    shape_names,
+    shape_of,
+)
 from rodshell.output.svg import tag
 from rodshell.results import Archive
 
@@ -42,9 +52,8 @@ def obj_text(archive: Archive, state: str) -> str:
     nodes = archive.states[state]
     text = f"# rodshell, {state}, metres\n"
     text += len(nodes) * "v %.9f %.9f %.9f\n" % tuple(nodes.ravel().tolist())
-    for rod in rods_of(archive):
-        if len(rod.nodes) > 1:
-            text += f"o {' '.join(rod.id.split()) or 'rod'}\nl {' '.join(map(str, (rod.nodes + 1).tolist()))}\n"
+    for rod in meshed_rods(archive):
+        text += f"o {' '.join(rod.id.split()) or 'rod'}\nl {' '.join(map(str, (rod.nodes + 1).tolist()))}\n"
     return text
 
 
@@ -54,15 +63,14 @@ def vtp_text(archive: Archive, name: str) -> str:
     Args:
         name: of a shape, see `shape_names`.
     """
-    shape = deployed_shape(archive, name)
-    rods = [(k, rod.nodes) for k, rod in enumerate(rods_of(archive)) if len(rod.nodes) > 1]
+    shape, rods = deployed_shape(archive, name), meshed_rods(archive)
     nodes = archive.states["rod_nodes"]
-    offsets = np.cumsum([len(nodes_of_rod) for _, nodes_of_rod in rods], dtype=np.int64)
+    offsets = np.cumsum([len(rod.nodes) for rod in rods], dtype=np.int64)
     counts = {"Points": len(nodes), "Lines": len(rods), "Verts": 0, "Strips": 0, "Polys": 0}
     piece = tag(
         "Piece",
         tag("PointData", *(_data_array(key, values) for key, values in _known(shape, nodes)), ""),
-        tag("CellData", _data_array("rod", np.array([k for k, _ in rods], dtype=np.int64))),
+        tag("CellData", _data_array("rod", np.arange(len(rods)))),
         tag("Points", _data_array("Points", shape.positions[nodes], NumberOfComponents="3")),
         tag("Lines", _data_array("connectivity", np.arange(len(nodes))), _data_array("offsets", offsets)),
         **{f"NumberOf{key}": str(count) for key, count in counts.items()},
@@ -113,7 +121,7 @@ def compas_json(archive: Archive, state: str) -> str:
     Args:
         state: "draped", "popped_pinned" or "popped_clamped".
     """
-    positions, rods = archive.states[state], rods_of(archive)
+    positions, rods = archive.states[state], meshed_rods(archive)
     joint_positions = joint_places(archive, positions)
     lines = [
         {
@@ -122,7 +130,6 @@ def compas_json(archive: Archive, state: str) -> str:
             "name": rod.id,
         }
         for rod in rods
-        if len(rod.nodes) > 1
     ]
     node = {repr(name): dict(zip("xyz", at.tolist(), strict=True)) for name, at in joint_positions.items()}
     edge: dict[str, dict[str, Any]] = {name: {} for name in node}
@@ -187,7 +194,7 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
         figures |= {"layer": str(rod.record.layer), "joints_from_cut_end_mm": joints}
         flat = polyline(np.column_stack([course, np.zeros(len(course))]))
         model.Objects.AddPolyline(flat, about("CUT", rod.id, figures))
-        if archive.final and len(rod.nodes) > 1:
+        if archive.final and len(rod.nodes):
             curve = 1e3 * archive.states[archive.final][rod.nodes]
             model.Objects.AddPolyline(polyline(curve), about("FINAL", rod.id, figures))
     for joint, (x, y) in zip(plan.joints, plan.marks.tolist(), strict=True):
@@ -215,7 +222,7 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
     Args:
         state: "draped", "popped_pinned" or "popped_clamped".
     """
-    shape, rods = shape_of(archive, state), [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
+    shape, rods = shape_of(archive, state), meshed_rods(archive)
     section = archive.results.rod.section if archive.results.rod else None
     outline = section_outline(section, float(np.ptp(shape.positions, axis=0).max()))
     scale = scale_of(archive, shape, "gap")
@@ -225,13 +232,7 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
         colours = np.split(palette[scale.bins], np.cumsum([len(rod.nodes) for rod in rods])[:-1])
     file = _Glb()
     for k, rod in enumerate(rods):
-        curve, along = shape.positions[rod.nodes], rod.record.stiffness
-        widths = (
-            None
-            if along is None or "flat" not in archive.states
-            else widths_along(along, archive.states["flat"][rod.nodes])
-        )
-        points, normals, faces = swept(curve, outline, widths)
+        points, normals, faces = swept(shape.positions[rod.nodes], outline, section_widths(archive, rod))
         shades = None if colours is None else np.repeat(colours[k], len(outline), axis=0)
         file.add(rod.id, points, normals, faces, shades)
     return file.content()
@@ -256,14 +257,16 @@ def section_outline(section: Section | None, size: float) -> Floats:
     return np.column_stack([b * np.cos(angle), a * np.sin(angle)])
 
 
-def widths_along(along: Stiffness, flat: Floats) -> Floats:
-    """(k, 2) widths across and up of a rod's section at its nodes, over those of the unchanged one.
+def section_widths(archive: Archive, rod: GridRod) -> Floats | None:
+    """(k, 2) widths across and up of a rod's section at its nodes, over those of the unchanged one; None: it does not
+    change, or the flat grid is not known."""
+    along, flat = rod.record.stiffness, archive.states.get("flat")
+    return None if along is None or flat is None else widths_along(along, flat[rod.nodes])
 
-    Args:
-        flat: (k, 3) its nodes in the flat grid [m].
-    """
-    stations = np.linalg.norm(flat - flat[0], axis=1)
-    factors = np.interp(stations, along.at, along.factors)
+
+def widths_along(along: Stiffness, flat: Floats) -> Floats:
+    """The same of a rod whose nodes are `flat` (k, 3) in the flat grid [m]."""
+    factors = np.interp(np.linalg.norm(flat - flat[0], axis=1), along.at, along.factors)
     same = np.ones_like(factors)
     if along.varies in ("laths", "width", "a"):
         return np.column_stack([same, factors if along.varies == "laths" else np.cbrt(factors)])

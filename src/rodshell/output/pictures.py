@@ -10,15 +10,17 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
-from rodshell.output.drawing import Drawing, Path, Pen, Pencil
+from rodshell.output.drawing import FAMILIES, Drawing, Path, Pen, Pencil
 from rodshell.output.grid import (
     STAGE,
     GridRod,
     Shape,
     deployed_shape,
+    end_nodes,
+    family_numbers,
+    meshed_rods,
     opens,
     outlines_of,
-    rods_of,
     shape_names,
     shape_of,
 )
@@ -124,7 +126,6 @@ WIDTH = 540.0  # drawing units of the shell itself
 SIDE, TOP, BELOW, BAR = 50.0, 22.0, 40.0, 28.0  # margins; the colour bar needs more below
 FRAMES, COLUMNS, GUTTER, CAPTION = 6, 3, 14.0, 34.0  # shapes of the deployment: all, a row; room at the sides, below
 PAPER, INK, SOFT, GROUND = "#fdfdfb", "#22282f", "#7b838a", "#f1efe8"
-FAMILIES = ("#1f5f8b", "#a8552a")
 DEPTHS = 20  # layers of depth: rods of a nearer layer pass over those of a farther one,
 LAG = 2  # and are set off against those so many layers farther: rods that meet at a joint do not cut each other
 PIECE = 5.0  # drawing units: about the length of a piece, or of an edge that is longer; finer ones make files large
@@ -181,14 +182,14 @@ def _pictures(archive: Archive) -> dict[tuple[str, Colour], Drawing]:
 
 def _laid_out(archive: Archive, state: str, colour: Colour) -> Drawing:
     """A picture, see `picture`."""
-    shape, rods = shape_of(archive, state), rods_of(archive)
+    shape = shape_of(archive, state)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)
     pencil = Pencil()
-    ends = np.array([rod.nodes[[0, -1]] for rod in rods if len(rod.nodes) > 1], dtype=np.intp).ravel()
+    ends = end_nodes(meshed_rods(archive))
     front = view.depth(points[ends]) > 0.5
     ground_axes(pencil, view, SOFT, 12.5)
-    _ground_curves(pencil, view, shape, rods)
+    _ground_curves(pencil, view, shape, meshed_rods(archive))
     drawn = _Rods.of(archive, view, shape, scale)
     drawn.draw(pencil, range(DEPTHS // 2))
     _supports(pencil, view, points[ends[~front]], state, len(ends))
@@ -231,7 +232,7 @@ def deployment_picture(archive: Archive) -> Drawing:
     known = shape_names(archive)
     names = [name for name in known if name.startswith(STAGE) or name in ("flat", archive.deployed)]
     chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
-    view, rods, whole, last = _view_of_all(archive), rods_of(archive), Pencil(), None
+    view, whole, last = _view_of_all(archive), Pencil(), None
     width = WIDTH + 2 * SIDE
     share = (width - 2 * GUTTER) / COLUMNS / WIDTH
     cell = np.array([share * WIDTH, -share * float(view.size[1]) - CAPTION])
@@ -239,7 +240,7 @@ def deployment_picture(archive: Archive) -> Drawing:
         shape, ground = deployed_shape(archive, name), Pencil()
         scale = scale_of(archive, shape, "stress")
         last = scale or last
-        _ground_curves(ground, view, shape, rods)
+        _ground_curves(ground, view, shape, meshed_rods(archive))
         corner = cell * (k % COLUMNS, k // COLUMNS) + (GUTTER - SIDE, 0.0)
         whole.paths += ground.done("", "", 12.5).placed(share, corner).paths
         drawn = _Rods.of(archive, view, shape, scale, share)
@@ -283,16 +284,20 @@ def _view_of_all(archive: Archive) -> View:
 
 def _pieces(archive: Archive, length: float) -> Pieces:
     """Pieces of about a length [m]: of rods with shorter edges, nodes are left out evenly."""
-    lengths = [len(rod.nodes) for rod in rods_of(archive)]
-    whole = sum(rod.length for rod in rods_of(archive) if len(rod.nodes) > 1)
-    stride = max(1, round(length * sum(max(count - 1, 0) for count in lengths) / max(whole, 1e-12)))
-    drawn, first = [np.empty(0, dtype=np.intp)], 0
-    for count in lengths:
-        drawn.append(first + np.array([*range(0, count - 1, stride), count - 1][:count], dtype=np.intp))
-        first += count
-    owner = np.repeat(np.arange(len(lengths)), [len(entries) for entries in drawn[1:]])
-    begins = np.flatnonzero(owner[1:] == owner[:-1])
-    return Pieces(np.concatenate(drawn).astype(np.intp), begins, owner[begins])
+    rods = meshed_rods(archive)
+    whole, edges = sum(rod.length for rod in rods), sum(len(rod.nodes) - 1 for rod in rods)
+    stride = max(1, round(length * edges / max(whole, 1e-12)))
+    drawn, first = list[int](), 0
+    owner = list[int]()
+    for k, rod in enumerate(rods):
+        last = first + len(rod.nodes) - 1
+        chosen = [*range(first, last, stride), last]
+        drawn += chosen
+        owner += [k] * len(chosen)
+        first = last + 1
+    of_rod = np.array(owner, dtype=np.intp)
+    begins = np.flatnonzero(of_rod[1:] == of_rod[:-1])
+    return Pieces(np.array(drawn, dtype=np.intp), begins, of_rod[begins])
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,13 +321,14 @@ class _Rods:
     @staticmethod
     def of(archive: Archive, view: View, shape: Shape, scale: Scale | None, share: float = 1.0) -> "_Rods":
         """Of a shape, whose lengths are drawn at a share of the view's scale."""
-        rods, pieces = rods_of(archive), _pieces(archive, PIECE / (share * view.scale))
-        nodes = np.concatenate([np.empty(0, dtype=np.intp), *(rod.nodes for rod in rods)])[pieces.drawn]
+        rods, pieces = meshed_rods(archive), _pieces(archive, PIECE / (share * view.scale))
+        nodes = archive.states["rod_nodes"][pieces.drawn]
         nearness = view.depth(shape.positions)[nodes]
         near = 0.5 * (nearness[pieces.first] + nearness[pieces.first + 1])
         layer = np.minimum((near * DEPTHS).astype(np.intp), DEPTHS - 1)
         if scale is None:
-            shade = np.array([rod.family == "v" for rod in rods], dtype=np.intp)[pieces.rod]
+            families = family_numbers(rod.family for rod in rods)
+            shade = (np.array(families, dtype=np.intp) % len(FAMILIES))[pieces.rod]
             palette, fade = list(FAMILIES), 0.0 if shape.flat else FADE
         else:
             bins = scale.bins[pieces.drawn]
@@ -369,13 +375,12 @@ def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
 
 def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[GridRod]) -> None:
     """The boundary: closed curves through the rods' ends, openings on top of what they open."""
-    drawn = [rod for rod in rods if len(rod.nodes) > 1]
-    ends = np.array([rod.nodes[[0, -1]] for rod in drawn], dtype=np.intp).ravel()
-    for loop in outlines_of(drawn):
+    ends = end_nodes(rods)
+    for loop in outlines_of(rods):
         outline = shape.positions[ends[loop]]
         fill = ""
         if np.ptp(outline[:, 2]) < LEVEL * np.ptp(outline[:, :2]):
-            fill = PAPER if opens(np.array([rod.flat for rod in drawn]).reshape(-1, 2)[loop]) else GROUND
+            fill = PAPER if opens(np.array([rod.flat for rod in rods]).reshape(-1, 2)[loop]) else GROUND
         pencil.line(view.project(outline), "BOUNDARY-FINAL", closed=True, pen=Pen(SOFT, 1.0, fill=fill))
 
 

@@ -22,7 +22,7 @@ from rodshell.figures.form import Meeting, Stiffness
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends, printable
 from rodshell.geometry.frames import unit
-from rodshell.output.grid import GridRod, joints_of, rods_of
+from rodshell.output.grid import GridRod, along, end_nodes, joints_of, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.states import POPPED
@@ -156,11 +156,11 @@ def joints_table(archive: Archive) -> Table:
     """
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
     placed = [_joints_in_space(archive, rod, final) for rod in rods]
-    joints, along = joints_of(rods), np.array([rod.flat[1] - rod.flat[0] for rod in rods]).reshape(-1, 2)
+    joints, ways = joints_of(rods), np.array([rod.flat[1] - rod.flat[0] for rod in rods]).reshape(-1, 2)
     pairs = [(rods[i], rods[j]) for i, j in (joint.rods for joint in joints)]
     in_space = [(placed[i].get(rods[j].id), placed[j].get(rods[i].id)) for i, j in (joint.rods for joint in joints)]
     first, second = np.array([joint.rods for joint in joints], dtype=np.intp).reshape(-1, 2).T
-    flats = _degrees(along[first], along[second])
+    flats = _degrees(ways[first], ways[second])
     tangents = np.array([[UNKNOWN if on is None else on[1] for on in pair] for pair in in_space]).reshape(-1, 2, 3)
     angles = _degrees(tangents[:, 0], tangents[:, 1])
     table = {
@@ -290,7 +290,7 @@ def end_paths_table(archive: Archive) -> Table:
     """
     mm, shares = Rounding(FINEST).mm, archive.states["history_share"].tolist()
     ends = [(rod.id, end) for rod in rods_of(archive) for end in "01"]
-    points = archive.states["history"][:, np.concatenate([rod.nodes[[0, -1]] for rod in rods_of(archive)])]
+    points = archive.states["history"][:, end_nodes(rods_of(archive))]
     table = _in_columns(("share", "rod", "end"), [(f"{share:.6f}", *end) for share in shares for end in ends])
     table |= _by_axis("", "_mm", points.reshape(-1, 3).tolist(), mm)
     return table | _by_axis("u", "_mm", (points - points[0]).reshape(-1, 3).tolist(), mm)
@@ -323,10 +323,10 @@ def _joints_at(rod: GridRod, mm: Show) -> str:
 
 def _joints_in_space(archive: Archive, rod: GridRod, state: str | None) -> dict[str, tuple[Floats, Floats]]:
     """Position (3,) [m] and a tangent (3,) of a rod at its joints, by the rod that is met; empty if not known."""
-    if state is None or len(rod.nodes) < 2 or "flat" not in archive.states:
+    if state is None or not len(rod.nodes) or "flat" not in archive.states:
         return {}
     flat, x = archive.states["flat"][rod.nodes], archive.states[state][rod.nodes]
-    stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(flat, axis=0), axis=1))])
+    stations = along(flat)
     at = np.array([at for _, at in rod.joints])
     step = 0.5 * np.diff(stations).min()  # stays within the edges on both sides
     before, position, after = (

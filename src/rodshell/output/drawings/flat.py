@@ -14,8 +14,8 @@ import numpy as np
 from rodshell.arrays import Bools, Floats
 from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
-from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
-from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
+from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
+from rodshell.output.grid import GridJoint, GridRod, family_numbers, joints_of, opens, outlines_of, rods_of
 from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, segments, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
@@ -23,7 +23,6 @@ from rodshell.results.archive import made_once
 from rodshell.results.laths import laths_text
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
-FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
 _FLAT_TITLE = "Flat plan"
 ROD = 0.18  # width of a rod's line, in text sizes
 LARGEST = 0.85  # size of a joint's id at most, in text sizes
@@ -163,8 +162,9 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
 
 def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     """Each rod as cut; a dot at the cut end from which its joints are measured, a tick where it is held."""
-    for rod, cut, line in zip(plan.rods, plan.courses, plan.lines, strict=True):
-        pen = Pen(FAMILY.get(rod.family, INK), ROD * text)
+    families = family_numbers(rod.family for rod in plan.rods)
+    for rod, cut, line, family in zip(plan.rods, plan.courses, plan.lines, families, strict=True):
+        pen = Pen(FAMILIES[family % len(FAMILIES)], ROD * text)
         pencil.line(cut, "CUT", pen=pen, name=rod.id, note=f"{rod.id}: {plan.rounding.mm(rod.cut_length)} mm")
         pencil.mark(cut[0], min(0.2 * text, 0.08 * plan.spacing), "DIM", pen=Pen(INK, 0.0, fill=INK))
         if rod.allowance > 0:
@@ -251,8 +251,8 @@ def _offset(rod: GridRod) -> float:
 
 
 def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
-    """The rods u and v of each joint of two families, grid by grid."""
-    pairs = [joint.rods for joint in plan.joints if [plan.rods[k].family for k in joint.rods] == ["u", "v"]]
+    """The rods along x and y of each joint of such two, grid by grid."""
+    pairs = [joint.rods for joint in plan.joints if [plan.rods[k].axis for k in joint.rods] == [0, 1]]
     first, second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
     patch = np.arange(len(plan.rods))  # each rod is of the patch of the first one that it leads to
     while (patch[first] != patch[second]).any():

@@ -25,7 +25,7 @@ from rodshell.output.drawing import (
     corners,
 )
 from rodshell.output.drawings.flat import FlatPlan
-from rodshell.output.grid import joint_places, outlines_of, rods_of
+from rodshell.output.grid import end_nodes, joint_places, meshed_rods, outlines_of
 from rodshell.output.labels import Room, callouts, closed_segments, outward, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
@@ -45,12 +45,8 @@ SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, 
 
 
 def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
-    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m].
-
-    Args:
-        positions: (n, 3) nodes of a state [m].
-    """
-    return [1e3 * positions[rod.nodes] for rod in rods_of(archive) if len(rod.nodes) > 1]
+    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m]."""
+    return [1e3 * positions[rod.nodes] for rod in meshed_rods(archive)]
 
 
 def _stopped(archive: Archive) -> str:
@@ -96,9 +92,8 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     assert archive.results.deployment is not None
     stages, mm = archive.results.deployment.stages, rounding_of(archive.results).mm
     pen = Pen(INK, 0.04 * text)
-    drawn = [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
-    ends = np.concatenate([rod.nodes[[0, -1]] for rod in drawn])
-    ways, thin = 1e3 * history[:, ends, :2], Pen(SOFT, 0.05 * text)
+    drawn = meshed_rods(archive)
+    ways, thin = 1e3 * history[:, end_nodes(drawn), :2], Pen(SOFT, 0.05 * text)
     loops = [loop for loop in outlines_of(drawn) if len(loop) > 1]
     for stage, loop in product(ways[:-1], loops):
         pencil.line(stage[loop], "DIM", closed=True, pen=thin)
@@ -219,7 +214,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     pencil, final = Pencil(), archive.final
     assert final is not None
     _seen_from_above(pencil, archive, text)
-    drawn = [rod for rod in plan.rods if len(rod.nodes) > 1]
+    drawn = meshed_rods(archive)
     curves = [curve[:, :2] for curve in rod_curves(archive, archive.states[final])]
     ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
     arrives = np.array([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).reshape(-1, 2)

@@ -18,9 +18,18 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
-from rodshell.output.grid import GridJoint, GridRod, Shape, along, joints_of, laid_out, rods_of, shape_names, shape_of
-from rodshell.output.models import section_outline, widths_along
-from rodshell.output.pictures import FAMILIES
+from rodshell.output.drawing import FAMILIES
+from rodshell.output.grid import (
+    GridRod,
+    Shape,
+    family_numbers,
+    joint_entries,
+    laid_out,
+    meshed_rods,
+    shape_names,
+    shape_of,
+)
+from rodshell.output.models import section_outline, section_widths
 from rodshell.output.schedules import SCHEDULES, Table, heading
 from rodshell.results import Archive, wording
 from rodshell.results.wording import nice_ticks, rounding_of
@@ -103,6 +112,7 @@ class Drawn:
         laths = _laths(outline)
         known = {kind: coloured.scale for _, colours in self.shapes for kind, coloured in colours.items()}
         shown = {kind: known[kind] for kind in COLOURS if kind in known}
+        families = family_numbers(family for _, family in self.rods)
         header: dict[str, Any] = {
             "version": VERSION,
             "name": self.name,
@@ -110,8 +120,8 @@ class Drawn:
             "low": low.tolist(),
             "box": (size / frame.size).tolist(),
             "rods": [
-                {"id": name, "count": count, "ink": FAMILIES[family == "v"]}
-                for (name, family), count in zip(self.rods, counts.tolist(), strict=True)
+                {"id": name, "count": count, "ink": FAMILIES[family % len(FAMILIES)]}
+                for (name, _), count, family in zip(self.rods, counts.tolist(), families, strict=True)
             ],
             "joints": {"ids": list(self.joints), "entries": data.add(meeting)},
             "outline": (outline / frame.size).tolist(),
@@ -155,11 +165,11 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     Args:
         schedules: whether rods and joints have the rows of the schedules with them, which takes most of the time.
     """
-    rods = [rod for rod in rods_of(archive) if len(rod.nodes)]
+    rods = meshed_rods(archive)
     names = [name for name in _in_order(shape_names(archive)) if rods]
     if len(names) < 2:
         return None
-    joints, shapes = _drawn_joints(archive, rods), [shape_of(archive, name) for name in names]
+    joints, shapes = joint_entries(archive), [shape_of(archive, name) for name in names]
     tables = {kind: SCHEDULES[f"{kind}s"].brief(archive) for kind in ("rod", "joint") if schedules}
     target = archive.states.get("target_points")
     return Drawn(
@@ -232,21 +242,6 @@ def _in_order(names: list[str]) -> list[str]:
     return [name for name in names if name == "draped"] + [name for name in names if name != "draped"]
 
 
-def _drawn_joints(archive: Archive, rods: list[GridRod]) -> list[tuple[GridJoint, tuple[int, int]]]:
-    """Every joint whose rods have nodes, and the entry of `rod_nodes` on either rod that lies nearest to it."""
-    if "flat" not in archive.states:
-        return []
-    starts = np.cumsum([0, *(len(rod.nodes) for rod in rods)])
-    flat = archive.states["flat"]
-    stations = [along(flat[rod.nodes]) for rod in rods]
-    found = []
-    for joint in joints_of(rods):
-        pairs = zip(joint.rods, joint.at, strict=True)
-        first, second = (int(starts[k] + np.abs(stations[k] - place).argmin()) for k, place in pairs)
-        found.append((joint, (first, second)))
-    return found
-
-
 def _entries(counts: Ints, meeting: Ints) -> Ints:
     """Entries that are drawn, of all rods: of very many some, those of ends and joints among them."""
     stop = np.cumsum(counts)
@@ -291,15 +286,11 @@ def _worst(archive: Archive, shape: Shape, kind: Colour, scale: Scale) -> tuple[
 
 def _widths(archive: Archive, rods: list[GridRod]) -> Floats | None:
     """Of the rods' sections, see `Drawn`; None where no section changes, or the flat grid is not known."""
-    if "flat" not in archive.states or not any(rod.record.stiffness for rod in rods):
+    each = [section_widths(archive, rod) for rod in rods]
+    if all(widths is None for widths in each):
         return None
-    flat, along = archive.states["flat"], [rod.record.stiffness for rod in rods]
-    return np.concatenate(
-        [
-            np.ones((len(rod.nodes), 2)) if stiffness is None else widths_along(stiffness, flat[rod.nodes])
-            for rod, stiffness in zip(rods, along, strict=True)
-        ]
-    )
+    known = zip(each, rods, strict=True)
+    return np.concatenate([np.ones((len(rod.nodes), 2)) if widths is None else widths for widths, rod in known])
 
 
 def _laths(outline: Floats) -> bool:
