@@ -50,11 +50,7 @@ class Lath:
 
 
 def _lath_name(rod: str, number: int) -> str:
-    """What a lath is called: the first as its rod, the second "U07-2".
-
-    Args:
-        rod: its id; number : of the lath.
-    """
+    """What a lath is called: the first as its rod, the second "U07-2"."""
     return rod if number == 1 else f"{rod}-{number}"
 
 

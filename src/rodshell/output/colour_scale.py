@@ -62,8 +62,6 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
     """The scale of a shape, the same for all shapes of an archive; None where its rods have the colours of families.
 
     Args:
-        archive: the result that the shape belongs to.
-        shape: the one whose rods are coloured.
         colour: "stress"; "curvature"; "force", along the rods; or "gap": signed distance to the target, or height where
             there is no target.
     """
@@ -96,12 +94,7 @@ def gap_scale(gaps: Floats, largest: float) -> Scale:
 
 
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
-    """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too.
-
-    Args:
-        archive: the result that the shape belongs to.
-        shape: one whose gaps are known.
-    """
+    """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too."""
     assert shape.gap is not None
     points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
     worst = int(np.argmax(np.abs(gaps)))
@@ -186,7 +179,6 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
     """Draw the map with ticks and caption.
 
     Args:
-        scale: the map, its range and its caption.
         right: x at which the bar ends [drawing units].
         y: baseline of the numbers [drawing units].
     """
@@ -207,7 +199,6 @@ def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
     """Colours "#rrggbb" in a map of evenly spaced control points.
 
     Args:
-        points: colours "#rrggbb" of the control points.
         shares: (k,) places in the map, from 0 (its first point) to 1 (its last).
     """
     table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
@@ -218,12 +209,7 @@ def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def mixed(colour: str, other: str, share: float) -> str:
-    """A mixture of two colours, as "#rrggbb".
-
-    Args:
-        colour, other: the two colours, "#rrggbb".
-        share: of the other colour, 0 to 1.
-    """
+    """A mixture of two colours "#rrggbb" with a share of the other, 0 to 1."""
     pairs = ((int(colour[k : k + 2], 16), int(other[k : k + 2], 16)) for k in (1, 3, 5))
     return "#" + "".join(f"{round(a + share * (b - a)):02x}" for a, b in pairs)
 

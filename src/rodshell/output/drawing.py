@@ -149,7 +149,6 @@ def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[
     """x and y of the four corners of a text's room, or of many: of numbers, or of arrays (t,).
 
     Args:
-        x, y: where its baseline starts, is centred or ends.
         c, s: cosine and sine of the angle of its baseline.
         back: where it begins, see `BACK`.
     """
@@ -220,12 +219,7 @@ class Drawing:
         )
 
     def placed(self, scale: float, shift: Floats) -> "Drawing":
-        """The drawing scaled about the origin, with its pens and texts, then shifted. Paths in space are left out.
-
-        Args:
-            scale: new lengths over old ones.
-            shift: (2,) [mm].
-        """
+        """The drawing scaled about the origin, with pens and texts, then shifted (2,) [mm]; without paths in space."""
         paths = [path for path in self.paths if path.flat]
         used = {id(pen): pen for pen in (*(path.pen for path in paths), *(mark.pen for mark in self.marks))}
         pens = {key: _scaled(pen, scale) for key, pen in used.items()}
@@ -251,11 +245,8 @@ class Drawing:
         )
 
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
-        """The part within a rectangle; marks and texts that cross its border, and paths in space, are left out.
-
-        Args:
-            low, high: (2,) lower left and upper right corner of the rectangle [mm].
-        """
+        """The part within the rectangle from `low` to `high` (2,) [mm]; paths in space are left out, and marks and
+        texts that cross its border."""
         flat = [path for path in self.paths if path.flat]
         extents = self._extents
         inside, marks, texts = (np.all((lowest >= low) & (highest <= high), axis=1) for lowest, highest in extents)
@@ -289,55 +280,24 @@ class Pencil:
     left_out: list[str] = field(default_factory=list)
 
     def line(self, points: Iterable[Iterable[float]], layer: str, **look: object) -> None:
-        """Add a polyline.
-
-        Args:
-            points: (k, 2), or (k, 3) in space [mm].
-            layer: a key of `LAYERS`.
-            look: further fields of `Path`, such as its pen.
-        """
+        """Add a polyline of points (k, 2), or (k, 3) in space [mm]."""
         self.paths.append(Path(np.array(points, dtype=float), layer, **look))  # type: ignore[arg-type]
 
     def mark(self, at: Iterable[float], radius: float, layer: str, **look: object) -> None:
-        """Add a circle.
-
-        Args:
-            at: (2,) its middle [mm].
-            radius: [mm].
-            layer: a key of `LAYERS`.
-            look: further fields of `Mark`, such as its pen.
-        """
+        """Add a circle about `at` (2,) [mm]."""
         self.marks.append(Mark(np.array(at, dtype=float), radius, layer, **look))  # type: ignore[arg-type]
 
     def write(self, text: str, at: Iterable[float], size: float, layer: str, **look: object) -> None:
-        """Add a line of text.
-
-        Args:
-            at: (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
-            size: of the font [mm].
-            layer: a key of `LAYERS`.
-            look: further fields of `Text`, such as its anchor.
-        """
+        """Add a line of text; `at` (2,) [mm] as of `Text`."""
         self.texts.append(Text(text, np.array(at, dtype=float), size, layer, **look))  # type: ignore[arg-type]
 
     def leave_out(self, count: int, of: int, what: str) -> None:
-        """Record that texts found no room.
-
-        Args:
-            count: number of texts that were left out; nothing is recorded for 0.
-            of: number of all such texts.
-            what: what the texts are, in words.
-        """
+        """Record that `count` of such texts found no room, in words; nothing for 0."""
         if count:
             self.left_out.append(f"{'all' if count == of > 1 else count} of {of} {what}")
 
     def done(self, name: str, title: str, text: float) -> Drawing:
-        """The drawing of all that was added.
-
-        Args:
-            title: of the drawing, in words.
-            text: usual size of its texts [mm].
-        """
+        """The drawing of all that was added, `text` being the usual size of its texts [mm]."""
         return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts), tuple(self.left_out))
 
 
@@ -355,11 +315,7 @@ def _moved(groups: Sequence[Floats], scale: float, shift: Floats) -> list[Floats
 
 
 def within(box: Floats, low: Floats, high: Floats) -> bool:
-    """Whether all points (k, 2) lie in a rectangle.
-
-    Args:
-        box: (k, 2) points; low, high : (2,) lower left and upper right corner of the rectangle.
-    """
+    """Whether all points (k, 2) lie in the rectangle from `low` to `high` (2,)."""
     (left, bottom), (right, top) = low.tolist(), high.tolist()
     return all(left <= x <= right and bottom <= y <= top for x, y in box.tolist())
 

@@ -164,21 +164,13 @@ def joints_of(rods: list[GridRod]) -> list[GridJoint]:
 
 
 def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
-    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods.
-
-    Args:
-        positions: (n, 3) nodes of a shape [m].
-    """
+    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods."""
     nodes = archive.states.get("rod_nodes", np.empty(0))
     return {joint.id: positions[nodes[entries]].mean(axis=0) for joint, entries in joint_entries(archive)}
 
 
 def outlines_of(rods: list[GridRod]) -> list[Ints]:
-    """Rod ends along each outline of the flat grid, see `outlines`.
-
-    Args:
-        rods: those that are drawn; the ends of rod k are 2 k and 2 k + 1.
-    """
+    """Rod ends along each outline of the flat grid, those of rod k being 2 k and 2 k + 1, see `outlines`."""
     return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
 
 
@@ -189,7 +181,7 @@ def joint_entries(archive: Archive) -> list[tuple[GridJoint, list[int]]]:
     if "flat" not in archive.states:
         return []
     rods, flat = meshed_rods(archive), archive.states["flat"]
-    starts = np.cumsum([0, *(len(rod.nodes) for rod in rods)]).tolist()
+    starts: list[int] = np.cumsum([0, *(len(rod.nodes) for rod in rods)]).tolist()
     stations = [along(flat[rod.nodes]) for rod in rods]
 
     def entry(rod: int, at: float) -> int:
@@ -256,11 +248,7 @@ def lies_flat(archive: Archive) -> bool:
 
 
 def caption_of(archive: Archive, state: str) -> str:
-    """What a state shows, in words.
-
-    Args:
-        state: "flat", or one in space.
-    """
+    """What a state shows, in words."""
     if archive.is_lost(state):
         return f"Not popped up, {state.removeprefix(POPPED)} ends: where the computation stopped"
     return CAPTIONS.get(state) or f"Popped up, {supported(state)}"
@@ -274,10 +262,7 @@ def supported(state: str, *more: str) -> str:
 
 
 def shape_of(archive: Archive, name: str) -> Shape:
-    """A shape by its name.
-
-    Args:
-        name: one of `shape_names`.
+    """A shape by its name, one of `shape_names`.
 
     Raises:
         OutputError: the archive has no such shape.
@@ -300,9 +285,6 @@ def shape_of(archive: Archive, name: str) -> Shape:
 def deployed_shape(archive: Archive, name: str) -> Shape:
     """A shape as the deployment passes it: the flat grid not in the axes of its drawings, but where it is laid out on
     site before its ends move.
-
-    Args:
-        name: one of `shape_names`.
     """
     shape, final = shape_of(archive, name), archive.final
     if not shape.flat or final is None:

@@ -124,8 +124,6 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
     A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
 
     Args:
-        texts: the label of each rod.
-        rods: (m, 2, 2) both ends of each rod.
         size: of the text, in the unit of `rods`.
         at: (m, 2) whether an end is to have one; default: all.
     """
@@ -155,10 +153,8 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
     The text covers none of the lines (m, 2, 2) either, the line to it may cross them.
 
     Args:
-        end: (2,) the rod's end that it belongs to.
         way: (2,) to the side that is tried first.
         size: of the text, in the unit of `end`.
-        lines: (m, 2, 2) lines that the text must not cover.
     """
     first = float(np.arctan2(way[1], way[0]))
     half = 0.5 * size * np.array([LETTER * len(text), LINE])
@@ -174,23 +170,14 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
 
 
 def take(label: Label, size: float, room: Room) -> None:
-    """Take the label's room, and that of the line to it.
-
-    Args:
-        size: of its text, in the unit of its coordinates.
-        room: in which its box is taken.
-    """
+    """Take the room of a label, its text of a size, and that of the line to it."""
     room.take(label.box(size))
     if label.moved:
         room.take(thin(label.leader(size), THIN * size))
 
 
 def _fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
-    """Whether a label and the line to it find room; the label must cover none of the lines.
-
-    Args:
-        size: of the text; room : what is taken; lines : (m, 2, 2), all in the unit of the label.
-    """
+    """Whether a label and the line to it find room; the label must cover none of the lines."""
     box = label.box(size)
     return (
         room.free(box)
@@ -200,24 +187,14 @@ def _fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
 
 
 def _off_its_mark(line: Floats, size: float) -> Floats:
-    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is.
-
-    Args:
-        line: (2, 2) from the mark to the label.
-        size: of the text, in the unit of the line; half of it is left out at the mark.
-    """
+    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is."""
     (ax, ay), (bx, by) = line.tolist()
     share = min(0.5 * size / max(hypot(bx - ax, by - ay), 1e-12), 0.9)
     return thin(np.array([(ax + share * (bx - ax), ay + share * (by - ay)), (bx, by)]), THIN * size)
 
 
 def thin(line: Floats, width: float) -> Floats:
-    """(4, 2) corners of the room of a line (2, 2).
-
-    Args:
-        line: (2, 2) its two ends.
-        width: of the room, in the unit of the line.
-    """
+    """(4, 2) corners of the room of a line (2, 2) of some width."""
     (ax, ay), (bx, by) = line.tolist()
     half = 0.5 * width / max(hypot(bx - ax, by - ay), 1e-12)
     x, y = half * (ay - by), half * (bx - ax)  # to the left
@@ -228,9 +205,6 @@ def spread(positions: ArrayLike, gap: float) -> Floats:
     """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares.
 
     Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
-
-    Args:
-        positions: (k,) positions on a line; gap : least distance of neighbours.
     """
     asked = np.asarray(positions, dtype=float)
     order = np.argsort(asked, kind="stable")
@@ -297,9 +271,6 @@ def outward(points: Floats) -> Floats:
     """(k, 2) unit normals, to the right of an outline that is walked through the points (k, 2); 0 for a single one.
 
     At each place across the chord of its neighbours, so that points that nearly coincide do not turn it.
-
-    Args:
-        points: (k, 2) along an outline, in their order.
     """
     along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     return _unit(np.column_stack([along[:, 1], -along[:, 0]]))

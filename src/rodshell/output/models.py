@@ -44,11 +44,7 @@ COLOURS = {"CUT": (34, 40, 47), "MARK": (179, 55, 44), "FINAL": (31, 95, 139), "
 
 
 def obj_text(archive: Archive, state: str) -> str:
-    """All nodes [m], then one object with one polyline for each rod.
-
-    Args:
-        state: "draped", "popped_pinned" or "popped_clamped".
-    """
+    """All nodes [m], then one object with one polyline for each rod."""
     nodes = archive.states[state]
     text = f"# rodshell, {state}, metres\n"
     text += len(nodes) * "v %.9f %.9f %.9f\n" % tuple(nodes.ravel().tolist())
@@ -58,11 +54,7 @@ def obj_text(archive: Archive, state: str) -> str:
 
 
 def vtp_text(archive: Archive, name: str) -> str:
-    """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`.
-
-    Args:
-        name: of a shape, see `shape_names`.
-    """
+    """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`."""
     shape, rods = deployed_shape(archive, name), meshed_rods(archive)
     nodes = archive.states["rod_nodes"]
     offsets = np.cumsum([len(rod.nodes) for rod in rods], dtype=np.int64)
@@ -116,11 +108,7 @@ def _vtk_file(kind: str, body: str) -> str:
 
 
 def compas_json(archive: Archive, state: str) -> str:
-    """A state of the shell; the graph's nodes are joints, its edges the rods between them.
-
-    Args:
-        state: "draped", "popped_pinned" or "popped_clamped".
-    """
+    """A state of the shell; the graph's nodes are joints, its edges the rods between them."""
     positions, rods = archive.states[state], meshed_rods(archive)
     joint_positions = joint_places(archive, positions)
     lines = [
@@ -217,11 +205,7 @@ FLOAT, INDEX, VERTICES, ELEMENTS = 5126, 5125, 34962, 34963  # glTF's numbers fo
 
 
 def glb_bytes(archive: Archive, state: str) -> bytes:
-    """One node, mesh and name for each rod.
-
-    Args:
-        state: "draped", "popped_pinned" or "popped_clamped".
-    """
+    """One node, mesh and name for each rod."""
     shape, rods = shape_of(archive, state), meshed_rods(archive)
     section = archive.results.rod.section if archive.results.rod else None
     outline = section_outline(section, float(np.ptp(shape.positions, axis=0).max()))
@@ -244,7 +228,6 @@ def section_outline(section: Section | None, size: float) -> Floats:
     Up is m1, the normal of the grid: a rectangle's width and an ellipse's a lie there.
 
     Args:
-        section: of the rods; None: not known.
         size: of the shell [m], for the thickness of a section without a shape.
     """
     section = section or Section()
@@ -279,7 +262,6 @@ def swept(curve: Floats, outline: Floats, widths: Floats | None = None) -> tuple
     The frame has no twist and begins as upright as possible. The ends are open.
 
     Args:
-        curve: (k, 3) nodes [m]; outline : (s, 2) corners across and up [m].
         widths: (k, 2) by which these are multiplied at each node; None: by 1.
     """
     edges = unit(np.diff(curve, axis=0))

@@ -55,12 +55,7 @@ class View:
 
     @staticmethod
     def of(points: Floats, width: float) -> "View":
-        """The view of all points (n, 3) [m] and of the ground below them.
-
-        Args:
-            points: (n, 3) all that is to be seen [m].
-            width: of the picture [drawing units].
-        """
+        """The view of all points (n, 3) [m] and of the ground below them."""
         low, high = bounds(points)
         corners = np.array([[x, y, low[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
         corners = np.concatenate([corners, points])
@@ -84,11 +79,7 @@ class View:
 
 
 def ground_axes(pencil: Pencil, view: View, colour: str, text: float) -> None:
-    """The box's ground with millimetre ticks on its front edges, and the height on the left.
-
-    Args:
-        view: of the box; colour : of lines and numbers; text : size of the numbers [drawing units].
-    """
+    """The box's ground with millimetre ticks on its front edges, and the height on the left."""
     (x0, y0, z0), (x1, y1, z1) = view.low, view.high
     thin, pale = Pen(colour, 0.8), Pen(mixed(colour, "#ffffff", 0.55), 0.8)
     corners = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]])
@@ -163,11 +154,7 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 
 
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
-    """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format.
-
-    Args:
-        state, colour: as of `picture_svg`.
-    """
+    """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format."""
     kept = _pictures(archive)
     if (state, colour) not in kept:
         kept[state, colour] = _laid_out(archive, state, colour)
@@ -207,11 +194,7 @@ MODE = 0.06  # of the shell's width: the largest displacement of a mode as it is
 
 
 def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
-    """A mode, drawn as displacements of the shell over the shell as it stands.
-
-    Args:
-        state: name of the mode's array (n, 3).
-    """
+    """A mode, an array (n, 3) of the states, drawn as displacements of the shell over the shell as it stands."""
     shape, pencil = shape_of(archive, POPPED + ends), Pencil()
     motion = archive.states[state]
     size = MODE * float(np.ptp(shape.positions[:, 0]))
@@ -224,11 +207,7 @@ def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
 
 
 def deployment_picture(archive: Archive) -> Drawing:
-    """The way from flat to popped up in FRAMES shapes side by side, coloured as of `picture`.
-
-    Args:
-        archive: one that holds stages of a deployment.
-    """
+    """The way from flat to popped up in FRAMES shapes side by side, coloured as of `picture`."""
     known = shape_names(archive)
     names = [name for name in known if name.startswith(STAGE) or name in ("flat", archive.deployed)]
     chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))

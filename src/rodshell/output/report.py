@@ -47,13 +47,7 @@ NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between
 
 
 def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing], files: Mapping[str, str]) -> str:
-    """The whole page; `plan`, `drawings` and `files` are the archive's.
-
-    Args:
-        plan: the flat plan of the archive.
-        drawings: of the archive, by name, see `drawing_set`.
-        files: the same as SVG files.
-    """
+    """The whole page; `plan`, `drawings` and the same as SVG `files` are the archive's."""
     environment = Environment(
         loader=PackageLoader("rodshell.output", "templates"),
         autoescape=True,
@@ -306,11 +300,7 @@ def _with_strength(results: Results, columns: Sequence[str], title: str, values:
 
 
 def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]:
-    """Groups of key figures; what is not known is left out.
-
-    Args:
-        plan: the flat plan of the archive.
-    """
+    """Groups of key figures; what is not known is left out."""
     rod, drape = results.rod, results.drape
     parts: list[Record | None] = [rod.section, rod.material, rod] if rod else []
     preset = _listed(rod.preset if rod else None, _PRESET, plan.rounding)

@@ -432,22 +432,14 @@ def table_csv(table: Table) -> str:
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """Rows as CSV; a number stays as it is, a text that a spreadsheet would run gets an apostrophe.
-
-    Args:
-        rows: cells; numbers are written by `str`.
-    """
+    """Rows as CSV; a number stays as `str` writes it, a text that a spreadsheet would run gets an apostrophe."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows([[safe_cell(str(cell)) for cell in row] for row in rows])
     return stream.getvalue()
 
 
 def safe_cell(cell: str) -> str:
-    """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons.
-
-    Args:
-        cell: a number or a text.
-    """
+    """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons."""
     if RUN.isdisjoint(cell):
         return printable(cell)
     return cell if WHOLE.fullmatch(cell) else FORMULA.sub(r"\1'", printable(cell))

@@ -17,11 +17,7 @@ SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sa
 
 
 def number(value: float, digits: int = 2) -> str:
-    """A number with at most `digits` decimals, without zeros at its end: "2.5", "-0.01", "0".
-
-    Args:
-        digits: most decimals that are shown.
-    """
+    """A number with at most `digits` decimals, without zeros at its end: "2.5", "-0.01", "0"."""
     text = f"{value:.{digits}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
@@ -32,7 +28,6 @@ def tag(name: str, *children: str, **attributes: Any) -> str:
     """An element.
 
     Args:
-        name: such as "path".
         attributes: "-" is written "_"; a "_" at the end, which Python's own words need, is dropped: `class_`.
     """
     words = [name]
@@ -50,20 +45,14 @@ def _attribute(key: str) -> str:
 
 
 def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:
-    """One line of text.
-
-    Args:
-        x, y: where its baseline begins [units of the view box], y down.
-        size: of the font [units].
-    """
+    """One line of text, whose baseline begins at x, y, y down."""
     return tag("text", escape(text), x=x, y=y, font_size=size, **attributes)
 
 
 def document(view: tuple[float, float, float, float], *children: str, unit: str = "") -> str:
-    """A complete SVG file.
+    """A complete SVG file; `view` is x, y, width and height of its view box.
 
     Args:
-        view: x, y, width and height of the view box.
         unit: of the file's size, which is that of the view box: "mm", or "" for pixels.
     """
     x, y, width, height = (number(value, 3) for value in view)
@@ -81,11 +70,7 @@ def inline(svg: str) -> str:
 
 
 def drawing_svg(drawing: Drawing) -> str:
-    """An SVG file at true scale, a unit a millimetre; neighbours of one layer and pen are one path or group.
-
-    Args:
-        drawing: y up; paths in space are not drawn.
-    """
+    """An SVG file at true scale, a unit a millimetre; neighbours of one layer and pen are one path or group."""
     margin = 2 * drawing.text
     low, high = drawing.box()
     width, height = high - low + 2 * margin

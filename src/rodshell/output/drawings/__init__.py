@@ -12,6 +12,7 @@ from rodshell.output.drawings.sheets import (
     SCALES,
     Compose,
     Layout,
+    Paper,
     Sheet,
     bound,
     laid_out,
@@ -51,7 +52,7 @@ def drawing_set(archive: Archive) -> dict[str, Drawing]:
     return {name: with_title(drawing, block) for name, drawing in (first | drawings).items()}
 
 
-def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
+def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
     """All sheets in mm of paper, and the paper's size."""
     plan, paper, layouts = flat_plan(archive), _paper(archive), dict(_layouts(archive))
     checked = _checked(archive.results)
@@ -105,8 +106,7 @@ def _layouts(archive: Archive) -> dict[str, Layout]:
     return layouts
 
 
-def _paper(archive: Archive) -> tuple[float, float]:
-    """Width and height of a sheet [mm]."""
+def _paper(archive: Archive) -> Paper:
     style = archive.results.drawings
     return PAPERS[style.paper if style else "A3"]
 
@@ -128,7 +128,7 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, 
     return makers
 
 
-def _strips(plan: FlatPlan, paper: tuple[float, float]) -> list[Sheet]:
+def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
     """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
     low, high = room(paper)
     width, height = high - low

@@ -1,7 +1,7 @@
 """Drawings for the workshop: the flat plan of both families as cut, and a strip for each rod.
 
 The plan has rods, joints, labels, the footprint, and the diagonals by which the grid is set out. On a strip all
-distances start at one end, so that errors do not add up.
+distances start at one end, so that errors do not add up. `text` is the usual size of a drawing's texts [mm at 1:1].
 """
 
 from collections.abc import Sequence
@@ -139,11 +139,7 @@ def flat_plan(archive: Archive) -> FlatPlan:
 
 
 def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
-    """The flat plan [mm], its rods labelled in the size `text` [mm].
-
-    Args:
-        text: usual size of the texts [mm at 1:1].
-    """
+    """The flat plan [mm], its rods labelled in the size `text` [mm]."""
     pencil = Pencil()
     for outline in plan.footprint:
         pencil.line(outline, "BOUNDARY-FLAT", closed=True)
@@ -315,12 +311,7 @@ def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
 
 
 def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None = None) -> Drawing:
-    """The strips of some rods (default: all) one below the other [mm], all starting at x = 0.
-
-    Args:
-        text: usual size of the texts [mm at 1:1].
-        rods: those to be drawn; default: all.
-    """
+    """The strips of some rods (default: all) one below the other [mm], all starting at x = 0."""
     pencil = Pencil()
     layer = {rod.id: rod.record.layer for rod in plan.rods}
     chosen = plan.rods if rods is None else rods
@@ -332,12 +323,7 @@ def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None =
 
 
 def per_sheet(height: float, text: float) -> int:
-    """How many strips find room in a height [mm].
-
-    Args:
-        height: of the room on a sheet [mm].
-        text: size of the texts [mm].
-    """
+    """How many strips find room in a height [mm], with texts of a size [mm]."""
     return max(int((height / text - 3) // TALL), 1)
 
 

@@ -35,6 +35,7 @@ COLUMNS = 4  # of entries, side by side
 BAR = 60.0  # length of the scale bar [mm], about
 TRUE_SIZE = ", 1:1"  # after the title of a drawing in a separate file
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
+Paper = tuple[float, float]  # width and height of a sheet [mm]
 
 SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 250, 300, 400, 500, 1000, 2000, 5000)
 FINE = SMALL * TEXT  # of tables and of the title block: capitals of 1.9 mm, the least on a sheet
@@ -73,11 +74,7 @@ class TitleBlock:
 
 
 def title_block(archive: Archive, summary: str) -> TitleBlock:
-    """The title block of an archive.
-
-    Args:
-        summary: the cut list in one line.
-    """
+    """The title block of an archive, with the cut list in one line as its `summary`."""
     results = archive.results
     given, rod = results.drawings or Drawings(), results.rod or RodType()
     kept = results.plain()
@@ -137,11 +134,7 @@ def _joint(joint: Joint | None) -> str:
 
 
 def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
-    """The drawing with its title block and a scale bar below: for a sheet without a frame.
-
-    Args:
-        block: entries and notes of the title block.
-    """
+    """The drawing with its title block and a scale bar below: for a sheet without a frame."""
     (left, bottom), (right, _) = drawing.box()
     size, pencil = drawing.text, Pencil()
     y = bottom - 2.6 * size
@@ -164,13 +157,7 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
 def _write_entries(
     pencil: Pencil, block: TitleBlock, left: float, y: float, width: float, size: float, line: float
 ) -> float:
-    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line.
-
-    Args:
-        left, y: baseline of the first entry [mm].
-        width: of all columns [mm].
-        size: of the texts; line : from baseline to baseline [mm].
-    """
+    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line."""
     step = width / COLUMNS
     for k, (label, value) in enumerate(block.entries):
         x, down = left + step * (k % COLUMNS), y - line * (k // COLUMNS)
@@ -181,33 +168,18 @@ def _write_entries(
 
 
 def shortened(text: str, width: float, size: float) -> str:
-    """A text that takes at most a width [mm] in a size; what is cut off is shown by dots.
-
-    Args:
-        width: that is available [mm]; size : of the text [mm].
-    """
+    """A text that takes at most a width [mm] in a size [mm]; what is cut off is shown by dots."""
     letters = int(width / (LETTER * size))
     return text if len(text) <= letters else text[: letters - 1].rstrip() + "\N{HORIZONTAL ELLIPSIS}"
 
 
 def _bar_length(longest: float, scale: float) -> float:
-    """The round length of a scale bar [mm of the sheet].
-
-    Args:
-        longest, scale: as of `_scale_bar`.
-    """
+    """The round length of a scale bar, in mm of a sheet at 1:`scale` as `longest`."""
     return nice_step(scale * longest, 2) * 2 / scale
 
 
 def _scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
-    """A bar of a round length of at most about `longest` [mm of the sheet], ending at `right`, at 1:`scale`.
-
-    Args:
-        right, y: lower right corner [mm of the sheet].
-        longest: of the bar [mm of the sheet].
-        text: size of its numbers [mm of the sheet].
-        scale: lengths of the object over those of the sheet.
-    """
+    """A bar of a round length of at most about `longest`, ending at `right`; all in mm of a sheet at 1:`scale`."""
     length = _bar_length(longest, scale)
     for k in range(4):
         x = right - length + k * length / 4
@@ -229,12 +201,8 @@ class Sheet:
     scale: float
 
 
-def room(paper: tuple[float, float]) -> tuple[Floats, Floats]:
-    """Lower left and upper right corner of what a sheet has for its drawing [mm].
-
-    Args:
-        paper: width and height of a sheet [mm].
-    """
+def room(paper: Paper) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of what a sheet has for its drawing [mm]."""
     return np.array([MARGIN + 4, MARGIN + BLOCK + 4]), np.array(paper) - MARGIN - 4
 
 
@@ -254,7 +222,7 @@ class Layout:
     parts: Drawing | None
     scale_of_parts: float
 
-    def sheets(self, paper: tuple[float, float]) -> Iterator[Sheet]:
+    def sheets(self, paper: Paper) -> Iterator[Sheet]:
         """The whole on one sheet of a paper [mm], in the middle, and its parts."""
         low, high = room(paper)
         bottom, top = self.whole.box()
@@ -264,9 +232,7 @@ class Layout:
             yield from tiled(self.parts, paper, self.scale_of_parts)
 
 
-def laid_out(
-    compose: Compose, extent: Floats, paper: tuple[float, float], finest: float, *, true_size: bool = False
-) -> Layout:
+def laid_out(compose: Compose, extent: Floats, paper: Paper, finest: float, *, true_size: bool = False) -> Layout:
     """A drawing, laid out for one sheet and, where that leaves something out, in detail.
 
     The parts are at the smallest scale that shows all, or the largest there is.
@@ -274,7 +240,6 @@ def laid_out(
     Args:
         compose: makes the drawing for a text size [mm at 1:1].
         extent: (2,) at least what the drawing takes without texts [mm].
-        paper: width and height of a sheet [mm].
         finest: size of the texts with which a file at 1:1 shows all that it can [mm].
         true_size: the parts are at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
     """
@@ -297,12 +262,8 @@ def laid_out(
     return Layout(whole, scale, detail, parts, of_parts)
 
 
-def fitted(compose: Compose, extent: Floats, paper: tuple[float, float]) -> tuple[Drawing, float]:
-    """A drawing with the texts of a sheet, and the largest standard scale at which one sheet has room for it.
-
-    Args:
-        compose, extent, paper: as of `laid_out`.
-    """
+def fitted(compose: Compose, extent: Floats, paper: Paper) -> tuple[Drawing, float]:
+    """A drawing with the texts of a sheet, and the largest standard scale at which one sheet has room for it."""
     low, high = room(paper)
     for scale in SCALES:
         if np.any(extent / scale > high - low) and scale != SCALES[-1]:
@@ -320,25 +281,20 @@ def _size(drawing: Drawing) -> Floats:
     return np.asarray(high - low)
 
 
-def _tiles(extent: Floats, paper: tuple[float, float]) -> Ints:
+def _tiles(extent: Floats, paper: Paper) -> Ints:
     """Sheets (2,) across and down that an extent (2,) of a drawing takes [mm of paper]."""
     low, high = room(paper)
     return np.maximum(np.ceil(extent / (high - low - 2 * OVERLAP)), 1).astype(np.intp)
 
 
-def _fits_on(extent: Floats, paper: tuple[float, float]) -> bool:
+def _fits_on(extent: Floats, paper: Paper) -> bool:
     """Whether an extent (2,) of a drawing [mm of paper] takes no more sheets than it may."""
     return bool(_tiles(extent, paper).prod() <= _MOST_TILES)
 
 
-def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
-    """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where that is one or too many.
-
-    Args:
-        drawing: at 1:1 [mm].
-        paper: width and height of a sheet [mm].
-        scale: lengths of the object over those of the sheet.
-    """
+def tiled(drawing: Drawing, paper: Paper, scale: float = 1) -> Iterator[Sheet]:
+    """A drawing, at 1:1, over as many sheets at 1:`scale` as it takes, with match lines; nothing where that is one or
+    too many."""
     low, high = room(paper)
     drawing = drawing.placed(1 / scale, np.zeros(2))
     bottom, top = drawing.box()
@@ -359,12 +315,8 @@ def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Ite
             )
 
 
-def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sheet]:
-    """A table over as many sheets as it takes, in as many columns side by side as fit.
-
-    Args:
-        paper: width and height of a sheet [mm].
-    """
+def table(title: str, content: Table, paper: Paper) -> Iterator[Sheet]:
+    """A table over as many sheets as it takes, in as many columns side by side as fit."""
     if not content:
         return
     (low, high), rows = room(paper), list(zip(*content.values(), strict=True))
@@ -391,12 +343,8 @@ def _wrapped(words: str, unit: str, width: int) -> list[str]:
     return wrap(words, max(width, 8), break_long_words=False) + ([f"[{unit}]"] if unit else [])
 
 
-def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: tuple[float, float]) -> list[Drawing]:
-    """The sheets with frames and title blocks, numbered.
-
-    Args:
-        paper: width and height of a sheet [mm].
-    """
+def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: Paper) -> list[Drawing]:
+    """The sheets with frames and title blocks, numbered."""
     return [
         replace(
             _frame(block, sheet, k, len(sheets), paper) + sheet.content,
@@ -428,7 +376,7 @@ def _number(cell: str) -> bool:
     return cell[-1:].isdigit() and cell[:1] in "-.0123456789"
 
 
-def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tuple[float, float]) -> Drawing:
+def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: Paper) -> Drawing:
     """Border and title block."""
     pencil, (width, height) = Pencil(), paper
     pencil.line(

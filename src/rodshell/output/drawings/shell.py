@@ -1,4 +1,7 @@
-"""Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection."""
+"""Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection.
+
+`text` is the usual size of a drawing's texts [mm at 1:1].
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
@@ -56,11 +59,7 @@ def _stopped(archive: Archive) -> str:
 
 
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
-    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions.
-
-    Args:
-        text: usual size of the texts [mm at 1:1].
-    """
+    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions."""
     pencil, final = Pencil(), archive.final
     assert final is not None
     curves = rod_curves(archive, archive.states[final])
@@ -84,9 +83,6 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     """Paths of the rod ends from flat to their supports, seen from above, and the shell's side at each stage.
 
     A line through all ends shows where they are at each stage; a ring where they end.
-
-    Args:
-        text: usual size of the texts [mm at 1:1].
     """
     pencil, history = Pencil(), archive.states["history"]
     assert archive.results.deployment is not None
@@ -139,30 +135,17 @@ def _not_known(results: Results) -> str:
 
 
 def _thinned(curve: Floats) -> Floats:
-    """A curve by about every third of its nodes, its ends kept.
-
-    Args:
-        curve: (k, 2 or 3) nodes.
-    """
+    """A curve by about every third of its nodes, its ends kept."""
     return np.asarray(curve[[*range(0, len(curve) - 1, 3), len(curve) - 1]])
 
 
 def apart(curves: Iterable[Floats]) -> list[Floats]:
-    """Each curve once: in an elevation a rod covers its mirror image.
-
-    Args:
-        curves: (k, 2) points of each [mm].
-    """
+    """Each curve (k, 2) [mm] once: in an elevation a rod covers its mirror image."""
     return list({(np.rint(curve / SAME) + 0.0).tobytes(): curve for curve in curves}.values())
 
 
 def _seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
-    """The rods of the final shape, pale.
-
-    Args:
-        archive: a result with a final shape.
-        text: size of the drawing's texts [mm], by which the line width is chosen.
-    """
+    """The rods of the final shape, pale."""
     assert archive.final is not None
     for curve in rod_curves(archive, archive.states[archive.final]):
         pencil.line(_thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
@@ -184,12 +167,7 @@ def _span(
 
 
 def axes(pencil: Pencil, text: float) -> None:
-    """Ticks of x and y [mm] along two sides of all that is there.
-
-    Args:
-        pencil: draws them, around what it has drawn so far.
-        text: size of the drawing's texts [mm].
-    """
+    """Ticks of x and y [mm] along two sides of all that is there."""
     low, high = pencil.done("", "", text).box()
     low, high = low - text, high + text
     pencil.line([(low[0], high[1]), low, (high[0], low[1])], "DIM")
@@ -205,12 +183,7 @@ def axes(pencil: Pencil, text: float) -> None:
 
 
 def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
-    """Where every rod end goes, seen from above, with the direction in which its rod arrives there.
-
-    Args:
-        plan: the flat plan of the archive.
-        text: usual size of the texts [mm at 1:1].
-    """
+    """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
     pencil, final = Pencil(), archive.final
     assert final is not None
     _seen_from_above(pencil, archive, text)
@@ -313,9 +286,6 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
 
     Each number stands off all rods and diagonals of its cell, as large as finds room; where there is none the table
     has it.
-
-    Args:
-        text: usual size of the texts [mm at 1:1].
     """
     pencil, final = Pencil(), archive.final
     assert final is not None
