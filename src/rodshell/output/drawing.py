@@ -1,7 +1,7 @@
 """A drawing: paths, marks and texts on named layers, y up [mm]. DXF, SVG, PDF and PNG are written from it."""
 
 import pathlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress, pairwise
@@ -220,28 +220,22 @@ class Drawing:
 
     def placed(self, scale: float, shift: Floats) -> "Drawing":
         """The drawing scaled about the origin, with pens and texts, then shifted (2,) [mm]; without paths in space."""
-        paths = [path for path in self.paths if path.flat]
-        used = {id(pen): pen for pen in (*(path.pen for path in paths), *(mark.pen for mark in self.marks))}
-        pens = {key: _scaled(pen, scale) for key, pen in used.items()}
-        at = _moved([*(mark.at for mark in self.marks), *(text.at for text in self.texts)], scale, shift)
-        marks, texts = at[: len(self.marks)], at[len(self.marks) :]
-        return Drawing(
-            self.name,
-            self.title,
-            scale * self.text,
-            tuple(
-                Path(points, path.layer, path.closed, pens[id(path.pen)], path.name, path.note)
-                for path, points in zip(paths, _moved([path.points for path in paths], scale, shift), strict=True)
+
+        def moved(points: Floats) -> Floats:
+            return np.asarray(scale * points + shift)
+
+        def pen(item: Path | Mark) -> Pen | None:
+            look = item.pen
+            return look and look._replace(width=scale * look.width, dash=tuple(scale * dash for dash in look.dash))
+
+        return replace(
+            self,
+            text=scale * self.text,
+            paths=tuple(path._replace(points=moved(path.points), pen=pen(path)) for path in self.paths if path.flat),
+            marks=tuple(
+                mark._replace(at=moved(mark.at), radius=scale * mark.radius, pen=pen(mark)) for mark in self.marks
             ),
-            tuple(
-                Mark(place, scale * mark.radius, mark.layer, pens[id(mark.pen)], mark.note)
-                for mark, place in zip(self.marks, marks, strict=True)
-            ),
-            tuple(
-                Text(t.text, place, scale * t.size, t.layer, t.anchor, t.angle, t.bold, t.colour, t.halo)
-                for t, place in zip(self.texts, texts, strict=True)
-            ),
-            self.left_out,
+            texts=tuple(text._replace(at=moved(text.at), size=scale * text.size) for text in self.texts),
         )
 
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
@@ -299,19 +293,6 @@ class Pencil:
     def done(self, name: str, title: str, text: float) -> Drawing:
         """The drawing of all that was added, `text` being the usual size of its texts [mm]."""
         return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts), tuple(self.left_out))
-
-
-def _scaled(pen: Pen | None, scale: float) -> Pen | None:
-    return pen and Pen(pen.colour, scale * pen.width, tuple(scale * dash for dash in pen.dash), pen.fill)
-
-
-def _moved(groups: Sequence[Floats], scale: float, shift: Floats) -> list[Floats]:
-    """Points (..., 2) in groups, scaled about the origin and then shifted: all at once, since groups are many."""
-    if not groups:
-        return []
-    stops = np.cumsum([points.size // 2 for points in groups]).tolist()
-    moved = scale * np.concatenate([points.reshape(-1, 2) for points in groups]) + shift
-    return [moved[a:b].reshape(points.shape) for a, b, points in zip([0, *stops], stops, groups, strict=False)]
 
 
 def within(box: Floats, low: Floats, high: Floats) -> bool:

@@ -232,9 +232,9 @@ def _on_own_line(text: str, end: Floats, other: Floats, size: float) -> Iterable
         yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2)
 
 
-def segments(course: Floats) -> Floats:
-    """(k - 1, 2, 2) the lines of a polyline (k, 2)."""
-    return np.stack([course[:-1], course[1:]], axis=1)
+def segments(courses: Iterable[Floats]) -> Floats:
+    """(m, 2, 2) the lines of polylines (k, 2)."""
+    return np.concatenate([np.empty((0, 2, 2)), *(np.stack([line[:-1], line[1:]], axis=1) for line in courses)])
 
 
 def closed_segments(outline: Floats) -> Floats:

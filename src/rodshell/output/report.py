@@ -11,7 +11,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from rodshell.figures.checks import OTHER_SHAPES, Clearance, Reactions
+from rodshell.figures.checks import OTHER_SHAPES, Clearance, Reactions, SelfWeight
 from rodshell.figures.fabrication import Stock
 from rodshell.figures.form import Agreement, Drape, Gate, PopUp
 from rodshell.figures.records import Ends, Record
@@ -352,20 +352,16 @@ def _weight_rows(results: Results, ends: Sequence[Ends], rounding: Rounding) -> 
     if not any(found):
         return []
     shares = [wording.share_of_weight(weight) if weight else wording.UNKNOWN for weight in found]
-    deflections = [_shown(wording.millimetres, weight.deflection if weight else None, rounding) for weight in found]
     whose = "the weakest patch, its seam held," if results.patches else "it"
-    rows = [(f"Own weight that {whose} carries", shares)]
-    return (
-        rows
-        if set(deflections) == {wording.UNKNOWN}
-        else [*rows, ("Largest deflection under its own weight", deflections)]
-    )
+    deflection = (("Largest deflection under its own weight", "deflection", wording.millimetres),)
+    weights = [weight or SelfWeight() for weight in found]
+    return [(f"Own weight that {whose} carries", shares), *_side_by_side(deflection, weights, rounding)]
 
 
 def _listed(record: Record | None, listed: tuple[Entry, ...], rounding: Rounding) -> list[Row]:
     """The figures of a record that are known."""
-    known = [(title, getattr(record, name), show) for title, name, show in listed] if record else []
-    return [(title, _shown(show, value, rounding)) for title, value, show in known if value is not None]
+    rows = _side_by_side(listed, [record], rounding) if record else []
+    return [(title, value) for title, (value,) in rows]
 
 
 def _drape_rows(drape: Drape | None, rounding: Rounding) -> list[Row]:

@@ -1,6 +1,7 @@
 """The drawing set: each drawing laid out once, at 1:1 for DXF and SVG, all of them on sheets for the PDF."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -93,14 +94,10 @@ def _checked(results: Results) -> str:
 def _layouts(archive: Archive) -> dict[str, Layout]:
     """Every drawing but the strips, which are cut into sheets between two rods."""
     plan, paper = flat_plan(archive), _paper(archive)
-
-    def of_the_plan(text: float) -> Drawing:
-        return flat_drawing(plan, text)
-
     extent = np.ptp(np.concatenate([plan.cuts.reshape(-1, 2), *plan.footprint]), axis=0)
     layouts = dict[str, Layout]()
     if lies_flat(archive):
-        layouts["plan"] = laid_out(of_the_plan, extent, paper, plan.text, true_size=True)
+        layouts["plan"] = laid_out(partial(flat_drawing, plan), extent, paper, plan.text, true_size=True)
     for name, (compose, extent) in _of_the_shell(archive, plan).items():
         layouts[name] = laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
     return layouts
@@ -118,13 +115,13 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, 
     width, depth, height = np.ptp(np.concatenate(rod_curves(archive, archive.states[archive.final])), axis=0)
     above, both_sides = np.array([width, depth]), np.array([max(width, depth), 2 * height])
     makers: dict[str, tuple[Compose, Floats]] = {
-        "supports": (lambda text: supports_drawing(archive, plan, text), above),
-        "elevations": (lambda text: elevations_drawing(archive, text), both_sides),
+        "supports": (partial(supports_drawing, archive, plan), above),
+        "elevations": (partial(elevations_drawing, archive), both_sides),
     }
     if archive.results.fabrication and archive.results.fabrication.bracing:
-        makers["bracing"] = (lambda text: bracing_drawing(archive, text), above)
+        makers["bracing"] = (partial(bracing_drawing, archive), above)
     if "history" in archive.states and archive.results.deployment:
-        makers["erection"] = (lambda text: erection_drawing(archive, text), above)
+        makers["erection"] = (partial(erection_drawing, archive), above)
     return makers
 
 

@@ -146,7 +146,7 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     for outline in plan.boundary:
         pencil.line(outline, "BOUNDARY-FINAL", closed=True)
     _rods(pencil, plan, text)
-    lines = np.concatenate([*map(segments, plan.courses), *map(closed_segments, plan.footprint)])
+    lines = np.concatenate([segments(plan.courses), *map(closed_segments, plan.footprint)])
     across = plan.across
     _labels(pencil, plan, text, lines)
     room = _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
@@ -294,17 +294,20 @@ def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     low, high = corners.min(axis=0) - text, corners.max(axis=0) + text
     frame = [low, (high[0], low[1]), high, (low[0], high[1])]
     pencil.line(frame, "DIM", closed=True)
-    for axis, name in enumerate("xy"):
-        out = np.array([0.0, -1.0]) if axis == 0 else np.array([-1.0, 0.0])
-        ticks = nice_ticks(low[axis], high[axis] - 2 * text, 8)
-        for value in ticks:
-            foot = np.array([value, low[1]]) if axis == 0 else np.array([low[0], value])
-            pencil.line([foot, foot - 0.4 * text * out], "DIM")
-            shift = np.array([0.0, -1.1 * text]) if axis == 0 else np.array([-0.4 * text, -0.3 * text])
-            anchor = "middle" if axis == 0 else "end"
-            pencil.write(f"{value:g}", foot + shift, 0.8 * text, "DIM", anchor=anchor)
-        end = np.array([high[0], low[1] - 1.1 * text]) if axis == 0 else np.array([low[0] - 0.4 * text, high[1] - text])
-        pencil.write(name, end, 0.8 * text, "DIM", anchor="end")
+    side_ticks(pencil, low, high, text, 8, names="xy")
+
+
+def side_ticks(pencil: Pencil, low: Floats, high: Floats, text: float, count: int, *, names: str = "") -> None:
+    """Ticks [mm] within the lower and the left side of a box, `count` at most, and the names of the axes at their
+    ends."""
+    for axis, (inwards, off, anchor) in enumerate((((0, 1), (0, -1.1), "middle"), ((1, 0), (-0.4, -0.3), "end"))):
+        for value in nice_ticks(low[axis], high[axis] - (2 * text if names else 0), count):
+            foot = np.where(np.arange(2) == axis, value, low)
+            pencil.line([foot, foot + 0.4 * text * np.array(inwards)], "DIM")
+            pencil.write(f"{value:g}", foot + text * np.array(off), 0.8 * text, "DIM", anchor=anchor)
+        if names:
+            end = (high[0], low[1] - 1.1 * text) if axis == 0 else (low[0] - 0.4 * text, high[1] - text)
+            pencil.write(names[axis], end, 0.8 * text, "DIM", anchor="end")
 
 
 # Strips

@@ -19,7 +19,7 @@ from rodshell.figures.form import Joint, Material, RodType, Section
 from rodshell.figures.records import json_text
 from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
-from rodshell.output.labels import Label, Room, nearby, take, thin
+from rodshell.output.labels import Label, Room, closed_segments, nearby, segments, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash
@@ -183,7 +183,7 @@ def _scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: flo
     length = _bar_length(longest, scale)
     for k in range(4):
         x = right - length + k * length / 4
-        corners = np.array([[x, y], [x + length / 4, y], [x + length / 4, y + 0.4 * text], [x, y + 0.4 * text]])
+        corners = _corners(np.array([x, y]), np.array([x + length / 4, y + 0.4 * text]))
         pencil.line(corners, "TITLE", closed=True, pen=Pen(INK, 0.06 * text, fill=INK if k % 2 == 0 else PAPER))
     pencil.write("0", (right - length, y - text), 0.8 * text, "TITLE", anchor="middle")
     pencil.write(f"{scale * length:g} mm", (right, y - text), 0.8 * text, "TITLE", anchor="end")
@@ -378,11 +378,9 @@ def _number(cell: str) -> bool:
 
 def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: Paper) -> Drawing:
     """Border and title block."""
-    pencil, (width, height) = Pencil(), paper
-    pencil.line(
-        [(MARGIN, MARGIN), (width - MARGIN, MARGIN), (width - MARGIN, height - MARGIN), (MARGIN, height - MARGIN)],
-        "TITLE", closed=True, pen=Pen(INK, 0.35),
-    )  # fmt: skip
+    pencil, width = Pencil(), paper[0]
+    border = _corners(np.full(2, MARGIN), np.array(paper) - MARGIN)
+    pencil.line(border, "TITLE", closed=True, pen=Pen(INK, 0.35))
     top = MARGIN + BLOCK
     pencil.line([(MARGIN, top), (width - MARGIN, top)], "TITLE", pen=Pen(INK, 0.35))
     left, right, y = MARGIN + 4, width - MARGIN - 4, top - 6.5
@@ -418,23 +416,17 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         box = text.box()
         if not within(box, low, high):
             free.take(box)
-    drawn = _segments([path.points for path in part.paths if not within(path.points, low, high)])
+    drawn = segments(path.points for path in part.paths if not within(path.points, low, high))
     pen = Pen(WARNING, 0.25, (6.0, 1.5, 1.0, 1.5))
-    sides: tuple[tuple[bool, tuple[int, int], list[Floats], tuple[float, float], float], ...] = (
-        (bool(row > 0), (row - 1, column), [np.array([low[0], high[1]]), high], (0.0, 1.5), 0.0),
-        (bool(row < count[1] - 1), (row + 1, column), [low, np.array([high[0], low[1]])], (0.0, -1.5 - TEXT), 0.0),
-        (bool(column > 0), (row, column - 1), [low, np.array([low[0], high[1]])], (-1.5, 0.0), np.pi / 2),
-        (
-            bool(column < count[0] - 1),
-            (row, column + 1),
-            [np.array([high[0], low[1]]), high],
-            (1.5 + TEXT, 0.0),
-            np.pi / 2,
-        ),
+    corners = _corners(low, high)
+    sides = (
+        ((row - 1, column), corners[[3, 2]], (0.0, 1.5), 0.0),
+        ((row + 1, column), corners[[0, 1]], (0.0, -1.5 - TEXT), 0.0),
+        ((row, column - 1), corners[[0, 3]], (-1.5, 0.0), np.pi / 2),
+        ((row, column + 1), corners[[1, 2]], (1.5 + TEXT, 0.0), np.pi / 2),
     )
-    for there, neighbour, line, off, angle in sides:
-        if not there:
-            continue
+    shared = [side for side in sides if 0 <= side[0][0] < count[1] and 0 <= side[0][1] < count[0]]
+    for neighbour, line, off, angle in shared:
         pencil.line(line, "TITLE", pen=pen)
         along, up = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         words = f"match line to part {_part(*neighbour)}"
@@ -456,36 +448,33 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
             take(aside, TEXT, free)
             pencil.line(aside.leader(TEXT), "TITLE", pen=Pen(WARNING, 0.18))
             pencil.texts.append(aside.written(TEXT)._replace(layer="TITLE", colour=pen.colour))
-    pencil.leave_out(missing, sum(there for there, *_ in sides), "names of match lines")
+    pencil.leave_out(missing, len(shared), "names of match lines")
     return pencil.done("", "", TEXT)
 
 
+def _corners(low: Floats, high: Floats) -> Floats:
+    """(4, 2) the corners of a rectangle, counterclockwise from its lower left one."""
+    return np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+
+
 def _led_aside(
-    words: str, line: Sequence[Floats], part: Drawing, names: Sequence[Text], low: Floats, high: Floats
+    words: str, line: Floats, part: Drawing, names: Sequence[Text], low: Floats, high: Floats
 ) -> Label | None:
     """The name of a match line next to it, with a line to it, within a sheet from `low` to `high` (2,): clear of all
     texts, and of drawn lines too where there is room for that. None: there is no free place."""
     taken = Room(20.0)
     for text in (*part.texts, *names):
         taken.take(text.box())
-    (left, bottom), (right, top) = low, high
-    for a, b in (((left, bottom), (right, bottom)), ((left, top), (right, top)), ((left, bottom), (left, top)),
-                 ((right, bottom), (right, top))):  # fmt: skip
-        taken.take(thin(np.array([a, b]), 0.1))
+    for side in closed_segments(_corners(low, high)):
+        taken.take(thin(side, 0.1))
     inwards = 0.5 * (low + high) - 0.5 * (line[0] + line[1])
     shares = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9])
-    drawn = _segments([path.points for path in part.paths])
+    drawn = segments(path.points for path in part.paths)
     for lines, share in product((drawn, drawn[:0]), shares):
         label = nearby(words, line[0] + share * (line[1] - line[0]), inwards, TEXT, taken, lines)
         if label is not None and within(label.box(TEXT), low, high):
             return label
     return None
-
-
-def _segments(lines: Sequence[Floats]) -> Floats:
-    """(m, 2, 2) the straight pieces of polylines (k, 2)."""
-    ends = [points[:-1] for points in lines], [points[1:] for points in lines]
-    return np.stack([np.concatenate([np.empty((0, 2)), *points]) for points in ends], axis=1)
 
 
 def _part(row: int, column: int) -> str:

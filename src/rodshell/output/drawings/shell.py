@@ -27,13 +27,13 @@ from rodshell.output.drawing import (
     Text,
     corners,
 )
-from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.drawings.flat import FlatPlan, side_ticks
 from rodshell.output.grid import end_nodes, joint_places, meshed_rods, outlines_of
-from rodshell.output.labels import Room, callouts, closed_segments, outward, upright
+from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
 from rodshell.results.verdict import unknown_below
-from rodshell.results.wording import Rounding, nice_ticks, rounding_of, whole_percent
+from rodshell.results.wording import Rounding, rounding_of, whole_percent
 
 _SUPPORTS_LEGEND = (
     "Red: where each rod ends and how it continues. A thin line leads to its name: rod.0 its start, rod.1 its end.",
@@ -171,12 +171,7 @@ def axes(pencil: Pencil, text: float) -> None:
     low, high = pencil.done("", "", text).box()
     low, high = low - text, high + text
     pencil.line([(low[0], high[1]), low, (high[0], low[1])], "DIM")
-    for value in nice_ticks(low[0], high[0], 6):
-        pencil.line([(value, low[1]), (value, low[1] + 0.4 * text)], "DIM")
-        pencil.write(f"{value:g}", (value, low[1] - 1.1 * text), 0.8 * text, "DIM", anchor="middle")
-    for value in nice_ticks(low[1], high[1], 6):
-        pencil.line([(low[0], value), (low[0] + 0.4 * text, value)], "DIM")
-        pencil.write(f"{value:g}", (low[0] - 0.4 * text, value - 0.3 * text), 0.8 * text, "DIM", anchor="end")
+    side_ticks(pencil, low, high, text, 6)
 
 
 # Supports
@@ -198,7 +193,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
         pencil.mark(end, RADIUS * text, "MARK", note=name)
         pencil.line([end, end + TICK * text * way], "MARK", pen=tick)
         room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
-    lines = np.concatenate([_segments(_thinned(_thinned(curve))) for curve in curves])  # what names keep clear of
+    lines = segments(_thinned(_thinned(curve)) for curve in curves)  # what names keep clear of
     alone = ~np.isin(names, list(_sewn(archive)))
     for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
@@ -255,11 +250,6 @@ def _runs(loop: Ints, alone: Bools) -> list[Ints]:
 def _sewn(archive: Archive) -> set[str]:
     """The rod ends on seams; these have the number of their meeting instead of a name."""
     return {end for seam in archive.results.seams for meeting in seam.meetings for end in meeting.ends}
-
-
-def _segments(curve: Floats) -> Floats:
-    """(k - 1, 2, 2) the parts of a polyline (k, 2)."""
-    return np.stack([curve[:-1], curve[1:]], axis=1)
 
 
 def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None:
