@@ -85,7 +85,7 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
 
 def gap_scale(gaps: Floats, largest: float) -> Scale:
     """The scale of signed distances to the target (k,) [m], `largest` [mm] of all shapes that have the scale."""
-    factor, unit = length_unit(largest)
+    factor, unit = (1e3, "m") if largest >= 1e3 else (1.0, "mm")
     return _scale(1e3 / factor * gaps, max(largest, FINEST) / factor, SIGNED, f"gap to target in {unit}, + outside")
 
 
@@ -112,11 +112,6 @@ def _largest_of_all_gaps(archive: Archive) -> float:
 @lru_cache(maxsize=8)
 def _palette(colours: tuple[str, ...]) -> list[str]:
     return hex_colours(colours, np.linspace(0, 1, BINS))
-
-
-def length_unit(largest: float) -> tuple[float, str]:
-    """The unit that fits a length [mm]: how many mm it is, and its name."""
-    return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
 
 
 def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, Floats]]:
@@ -203,8 +198,7 @@ def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
 @lru_cache(maxsize=4096)
 def mixed(colour: str, other: str, share: float) -> str:
     """A mixture of two colours "#rrggbb" with a share of the other, 0 to 1."""
-    pairs = ((int(colour[k : k + 2], 16), int(other[k : k + 2], 16)) for k in (1, 3, 5))
-    return "#" + "".join(f"{round(a + share * (b - a)):02x}" for a, b in pairs)
+    return hex_colours((colour, other), np.array([share]))[0]
 
 
 CELL, ROW, LEFT, TOP = 84, 30, 190, 64

@@ -291,7 +291,9 @@ def callouts(
     """
     best: _Tried | None = None
     for size, gap in ((text * share, gap) for gap in GAPS for share in _CALLOUT_SIZES):
-        tried = _tried(names, points, away, size, gap, room, lines)
+        taken, (starts, ways) = Room(4 * size, room), _slots(points, away, size, gap)
+        labels = [_free(*slot, size, taken, lines) for slot in zip(names, points, starts, ways, strict=True)]
+        tried = _Tried(labels, size, taken)
         best = tried if best is None or tried.missing < best.missing else best
         if not best.missing or (size <= text * SMALL and best.missing > MANY):
             break
@@ -318,15 +320,6 @@ class _Tried:
     @property
     def missing(self) -> int:
         return sum(label is None for label in self.labels)
-
-
-def _tried(
-    names: Sequence[str], points: Floats, away: Floats, size: float, gap: float, room: Room, lines: Floats
-) -> _Tried:
-    taken = Room(4 * size, room)
-    starts, ways = _slots(points, away, size, gap)
-    labels = [_free(*slot, size, taken, lines) for slot in zip(names, points, starts, ways, strict=True)]
-    return _Tried(labels, size, taken)
 
 
 def _elsewhere(

@@ -288,9 +288,7 @@ class _Glb:
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
         self._meshes: list[dict[str, Any]] = []
-        self._nodes: list[dict[str, Any]] = []
-        self._parts: list[bytes] = []
-        self._length = 0
+        self._body = bytearray()
 
     def add(
         self, name: str, points: Floats, normals: Floats, faces: NDArray[np.uint32], colours: Floats | None
@@ -302,33 +300,32 @@ class _Glb:
             attributes["COLOR_0"] = self._array(colours.astype(np.float32), "VEC3", VERTICES)
         indices = self._array(faces.ravel(), "SCALAR", ELEMENTS)
         primitive = {"attributes": attributes, "indices": indices, "material": 0}
-        self._nodes.append({"name": name, "mesh": len(self._meshes)})
         self._meshes.append({"name": name, "primitives": [primitive]})
 
     def content(self) -> bytes:
         tree = {
             "asset": {"version": "2.0", "generator": "rodshell"},
             "scene": 0,
-            "scenes": [{"nodes": list(range(len(self._nodes)))}],
-            "nodes": self._nodes,
+            "scenes": [{"nodes": list(range(len(self._meshes)))}],
+            "nodes": [{"name": mesh["name"], "mesh": k} for k, mesh in enumerate(self._meshes)],
             "meshes": self._meshes,
             "materials": [
                 {"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.7}, "doubleSided": True}
             ],
             "accessors": self._accessors,
             "bufferViews": self._views,
-            "buffers": [{"byteLength": self._length}],
+            "buffers": [{"byteLength": len(self._body)}],
         }
         text = json.dumps(tree, separators=(",", ":"), ensure_ascii=False).encode()
         text += b" " * (-len(text) % 4)
-        body = b"".join(self._parts)
-        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(body), 0x004E4942) + body
+        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+        chunks += struct.pack("<II", len(self._body), 0x004E4942) + self._body
         return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
     def _array(self, values: NDArray[Any], kind: str, use: int, *, bounds: bool = False) -> int:
         """Index of a new accessor; every item is of four bytes, so that all are aligned."""
         data = np.ascontiguousarray(values).tobytes()
-        self._views.append({"buffer": 0, "byteOffset": self._length, "byteLength": len(data), "target": use})
+        self._views.append({"buffer": 0, "byteOffset": len(self._body), "byteLength": len(data), "target": use})
         accessor: dict[str, Any] = {
             "bufferView": len(self._views) - 1,
             "componentType": INDEX if values.dtype == np.uint32 else FLOAT,
@@ -338,6 +335,5 @@ class _Glb:
         if bounds:
             accessor |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         self._accessors.append(accessor)
-        self._parts.append(data)
-        self._length += len(data)
+        self._body += data
         return len(self._accessors) - 1

@@ -33,15 +33,10 @@ def tag(name: str, *children: str, **attributes: Any) -> str:
     words = [name]
     for key, value in attributes.items():
         shown = escape(value) if isinstance(value, str) else number(value, 3)
-        words.append(f'{_attribute(key)}="{shown}"')
+        attribute = key.rstrip("_").replace("_", "-")
+        words.append(f'{attribute}="{shown}"')
     opening = " ".join(words)
     return f"<{opening}>{''.join(children)}</{name}>" if children else f"<{opening}/>"
-
-
-@cache
-def _attribute(key: str) -> str:
-    """The name of an attribute, by that of Python's argument."""
-    return key.rstrip("_").replace("_", "-")
 
 
 def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:

@@ -54,7 +54,6 @@ class FlatPlan:
         laths: how much lies on the rods, in words; "" where nothing does.
     """
 
-    name: str
     rods: list[GridRod]
     joints: list[GridJoint]
     lines: Floats
@@ -91,9 +90,24 @@ class FlatPlan:
         return [f"{joint.id}: {where}" for joint, where in zip(self.joints, said, strict=True)]
 
     @cached_property
-    def across(self) -> list[tuple[Floats, Floats]]:
-        """Its `diagonals`."""
-        return diagonals(self)
+    def diagonals(self) -> list[tuple[Floats, Floats]]:
+        """The two of each grid's largest rectangle with a joint at every crossing: by them it is set out square.
+
+        No diagonal runs over an opening; grids that do not touch each other, as patches with seams, have two each.
+        """
+        found = []
+        for patch in _patches(self):
+            x, y = (np.unique(np.round([_offset(self.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
+            met = np.zeros((len(y), len(x)), dtype=bool)
+            for u, v in patch:
+                row, column = (int(np.abs(at - _offset(self.rods[k])).argmin()) for at, k in ((y, u), (x, v)))
+                met[row, column] = True
+            best = _largest_full(met, x, y)
+            if best is not None:
+                left, right, low, high = (1e3 * value for value in best)
+                found.append((np.array([left, low]), np.array([right, high])))
+                found.append((np.array([left, high]), np.array([right, low])))
+        return found
 
     @cached_property
     def text(self) -> float:
@@ -131,7 +145,7 @@ def flat_plan(archive: Archive) -> FlatPlan:
     boundary = np.array(archive.results.boundary, dtype=float).reshape(-1, 3)
     loops = outlines_of(rods)
     return FlatPlan(
-        archive.name, rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks,
+        rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks,
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
         rounding_of(archive.results), laths_text(archive.results),
@@ -147,10 +161,9 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
         pencil.line(outline, "BOUNDARY-FINAL", closed=True)
     _rods(pencil, plan, text)
     lines = np.concatenate([segments(plan.courses), *map(closed_segments, plan.footprint)])
-    across = plan.across
     _labels(pencil, plan, text, lines)
-    room = _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
-    for a, b in across:
+    room = _joints(pencil, plan, text, lines, np.array(plan.diagonals).reshape(-1, 2, 2))
+    for a, b in plan.diagonals:
         _dimension(pencil, plan, a, b, text, room)
     _axes(pencil, plan, text)
     return pencil.done("plan", _FLAT_TITLE, text)
@@ -220,26 +233,6 @@ def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
             pencil.texts.append(callout.written)
             pencil.line(callout.line, "DIM")
     pencil.leave_out(len(set(names) - named), len(names), "names of rods")
-
-
-def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
-    """The two diagonals of each grid's largest rectangle with a joint at every crossing: by them it is set out square.
-
-    No diagonal runs over an opening; grids that do not touch each other, as patches with seams, have two each.
-    """
-    found = []
-    for patch in _patches(plan):
-        x, y = (np.unique(np.round([_offset(plan.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
-        met = np.zeros((len(y), len(x)), dtype=bool)
-        for u, v in patch:
-            row, column = (int(np.abs(offsets - _offset(plan.rods[k])).argmin()) for offsets, k in ((y, u), (x, v)))
-            met[row, column] = True
-        best = _largest_full(met, x, y)
-        if best is not None:
-            left, right, low, high = (1e3 * value for value in best)
-            found.append((np.array([left, low]), np.array([right, high])))
-            found.append((np.array([left, high]), np.array([right, low])))
-    return found
 
 
 def _offset(rod: GridRod) -> float:

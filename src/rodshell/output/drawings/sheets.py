@@ -5,9 +5,9 @@ verdict on the shell where that is not good.
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 from itertools import product
 from math import ceil
 from textwrap import wrap
@@ -15,7 +15,7 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.figures.form import Joint, Material, RodType, Section
+from rodshell.figures.form import Material, RodType
 from rodshell.figures.records import json_text
 from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
@@ -82,11 +82,11 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
     entries = (
         ("Project", given.project or _NOT_GIVEN),
         ("Drawn by", given.author or _NOT_GIVEN),
-        ("Date", given.date or _today().isoformat()),
+        ("Date", given.date or (source_date() or datetime.now(UTC)).date().isoformat()),
         ("Revision", given.revision or "-"),
-        ("Section", _section(rod.section) or _NOT_GIVEN),
+        ("Section", _in_words(case_rows(rod.section)) or _NOT_GIVEN),
         ("Material", _material(rod.material) or _NOT_GIVEN),
-        ("Joints", _joint(results.joint)),
+        ("Joints", _in_words(joint_rows(results.joint)) or "ball"),
         ("Rods", f"{len(results.rods)}"),
         ("Units", f"mm, shown to {rounding_of(results).words}"),
         ("Tolerance", _NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
@@ -106,14 +106,9 @@ def source_date() -> datetime | None:
         return None
 
 
-def _today() -> date:
-    """The date of writing in UTC, or that of `source_date`."""
-    return (source_date() or datetime.now(UTC)).date()
-
-
-def _section(section: Section | None) -> str:
+def _in_words(rows: Iterable[tuple[str, str]]) -> str:
     """ "circle, radius 1 mm"."""
-    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in case_rows(section))
+    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in rows)
 
 
 def _material(material: Material | None) -> str:
@@ -126,11 +121,6 @@ def _material(material: Material | None) -> str:
     if material.density is not None:
         words.append(f"{rounded(material.density, 4)} kg/m\N{SUPERSCRIPT THREE}")
     return ", ".join(words)
-
-
-def _joint(joint: Joint | None) -> str:
-    """ "pin, eccentricity 42 mm"; without a word about them, joints are balls, free to turn."""
-    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in joint_rows(joint)) or "ball"
 
 
 def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:

@@ -72,8 +72,9 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
             pencil.line(curve, "CUT", pen=pen)
         cloud = np.concatenate(flat)
         low, high = bounds(cloud)
-        _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, rounding)
-        _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, rounding)
+        below, beside = low - (0.0, 1.5 * text), low - (1.5 * text, 0.0)
+        _span(pencil, below, np.array([high[0], below[1]]), text, rounding)
+        _span(pencil, beside, np.array([beside[0], high[1]]), text, rounding)
         pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
         pencil.write(words, (low[0], low[1] - 5 * text), 1.2 * text, "LABEL", bold=True)
     return pencil.done("elevations", f"Elevations{_stopped(archive)}", text)
@@ -151,16 +152,14 @@ def _seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
         pencil.line(_thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
 
 
-def _span(
-    pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float, rounding: Rounding
-) -> None:
+def _span(pencil: Pencil, start: Floats, end: Floats, text: float, rounding: Rounding) -> None:
     """A dimension line with its length [mm] next to it."""
-    start, end = np.array(a), np.array(b)
-    along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    length = float(np.linalg.norm(end - start))
+    along = (end - start) / max(length, 1e-9)
     across = 0.4 * text * np.array([-along[1], along[0]])
     pencil.line([start, end], "DIM")
-    for place_ in (start, end):
-        pencil.line([place_ - across, place_ + across], "DIM")
+    for tip in (start, end):
+        pencil.line([tip - across, tip + across], "DIM")
     angle = float(np.arctan2(along[1], along[0]))
     side = 0.5 * text * np.array([-along[1], along[0]]) if angle else np.array([0.0, -1.4 * text])
     pencil.write(rounding.mm(1e-3 * length), 0.5 * (start + end) + side, text, "DIM", anchor="middle", angle=angle)
