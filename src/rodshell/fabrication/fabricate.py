@@ -166,10 +166,8 @@ def _stretch(rod: Rod, profile: Profile, factors: Floats) -> Floats:
 def _laths(
     mesh: GridMesh, options: Fabrication, curvature: Floats | None, *, short: float = 0.0
 ) -> tuple[tuple[Lath, ...], tuple[Said, ...]]:
-    """All laths with their splices, and a sentence about those that cannot be spliced.
-
-    short : pieces of so many joint distances are avoided.
-    """
+    """All laths with their splices, pieces of under `short` joint distances being avoided, and a sentence about those
+    that cannot be spliced."""
     stock, crossings = options.stock_length, mesh.grid.crossings
     bend = np.zeros(len(mesh.rod_nodes)) if curvature is None else curvature
     made, hopeless = list[Lath](), dict[int, str]()

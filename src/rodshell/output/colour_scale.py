@@ -57,7 +57,8 @@ class Scale:
 
     @property
     def palette(self) -> list[str]:
-        return list(_palette(self.colours))
+        """Colours "#rrggbb" of all bins."""
+        return hex_colours(self.colours, np.linspace(0, 1, BINS))
 
 
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
@@ -107,11 +108,6 @@ def _largest_of_all_gaps(archive: Archive) -> float:
     """The largest gap [mm], without its sign, of all shapes that have one."""
     shapes = [shape_of(archive, name) for name in shells_among(archive.states)]
     return max((abs(largest_gap(archive, shape)[0]) for shape in shapes if shape.gap is not None), default=0.0)
-
-
-@lru_cache(maxsize=8)
-def _palette(colours: tuple[str, ...]) -> list[str]:
-    return hex_colours(colours, np.linspace(0, 1, BINS))
 
 
 def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, Floats]]:

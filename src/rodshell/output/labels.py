@@ -60,10 +60,8 @@ WIDE = ()
 
 
 class Room:
-    """The boxes (4, 2) that are taken, found by the square of the plane that they lie in.
-
-    within : an outer room; what is taken there is taken here too.
-    """
+    """The boxes (4, 2) that are taken, also those `within` an outer room, found by the square of the plane that they
+    lie in."""
 
     def __init__(self, square: float, within: "Room | None" = None) -> None:
         self._square = square

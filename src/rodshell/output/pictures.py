@@ -86,19 +86,19 @@ def ground_axes(pencil: Pencil, view: View, colour: str, text: float) -> None:
     pencil.line(view.project(corners), "DIM", closed=True, pen=pale)
     span = 0.02 * max(x1 - x0, y1 - y0)
 
-    def tick(point: list[float], out: list[float], value: float) -> None:
-        """A short line outwards from `point`, and the value [m] in mm beyond it."""
-        at, off = np.array(point), np.array(out)
-        a, b, c = view.project(np.array([at, at + off, at + 2.6 * off]))
-        anchor = "end" if b[0] < a[0] - 1 else "start" if b[0] > a[0] + 1 else "middle"
-        pencil.line([a, b], "DIM", pen=thin)
-        shown = number(1e3 * value).replace("-", MINUS)
-        pencil.write(shown, c - (0, 0.35 * text), text, "DIM", anchor=anchor, colour=colour)
+    def ticks(axis: int, start: list[float], out: list[float], count: int, above: float = -np.inf) -> None:
+        """Short lines outwards from places along an axis through `start`, and these in mm beyond them."""
+        for value in nice_ticks(1e3 * view.low[axis], 1e3 * view.high[axis], count):
+            if value > above:
+                at, off = np.where(np.arange(3) == axis, 1e-3 * value, start), np.array(out)
+                a, b, c = view.project(np.array([at, at + off, at + 2.6 * off]))
+                anchor = "end" if b[0] < a[0] - 1 else "start" if b[0] > a[0] + 1 else "middle"
+                pencil.line([a, b], "DIM", pen=thin)
+                shown = number(value).replace("-", MINUS)
+                pencil.write(shown, c - (0, 0.35 * text), text, "DIM", anchor=anchor, colour=colour)
 
-    for value in nice_ticks(1e3 * x0, 1e3 * x1, 5):
-        tick([1e-3 * value, y0, z0], [0, -span, 0], 1e-3 * value)
-    for value in nice_ticks(1e3 * y0, 1e3 * y1, 5):
-        tick([x1, 1e-3 * value, z0], [span, 0, 0], 1e-3 * value)
+    ticks(0, [x0, y0, z0], [0, -span, 0], 5)
+    ticks(1, [x1, y0, z0], [span, 0, 0], 5)
     middle = np.array([[(x0 + x1) / 2, y0 - 8 * span, z0], [x1 + 8 * span, (y0 + y1) / 2, z0]])
     for name, at in zip("xy", view.project(middle), strict=True):
         pencil.write(f"{name}, mm", at - (0, 0.35 * text), text, "DIM", anchor="middle", colour=colour)
@@ -106,9 +106,7 @@ def ground_axes(pencil: Pencil, view: View, colour: str, text: float) -> None:
         foot, top = view.project(np.array([[x0, y0, z0], [x0, y0, z1]]))
         pencil.line([foot, top], "DIM", pen=thin)
         pencil.write("z, mm", top + (0, 0.8 * text), text, "DIM", anchor="middle", colour=colour)
-        for value in nice_ticks(1e3 * z0, 1e3 * z1, 3):
-            if value > 1e3 * (z0 + 0.05 * (z1 - z0)):
-                tick([x0, y0, 1e-3 * value], [-0.6 * span, -0.6 * span, 0], 1e-3 * value)
+        ticks(2, [x0, y0, z0], [-0.6 * span, -0.6 * span, 0], 3, above=1e3 * (z0 + 0.05 * (z1 - z0)))
 
 
 Polylines = list[list[tuple[int, slice]]]

@@ -80,10 +80,7 @@ def drawing_svg(drawing: Drawing) -> str:
 
 
 def picture_document(drawing: Drawing) -> str:
-    """An SVG file of a picture, which has no scale.
-
-    drawing : in units of about a pixel, y up.
-    """
+    """An SVG file of a picture in units of about a pixel, y up, which has no scale."""
     low, high = drawing.box()
     view = (float(low[0]), float(-high[1]), *(high - low).tolist())
     return document(view, *_shapes(drawing), *(_text(text) for text in drawing.texts))

@@ -26,7 +26,7 @@ from rodshell.output.drawings.shell import (
     bracing_drawing,
     elevations_drawing,
     erection_drawing,
-    rod_curves,
+    final_curves,
     supports_drawing,
 )
 from rodshell.output.grid import lies_flat, supported
@@ -112,7 +112,7 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, 
     """Drawings that need a shape in space, and what each takes at least without its texts (2,) [mm]."""
     if archive.final is None or "rod_nodes" not in archive.states:
         return {}
-    width, depth, height = np.ptp(np.concatenate(rod_curves(archive, archive.states[archive.final])), axis=0)
+    width, depth, height = np.ptp(np.concatenate(final_curves(archive)), axis=0)
     above, both_sides = np.array([width, depth]), np.array([max(width, depth), 2 * height])
     makers: dict[str, tuple[Compose, Floats]] = {
         "supports": (partial(supports_drawing, archive, plan), above),

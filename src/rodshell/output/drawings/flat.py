@@ -34,6 +34,12 @@ _STRIPS_LEGEND = (
     "S2: of the second lath.",
     "Open triangle: support. Arrow: the section's size there [mm], or from there on the number of laths (L).",
 )
+# On a strip, in text sizes: points, whether the line is closed, its width.
+_SIGNS = {
+    "splice": (((0.0, -0.5), (0.0, 0.5)), False, 0.2),
+    "section": (((-0.25, -0.5), (0.0, 0.0), (0.25, -0.5)), False, 0.07),
+    "support": (((0.0, 0.0), (-0.4, -0.7), (0.4, -0.7)), True, 0.07),
+}
 TALL = 15.0  # text sizes from strip to strip
 
 
@@ -333,7 +339,7 @@ def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str,
     pencil.write("   ".join(filter(None, words)), (0.0, y - 2.2 * text), 1.1 * text, "LABEL", bold=True)
     joints = ((1e3 * rod.from_cut_end(at), other, "joint") for other, at in rod.joints)
     along = rod.record.stiffness
-    first, last = _end_sizes(along) if along is not None else ("", "")
+    first, last = map(_size, (along.sizes[0], along.sizes[-1])) if along and along.sizes else ("", "")
     stops = [(0.0, first, ""), *joints, (cut, last, "")]
     stops += [(1e3 * rod.from_cut_end(at), "S", "splice") for at in rod.record.splices]
     if along is not None:
@@ -357,11 +363,6 @@ def _section_marks(along: Stiffness) -> list[tuple[float, str]]:
     return [(at, _size(size)) for at, size in zip(along.at[1:-1], along.sizes[1:-1], strict=False)]
 
 
-def _end_sizes(along: Stiffness) -> tuple[str, str]:
-    """The same at both ends."""
-    return (_size(along.sizes[0]), _size(along.sizes[-1])) if along.sizes else ("", "")
-
-
 def _size(metres: float) -> str:
     return f"\N{EMPTY SET}{1e3 * metres:.3g}"
 
@@ -379,11 +380,8 @@ def _stop(
         here, other = rod.record.layer, layer.get(name)
         below = here is not None and other is not None and other > here
         pencil.mark((at, y), 0.35 * text, "MARK", pen=Pen("#b3372c", 0.07 * text, fill="#b3372c" if below else PAPER))
-    elif kind == "splice":
-        pencil.line([(at, y - 0.5 * text), (at, y + 0.5 * text)], "MARK", pen=Pen(INK, 0.2 * text))
-    elif kind == "section":
-        corners = [(at - 0.25 * text, y - 0.5 * text), (at, y), (at + 0.25 * text, y - 0.5 * text)]
-        pencil.line(corners, "MARK", pen=Pen(INK, 0.07 * text))
-    elif kind == "support":
-        corners = [(at, y), (at - 0.4 * text, y - 0.7 * text), (at + 0.4 * text, y - 0.7 * text)]
-        pencil.line(corners, "MARK", closed=True, pen=Pen(INK, 0.07 * text))
+    elif kind in _SIGNS:
+        points, closed, width = _SIGNS[kind]
+        pencil.line(
+            [(at + u * text, y + v * text) for u, v in points], "MARK", closed=closed, pen=Pen(INK, width * text)
+        )

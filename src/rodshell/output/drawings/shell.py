@@ -52,6 +52,12 @@ def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
     return [1e3 * positions[rod.nodes] for rod in meshed_rods(archive)]
 
 
+def final_curves(archive: Archive) -> list[Floats]:
+    """The same in the final shape, which there has to be."""
+    assert archive.final is not None
+    return rod_curves(archive, archive.states[archive.final])
+
+
 def _stopped(archive: Archive) -> str:
     """For titles: that the final shape is not one of equilibrium, and that its ends may not be at their supports."""
     lost = archive.final is not None and archive.is_lost(archive.final)
@@ -60,9 +66,7 @@ def _stopped(archive: Archive) -> str:
 
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
     """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions."""
-    pencil, final = Pencil(), archive.final
-    assert final is not None
-    curves = rod_curves(archive, archive.states[final])
+    pencil, curves = Pencil(), final_curves(archive)
     heights = np.concatenate(curves)[:, 2]
     tall, rounding = float(np.ptp(heights)) + 10 * text, rounding_of(archive.results)
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
@@ -147,8 +151,7 @@ def apart(curves: Iterable[Floats]) -> list[Floats]:
 
 def _seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
     """The rods of the final shape, pale."""
-    assert archive.final is not None
-    for curve in rod_curves(archive, archive.states[archive.final]):
+    for curve in final_curves(archive):
         pencil.line(_thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
 
 
@@ -178,11 +181,9 @@ def axes(pencil: Pencil, text: float) -> None:
 
 def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
-    pencil, final = Pencil(), archive.final
-    assert final is not None
+    pencil, drawn = Pencil(), meshed_rods(archive)
     _seen_from_above(pencil, archive, text)
-    drawn = meshed_rods(archive)
-    curves = [curve[:, :2] for curve in rod_curves(archive, archive.states[final])]
+    curves = [curve[:, :2] for curve in final_curves(archive)]
     ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
     arrives = np.array([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).reshape(-1, 2)
     arrives /= np.maximum(np.linalg.norm(arrives, axis=1), 1e-9)[:, None]
