@@ -100,8 +100,7 @@ def fabricate(
     if prestrain is not None:
         number("prestrain", prestrain)
     rods, crossings = mesh.grid.rods, mesh.grid.crossings
-    lengths = np.array([rod_line.length for rod_line in rods])
-    cut = lengths + 2 * options.end_allowance
+    cut = np.array([rod_line.length for rod_line in rods]) + 2 * options.end_allowance
     made, warnings = _laths(mesh, options, curvature)
     more = dict[str, Any]()
     if options.stock_length is not None and not warnings:
@@ -118,15 +117,12 @@ def fabricate(
         pairs = diagonals(mesh.grid, pattern)
         if to_supports:
             pairs = np.vstack([pairs, rim_diagonals(mesh.grid, pattern) + [0, len(mesh.joint_pairs)]])
-
-        def apart(points: Floats) -> list[float]:
-            distances: list[float] = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1).tolist()
-            return distances
-
-        points = [*mesh.grid.joint_names, *mesh.grid.support_names]
+        names = [*mesh.grid.joint_names, *mesh.grid.support_names]
+        both = np.stack([flat, there], axis=1)
+        lengths = np.linalg.norm(both[pairs[:, 0]] - both[pairs[:, 1]], axis=2).tolist()
         bracing = tuple(
-            Brace(start=points[a], end=points[b], flat=laid, final=spanned)
-            for (a, b), laid, spanned in zip(pairs.tolist(), apart(flat), apart(there), strict=True)
+            Brace(start=names[a], end=names[b], flat=laid, final=spanned)
+            for (a, b), (laid, spanned) in zip(pairs.tolist(), lengths, strict=True)
         )
         if prestrain is not None:
             bracing = tuple(brace.changed(cut=(brace.final or 0.0) / (1.0 + prestrain)) for brace in bracing)

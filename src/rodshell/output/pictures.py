@@ -122,21 +122,6 @@ LEVEL = 0.01  # of its width: an outline that rises more is not filled, which wo
 FADE = 0.42  # share of paper in the colour of the farthest rods
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
-    """Parts of rods between two drawn nodes, rod by rod.
-
-    Args:
-        drawn: (d,) entries of `rod_nodes` that are drawn.
-        first: (s,) at which of them each piece begins; it ends at the next.
-        rod: (s,) index of its rod.
-    """
-
-    drawn: Ints
-    first: Ints
-    rod: Ints
-
-
 def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
     """A picture of "flat", "draped", "popped_pinned", "popped_clamped" or "stage_1", ... as a complete SVG.
 
@@ -259,13 +244,13 @@ def _view_of_all(archive: Archive) -> View:
     return View.of(np.concatenate([*shells, *archive.states["history"]]), WIDTH)
 
 
-def _pieces(archive: Archive, length: float) -> Pieces:
-    """Pieces of about a length [m]: of rods with shorter edges, nodes are left out evenly."""
+def _pieces(archive: Archive, length: float) -> tuple[Ints, Ints, Ints]:
+    """Entries (d,) of `rod_nodes` that are drawn, at which of them each piece (s,) of a rod to the next begins, and the
+    index (s,) of its rod. A piece has about a length [m]: of rods with shorter edges, nodes are left out evenly."""
     rods = meshed_rods(archive)
     whole, edges = sum(rod.length for rod in rods), sum(len(rod.nodes) - 1 for rod in rods)
     stride = max(1, round(length * edges / max(whole, 1e-12)))
-    drawn, first = list[int](), 0
-    owner = list[int]()
+    drawn, owner, first = list[int](), list[int](), 0
     for k, rod in enumerate(rods):
         last = first + len(rod.nodes) - 1
         chosen = [*range(first, last, stride), last]
@@ -274,7 +259,7 @@ def _pieces(archive: Archive, length: float) -> Pieces:
         first = last + 1
     of_rod = np.array(owner, dtype=np.intp)
     begins = np.flatnonzero(of_rod[1:] == of_rod[:-1])
-    return Pieces(np.array(drawn, dtype=np.intp), begins, of_rod[begins])
+    return np.array(drawn, dtype=np.intp), begins, of_rod[begins]
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,21 +283,21 @@ class _Rods:
     @staticmethod
     def of(archive: Archive, view: View, shape: Shape, scale: Scale | None, share: float = 1.0) -> "_Rods":
         """Of a shape, whose lengths are drawn at a share of the view's scale."""
-        rods, pieces = meshed_rods(archive), _pieces(archive, PIECE / (share * view.scale))
-        nodes = archive.states["rod_nodes"][pieces.drawn]
+        rods, (drawn, first, of_rod) = meshed_rods(archive), _pieces(archive, PIECE / (share * view.scale))
+        nodes = archive.states["rod_nodes"][drawn]
         nearness = view.depth(shape.positions)[nodes]
-        near = 0.5 * (nearness[pieces.first] + nearness[pieces.first + 1])
+        near = 0.5 * (nearness[first] + nearness[first + 1])
         layer = np.minimum((near * DEPTHS).astype(np.intp), DEPTHS - 1)
         if scale is None:
             families = family_numbers(rod.family for rod in rods)
-            shade = (np.array(families, dtype=np.intp) % len(FAMILIES))[pieces.rod]
+            shade = (np.array(families, dtype=np.intp) % len(FAMILIES))[of_rod]
             palette, fade = list(FAMILIES), 0.0 if shape.flat else FADE
         else:
-            bins = scale.bins[pieces.drawn]
-            shade = np.rint(0.5 * (bins[pieces.first] + bins[pieces.first + 1])).astype(np.intp)
+            bins = scale.bins[drawn]
+            shade = np.rint(0.5 * (bins[first] + bins[first + 1])).astype(np.intp)
             palette, fade = scale.palette, FADE
         pen = float(np.clip(0.12 * WIDTH / max(len(rods), 1), 0.45, 1.7))
-        halos, lines = (_polylines(pieces, layer, shades) for shades in (np.zeros_like(shade), shade))
+        halos, lines = (_polylines(first, layer, shades) for shades in (np.zeros_like(shade), shade))
         return _Rods(view.project(shape.positions)[nodes], halos, lines, palette, fade, pen)
 
     def draw(self, pencil: Pencil, layers: range, *, halos: bool = True) -> None:
@@ -337,10 +322,10 @@ def _nearness(depth: int) -> float:
     return (depth + 0.5) / DEPTHS
 
 
-def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
+def _polylines(first: Ints, layer: Ints, shade: Ints) -> Polylines:
     """Pieces that follow each other on a rod in one layer and shade as one; the shades of a layer ascend."""
     order = np.lexsort((shade, layer))
-    first, layer, shade = pieces.first[order], layer[order], shade[order]
+    first, layer, shade = first[order], layer[order], shade[order]
     ends = np.flatnonzero((np.diff(layer) != 0) | (np.diff(shade) != 0) | (np.diff(first) > 1))
     begin, end = (np.concatenate(parts)[: len(first)] for parts in (([0], ends + 1), (ends, [len(first) - 1])))
     columns = (layer[begin], shade[begin], first[begin], first[end] + 2)

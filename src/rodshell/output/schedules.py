@@ -22,7 +22,7 @@ from rodshell.figures.form import Meeting, Stiffness
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends, printable
 from rodshell.geometry.frames import unit
-from rodshell.output.grid import GridRod, along, end_nodes, joints_of, rods_of
+from rodshell.output.grid import GridJoint, GridRod, along, end_nodes, joints_of, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.states import POPPED
@@ -39,7 +39,7 @@ UNITS = {
     "N": "N",
     "Nm": "N m",
 }
-UNKNOWN = (np.nan, np.nan, np.nan)  # force or tangent
+UNKNOWN = (np.nan, np.nan, np.nan)  # force
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
 Show = Callable[[float | None], str]
 
@@ -155,26 +155,21 @@ def joints_table(archive: Archive) -> Table:
     The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines.
     """
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
-    placed = [_joints_in_space(archive, rod, final) for rod in rods]
-    joints, ways = joints_of(rods), np.array([rod.flat[1] - rod.flat[0] for rod in rods]).reshape(-1, 2)
+    joints = joints_of(rods)
     pairs = [(rods[i], rods[j]) for i, j in (joint.rods for joint in joints)]
-    in_space = [(placed[i].get(rods[j].id), placed[j].get(rods[i].id)) for i, j in (joint.rods for joint in joints)]
-    first, second = np.array([joint.rods for joint in joints], dtype=np.intp).reshape(-1, 2).T
-    flats = _degrees(ways[first], ways[second])
-    tangents = np.array([[UNKNOWN if on is None else on[1] for on in pair] for pair in in_space]).reshape(-1, 2, 3)
-    angles = _degrees(tangents[:, 0], tangents[:, 1])
+    ways = np.array([[rod.flat[1] - rod.flat[0] for rod in pair] for pair in pairs]).reshape(-1, 2, 2)
+    points, tangents = _in_space(archive, rods, joints, final)
+    flats, angles = _degrees(ways[:, 0], ways[:, 1]), _degrees(tangents[:, 0], tangents[:, 1])
+    known = np.isfinite(points[:, 0, 0]).tolist()
+    at = [[rods[k].from_cut_end(s) for k, s in zip(joint.rods, joint.at, strict=True)] for joint in joints]
     table = {
         "id": [joint.id for joint in joints],
-        "rod_a": [a.id for a, _ in pairs],
-        "rod_b": [b.id for _, b in pairs],
-        "at_a_from_cut_end_mm": [mm(a.from_cut_end(joint.at[0])) for (a, _), joint in zip(pairs, joints, strict=True)],
-        "at_b_from_cut_end_mm": [mm(b.from_cut_end(joint.at[1])) for (_, b), joint in zip(pairs, joints, strict=True)],
+        **_in_columns(("rod_a", "rod_b"), [(a.id, b.id) for a, b in pairs]),
+        **_by_axis("at_", "_from_cut_end_mm", at, mm, "ab"),
         "over": [joint.over(rods) for joint in joints],
-        **_by_axis(
-            "flat_", "_mm", [a.point(joint.at[0]) for (a, _), joint in zip(pairs, joints, strict=True)], mm, "xy"
-        ),
-        "final_state": [(final or "") if on_a else "" for on_a, _ in in_space],
-        **_by_axis("final_", "_mm", [on_a and on_a[0] for on_a, _ in in_space], mm),
+        **_by_axis("flat_", "_mm", [rods[joint.rods[0]].point(joint.at[0]) for joint in joints], mm, "xy"),
+        "final_state": [(final or "") if there else "" for there in known],
+        **_by_axis("final_", "_mm", points[:, 0].tolist(), mm),
         "flat_deg": [_number(angle, 2) for angle in flats.tolist()],
         "final_deg": [_number(angle, 2) for angle in angles.tolist()],
         "scissor_deg": [_number(angle, 2) for angle in (angles - flats).tolist()],
@@ -321,18 +316,23 @@ def _joints_at(rod: GridRod, mm: Show) -> str:
     )
 
 
-def _joints_in_space(archive: Archive, rod: GridRod, state: str | None) -> dict[str, tuple[Floats, Floats]]:
-    """Position (3,) [m] and a tangent (3,) of a rod at its joints, by the rod that is met; empty if not known."""
-    if state is None or not len(rod.nodes) or "flat" not in archive.states:
-        return {}
-    flat, x = archive.states["flat"][rod.nodes], archive.states[state][rod.nodes]
-    stations = along(flat)
-    at = np.array([at for _, at in rod.joints])
-    step = 0.5 * np.diff(stations).min()  # stays within the edges on both sides
-    before, position, after = (
-        np.column_stack([np.interp(s, stations, x[:, axis]) for axis in range(3)]) for s in (at - step, at, at + step)
-    )
-    return {other: (position[k], after[k] - before[k]) for k, (other, _) in enumerate(rod.joints)}
+def _in_space(
+    archive: Archive, rods: Sequence[GridRod], joints: Sequence[GridJoint], state: str | None
+) -> tuple[Floats, Floats]:
+    """Position (c, 2, 3) [m] of both rods at each joint, and a tangent (c, 2, 3); NaN where they are not known."""
+    on = np.array([joint.rods for joint in joints], dtype=np.intp).reshape(-1, 2)
+    at = np.array([joint.at for joint in joints]).reshape(-1, 2)
+    points, tangents = np.full((2, len(joints), 2, 3), np.nan)
+    for k, rod in enumerate(rods if state in archive.states and "flat" in archive.states else ()):
+        x, stations = archive.states[state or ""][rod.nodes], along(archive.states["flat"][rod.nodes])
+        if len(x):
+            here, step = on == k, 0.5 * np.diff(stations).min()  # stays within the edges on both sides
+            before, points[here], after = (
+                np.column_stack([np.interp(s, stations, x[:, axis]) for axis in range(3)])
+                for s in (at[here] - step, at[here], at[here] + step)
+            )
+            tangents[here] = after - before
+    return points, tangents
 
 
 def _degrees(a: Floats, b: Floats) -> Floats:

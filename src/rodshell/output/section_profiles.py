@@ -10,9 +10,6 @@ WIDTH, HEIGHT = 640, 300
 LEFT, RIGHT, TOP, BOTTOM = 64, 150, 24, 48
 MOST = 8  # lines that are named
 COLOURS = ("#1f5f8b", "#b3372c", "#2b7a4b", "#a86a08", "#6a4c93", "#0f7c85", "#8c564b", "#4a5560")
-_WHAT = {
-    "size": "size", "width": "width", "height": "height", "a": "axis a", "b": "axis b", "laths": "laths",
-}  # fmt: skip
 
 
 def profiles_svg(rods: Sequence[Rod]) -> str | None:
@@ -75,7 +72,7 @@ def _names(names: list[str], count: int) -> str:
 
 def _range(along: Stiffness) -> str:
     """What changes, from the smallest to the largest."""
-    what = _WHAT.get(along.varies or "", along.varies or "")
+    what = f"axis {along.varies}" if along.varies in ("a", "b") else along.varies or ""
     if along.sizes:
         return f"{what} {rounded(1e3 * min(along.sizes))} to {rounded(1e3 * max(along.sizes))} mm"
     return f"{min(along.factors):g} to {max(along.factors):g} {what}"
