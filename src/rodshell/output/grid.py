@@ -13,7 +13,6 @@ from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
 from rodshell.results.archive import Archive, made_once
-from rodshell.results.laths import laths_on
 from rodshell.results.states import BENT, DRAPED, GAP, POPPED, shells_among
 from rodshell.rods.supports import SUPPORTS
 
@@ -65,11 +64,6 @@ class GridRod:
     def cut_length(self) -> float:
         """With its end allowances [m]."""
         return self.length if self.record.cut_length is None else self.record.cut_length
-
-    @property
-    def laths(self) -> tuple[tuple[float, float], ...]:
-        """The cut ends of each lath that lies on it, from its start [m]."""
-        return laths_on(self.record)
 
     @property
     def allowance(self) -> float:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import isotonic_regression
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.boxes import boxes_meet, lines_meet, lines_near
@@ -200,24 +201,11 @@ def thin(line: Floats, width: float) -> Floats:
 
 
 def spread(positions: ArrayLike, gap: float) -> Floats:
-    """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares.
-
-    Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
-    """
+    """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares."""
     asked = np.asarray(positions, dtype=float)
-    order = np.argsort(asked, kind="stable")
-    wanted = asked[order] - gap * np.arange(len(asked))  # now they need only be ascending
-    groups: list[tuple[float, int]] = []
-    for value in wanted.tolist():
-        group = (value, 1)
-        while groups and groups[-1][0] > group[0]:
-            mean, count = groups.pop()
-            group = ((mean * count + group[0] * group[1]) / (count + group[1]), count + group[1])
-        groups.append(group)
+    order, apart = np.argsort(asked, kind="stable"), gap * np.arange(len(asked))
     result = np.empty_like(asked)
-    result[order] = np.concatenate([np.full(n, mean) for mean, n in groups] or [np.empty(0)]) + gap * np.arange(
-        len(asked)
-    )
+    result[order] = isotonic_regression(asked[order] - apart).x + apart
     return result
 
 

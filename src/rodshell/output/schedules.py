@@ -25,6 +25,7 @@ from rodshell.geometry.frames import unit
 from rodshell.output.grid import GridJoint, GridRod, along, end_nodes, joints_of, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
+from rodshell.results.laths import laths_on
 from rodshell.results.states import POPPED
 from rodshell.results.wording import FINEST, Rounding, rounding_of
 from rodshell.rods.supports import finals_first
@@ -87,7 +88,7 @@ def rods_table(archive: Archive) -> Table:
         "max_stress_pop_up_MPa": lambda rod: _mpa(rod.record.pop_up.max_stress if rod.record.pop_up else None),
         "utilisation_pop_up": lambda rod: _number(rod.record.pop_up.utilisation if rod.record.pop_up else None, 3),
         "splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.record.splices),
-        "second_laths_mm": lambda rod: "; ".join(mm(stop - start) for start, stop in rod.laths),
+        "second_laths_mm": lambda rod: "; ".join(mm(stop - start) for start, stop in laths_on(rod.record)),
         "second_laths_splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
     }
     table = {name: [cell(rod) for rod in rods] for name, cell in columns.items()}

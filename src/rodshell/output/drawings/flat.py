@@ -10,6 +10,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Bools, Floats
 from rodshell.figures.form import Stiffness
@@ -249,12 +251,8 @@ def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
     """The rods along x and y of each joint of such two, grid by grid."""
     pairs = [joint.rods for joint in plan.joints if [plan.rods[k].axis for k in joint.rods] == [0, 1]]
     first, second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-    patch = np.arange(len(plan.rods))  # each rod is of the patch of the first one that it leads to
-    while (patch[first] != patch[second]).any():
-        low = np.minimum(patch[first], patch[second])
-        np.minimum.at(patch, first, low)
-        np.minimum.at(patch, second, low)
-    patch = patch[first]
+    met = coo_array((np.ones(len(pairs)), (first, second)), shape=2 * (len(plan.rods),))
+    patch = connected_components(met)[1][first]
     return [[pair for pair, k in zip(pairs, patch, strict=True) if k == name] for name in dict.fromkeys(patch)]
 
 
