@@ -195,9 +195,9 @@ def wanted_kinds(only: str | None) -> list[str] | None:
     """
     if only is None:
         return None
-    from rodshell.output.files import read_kinds
+    from rodshell.output import files
 
-    return read_kinds(only)
+    return files.wanted_kinds(only)
 
 
 def seconds_of(given: str | None) -> float | None:

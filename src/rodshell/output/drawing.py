@@ -1,7 +1,7 @@
 """A drawing: paths, marks and texts on named layers, y up [mm]. DXF, SVG, PDF and PNG are written from it."""
 
 import pathlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress, pairwise
@@ -17,6 +17,7 @@ _Anchor = Literal["start", "middle", "end"]
 T = TypeVar("T", float, Floats)
 
 INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"
+FAMILIES = ("#1f5f8b", "#a8552a", "#2b7a4b")  # of the rods of a grid's first, second and third family
 LETTER = 0.62  # width of a capital or digit over the text size
 TEXT = 3.43  # mm: size of usual texts on paper, whose capitals are 2.5 mm high, the usual nominal size of ISO 3098
 SMALL = 0.75  # size of the smallest texts over the usual one: where capitals are 2.5 mm high, these have 1.9 mm
@@ -148,7 +149,6 @@ def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[
     """x and y of the four corners of a text's room, or of many: of numbers, or of arrays (t,).
 
     Args:
-        x, y: where its baseline starts, is centred or ends.
         c, s: cosine and sine of the angle of its baseline.
         back: where it begins, see `BACK`.
     """
@@ -219,42 +219,28 @@ class Drawing:
         )
 
     def placed(self, scale: float, shift: Floats) -> "Drawing":
-        """The drawing scaled about the origin, with its pens and texts, then shifted. Paths in space are left out.
+        """The drawing scaled about the origin, with pens and texts, then shifted (2,) [mm]; without paths in space."""
 
-        Args:
-            scale: new lengths over old ones.
-            shift: (2,) [mm].
-        """
-        paths = [path for path in self.paths if path.flat]
-        used = {id(pen): pen for pen in (*(path.pen for path in paths), *(mark.pen for mark in self.marks))}
-        pens = {key: _scaled(pen, scale) for key, pen in used.items()}
-        at = _moved([*(mark.at for mark in self.marks), *(text.at for text in self.texts)], scale, shift)
-        marks, texts = at[: len(self.marks)], at[len(self.marks) :]
-        return Drawing(
-            self.name,
-            self.title,
-            scale * self.text,
-            tuple(
-                Path(points, path.layer, path.closed, pens[id(path.pen)], path.name, path.note)
-                for path, points in zip(paths, _moved([path.points for path in paths], scale, shift), strict=True)
+        def moved(points: Floats) -> Floats:
+            return np.asarray(scale * points + shift)
+
+        def pen(item: Path | Mark) -> Pen | None:
+            look = item.pen
+            return look and look._replace(width=scale * look.width, dash=tuple(scale * dash for dash in look.dash))
+
+        return replace(
+            self,
+            text=scale * self.text,
+            paths=tuple(path._replace(points=moved(path.points), pen=pen(path)) for path in self.paths if path.flat),
+            marks=tuple(
+                mark._replace(at=moved(mark.at), radius=scale * mark.radius, pen=pen(mark)) for mark in self.marks
             ),
-            tuple(
-                Mark(place, scale * mark.radius, mark.layer, pens[id(mark.pen)], mark.note)
-                for mark, place in zip(self.marks, marks, strict=True)
-            ),
-            tuple(
-                Text(t.text, place, scale * t.size, t.layer, t.anchor, t.angle, t.bold, t.colour, t.halo)
-                for t, place in zip(self.texts, texts, strict=True)
-            ),
-            self.left_out,
+            texts=tuple(text._replace(at=moved(text.at), size=scale * text.size) for text in self.texts),
         )
 
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
-        """The part within a rectangle; marks and texts that cross its border, and paths in space, are left out.
-
-        Args:
-            low, high: (2,) lower left and upper right corner of the rectangle [mm].
-        """
+        """The part within the rectangle from `low` to `high` (2,) [mm]; paths in space are left out, and marks and
+        texts that cross its border."""
         flat = [path for path in self.paths if path.flat]
         extents = self._extents
         inside, marks, texts = (np.all((lowest >= low) & (highest <= high), axis=1) for lowest, highest in extents)
@@ -288,77 +274,29 @@ class Pencil:
     left_out: list[str] = field(default_factory=list)
 
     def line(self, points: Iterable[Iterable[float]], layer: str, **look: object) -> None:
-        """Add a polyline.
-
-        Args:
-            points: (k, 2), or (k, 3) in space [mm].
-            layer: a key of `LAYERS`.
-            look: further fields of `Path`, such as its pen.
-        """
+        """Add a polyline of points (k, 2), or (k, 3) in space [mm]."""
         self.paths.append(Path(np.array(points, dtype=float), layer, **look))  # type: ignore[arg-type]
 
     def mark(self, at: Iterable[float], radius: float, layer: str, **look: object) -> None:
-        """Add a circle.
-
-        Args:
-            at: (2,) its middle [mm].
-            radius: [mm].
-            layer: a key of `LAYERS`.
-            look: further fields of `Mark`, such as its pen.
-        """
+        """Add a circle about `at` (2,) [mm]."""
         self.marks.append(Mark(np.array(at, dtype=float), radius, layer, **look))  # type: ignore[arg-type]
 
     def write(self, text: str, at: Iterable[float], size: float, layer: str, **look: object) -> None:
-        """Add a line of text.
-
-        Args:
-            at: (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
-            size: of the font [mm].
-            layer: a key of `LAYERS`.
-            look: further fields of `Text`, such as its anchor.
-        """
+        """Add a line of text; `at` (2,) [mm] as of `Text`."""
         self.texts.append(Text(text, np.array(at, dtype=float), size, layer, **look))  # type: ignore[arg-type]
 
     def leave_out(self, count: int, of: int, what: str) -> None:
-        """Record that texts found no room.
-
-        Args:
-            count: number of texts that were left out; nothing is recorded for 0.
-            of: number of all such texts.
-            what: what the texts are, in words.
-        """
+        """Record that `count` of such texts found no room, in words; nothing for 0."""
         if count:
             self.left_out.append(f"{'all' if count == of > 1 else count} of {of} {what}")
 
     def done(self, name: str, title: str, text: float) -> Drawing:
-        """The drawing of all that was added.
-
-        Args:
-            title: of the drawing, in words.
-            text: usual size of its texts [mm].
-        """
+        """The drawing of all that was added, `text` being the usual size of its texts [mm]."""
         return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts), tuple(self.left_out))
 
 
-def _scaled(pen: Pen | None, scale: float) -> Pen | None:
-    return pen and Pen(pen.colour, scale * pen.width, tuple(scale * dash for dash in pen.dash), pen.fill)
-
-
-def _moved(groups: Sequence[Floats], scale: float, shift: Floats) -> list[Floats]:
-    """Points (..., 2) in groups, scaled about the origin and then shifted: all at once, since groups are many."""
-    if not groups:
-        return []
-    stops = np.cumsum([points.size // 2 for points in groups]).tolist()
-    moved = scale * np.concatenate([points.reshape(-1, 2) for points in groups]) + shift
-    return [moved[a:b].reshape(points.shape) for a, b, points in zip([0, *stops], stops, groups, strict=False)]
-
-
 def within(box: Floats, low: Floats, high: Floats) -> bool:
-    """Whether all points (k, 2) lie in a rectangle.
-
-    Args:
-        box: (k, 2) points; low, high : (2,) lower left and upper right corner of the rectangle.
-    """
+    """Whether all points (k, 2) lie in the rectangle from `low` to `high` (2,)."""
     (left, bottom), (right, top) = low.tolist(), high.tolist()
     return all(left <= x <= right and bottom <= y <= top for x, y in box.tolist())
 

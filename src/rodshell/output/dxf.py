@@ -28,7 +28,6 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
     """The text of a DXF file: a LINE, LWPOLYLINE or 3D POLYLINE for each path, a CIRCLE a mark, a TEXT a text.
 
     Args:
-        drawing: at 1:1 [mm].
         names: for some layers the name that they take in the file (see `layer_names`).
     """
     document = ezdxf.new("R2010", units=ezdxf.units.MM)
@@ -45,11 +44,8 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
 
 
 def layer_names(names: Mapping[str, str]) -> dict[str, str]:
-    """The name of each layer in a file: without characters that DXF forbids, and unique in upper and lower case.
-
-    Args:
-        names: the wished names of some layers, by those of `LAYERS`.
-    """
+    """The name of each layer in a file, by a wish or its own: without characters that DXF forbids, and unique in upper
+    and lower case."""
     shown, taken = dict[str, str](), {"0", "DEFPOINTS"}  # which every file has
     for layer in LAYERS:
         asked = "".join("_" if letter in FORBIDDEN else letter for letter in printable(str(names.get(layer, layer))))

@@ -1,5 +1,6 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -12,13 +13,13 @@ from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
 from rodshell.results.archive import Archive, made_once
-from rodshell.results.laths import laths_on
 from rodshell.results.states import BENT, DRAPED, GAP, POPPED, shells_among
 from rodshell.rods.supports import SUPPORTS
 
 CAPTIONS = {"flat": "Flat, as cut and laid out", DRAPED: "Draped on the target"}
 STAGE = "stage_"
 FEWEST = 3  # ends of an outline
+AXES = {"u": 0, "v": 1}  # that rods of a family run along, by the format of result.json
 STRAIGHT = 1e-6  # of a rod's length, which it leaves its chord by: it is straight
 
 
@@ -45,6 +46,11 @@ class GridRod:
         return self.record.family
 
     @property
+    def axis(self) -> int | None:
+        """The axis of the flat plan that it runs along at its offset, x or y; None: it has both its own ends."""
+        return None if self.record.offset is None else AXES.get(self.record.family)
+
+    @property
     def length(self) -> float:
         """Between its supports [m]."""
         return self.record.end - self.record.start if self.record.length is None else self.record.length
@@ -58,11 +64,6 @@ class GridRod:
     def cut_length(self) -> float:
         """With its end allowances [m]."""
         return self.length if self.record.cut_length is None else self.record.cut_length
-
-    @property
-    def laths(self) -> tuple[tuple[float, float], ...]:
-        """The cut ends of each lath that lies on it, from its start [m]."""
-        return laths_on(self.record)
 
     @property
     def allowance(self) -> float:
@@ -120,12 +121,28 @@ class GridJoint:
 @made_once
 def rods_of(archive: Archive) -> list[GridRod]:
     """All rods, in the order of the result."""
-    nodes = _nodes(archive)
-    flat = archive.states.get("flat")
-    return [
-        _grid_rod(rod, nodes[k] if k < len(nodes) else np.empty(0, dtype=np.intp), flat)
-        for k, rod in enumerate(archive.results.rods)
-    ]
+    states, rods, nodes = archive.states, archive.results.rods, list[Ints]()
+    if "rod_nodes" in states and "rod_start" in states:
+        nodes = np.split(states["rod_nodes"].astype(np.intp), states["rod_start"][1:])
+    nodes += [np.empty(0, dtype=np.intp)] * len(rods)
+    return [_grid_rod(rod, along, states.get("flat")) for rod, along in zip(rods, nodes, strict=False)]
+
+
+def meshed_rods(archive: Archive) -> list[GridRod]:
+    """The rods whose nodes the states hold: all, or none."""
+    return [rod for rod in rods_of(archive) if len(rod.nodes)]
+
+
+def end_nodes(rods: Iterable[GridRod]) -> Ints:
+    """(2 m,) the nodes of start and end of each rod in turn."""
+    return np.array([rod.nodes[[0, -1]] for rod in rods], dtype=np.intp).ravel()
+
+
+def family_numbers(families: Iterable[str]) -> list[int]:
+    """For the family of each rod, which one of the grid it is, from 0, in the order in which they come."""
+    names = list(families)
+    numbers = {family: k for k, family in enumerate(dict.fromkeys(names))}
+    return [numbers[family] for family in names]
 
 
 def joints_of(rods: list[GridRod]) -> list[GridJoint]:
@@ -141,36 +158,30 @@ def joints_of(rods: list[GridRod]) -> list[GridJoint]:
 
 
 def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
-    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods.
-
-    Args:
-        positions: (n, 3) nodes of a shape [m].
-    """
-    return {name: positions[nodes].mean(axis=0) for name, nodes in _joint_nodes(archive).items()}
+    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods."""
+    nodes = archive.states.get("rod_nodes", np.empty(0))
+    return {joint.id: positions[nodes[entries]].mean(axis=0) for joint, entries in joint_entries(archive)}
 
 
 def outlines_of(rods: list[GridRod]) -> list[Ints]:
-    """Rod ends along each outline of the flat grid, see `outlines`.
-
-    Args:
-        rods: those that are drawn; the ends of rod k are 2 k and 2 k + 1.
-    """
+    """Rod ends along each outline of the flat grid, those of rod k being 2 k and 2 k + 1, see `outlines`."""
     return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
 
 
 @made_once
-def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
-    """The nodes of each joint that has some, on both of its rods, by its id: one node twice, or one in either layer."""
-    rods, flat = rods_of(archive), archive.states.get("flat")
-    nodes = dict[str, list[int]]()
-    if flat is None:
-        return nodes
+def joint_entries(archive: Archive) -> list[tuple[GridJoint, list[int]]]:
+    """Every joint of rods that have nodes, and the entry of `rod_nodes` on either rod that lies nearest to it: one node
+    twice, or one in either layer."""
+    if "flat" not in archive.states:
+        return []
+    rods, flat = meshed_rods(archive), archive.states["flat"]
+    starts: list[int] = np.cumsum([0, *(len(rod.nodes) for rod in rods)]).tolist()
     stations = [along(flat[rod.nodes]) for rod in rods]
-    for joint in joints_of(rods):
-        if all(len(rods[k].nodes) for k in joint.rods):
-            pairs = zip(joint.rods, joint.at, strict=True)
-            nodes[joint.id] = [int(rods[k].nodes[np.abs(stations[k] - at).argmin()]) for k, at in pairs]
-    return nodes
+
+    def entry(rod: int, at: float) -> int:
+        return starts[rod] + int(np.abs(stations[rod] - at).argmin())
+
+    return [(joint, [*map(entry, joint.rods, joint.at)]) for joint in joints_of(rods)]
 
 
 @lru_cache(maxsize=4)
@@ -179,24 +190,16 @@ def _outlines(flat: bytes) -> list[Ints]:
     return outlines(np.frombuffer(flat).reshape(-1, 2, 2))
 
 
-def _nodes(archive: Archive) -> list[Ints]:
-    if "rod_nodes" not in archive.states or "rod_start" not in archive.states:
-        return []
-    return np.split(archive.states["rod_nodes"].astype(np.intp), archive.states["rod_start"][1:])
-
-
 def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
-    if rod.family == "u" and rod.offset is not None:
-        course = np.array([[rod.start, rod.offset], [rod.end, rod.offset]])
-    elif rod.family == "v" and rod.offset is not None:
-        course = np.array([[rod.offset, rod.start], [rod.offset, rod.end]])
+    course = np.array([[rod.start, 0.0], [rod.end, 0.0]])
+    if rod.offset is not None and rod.family in AXES:
+        course = np.full((2, 2), rod.offset)
+        course[:, AXES[rod.family]] = rod.start, rod.end
     elif flat is not None and len(nodes):
         course = np.asarray(flat[nodes, :2], dtype=np.float64)
         chord, off = course[-1] - course[0], course - course[0]
         if np.abs(off[:, 0] * chord[1] - off[:, 1] * chord[0]).max() < STRAIGHT * float(chord @ chord):
             course = course[[0, -1]]
-    else:
-        course = np.array([[rod.start, 0.0], [rod.end, 0.0]])
     return GridRod(rod, course, nodes)
 
 
@@ -239,11 +242,7 @@ def lies_flat(archive: Archive) -> bool:
 
 
 def caption_of(archive: Archive, state: str) -> str:
-    """What a state shows, in words.
-
-    Args:
-        state: "flat", or one in space.
-    """
+    """What a state shows, in words."""
     if archive.is_lost(state):
         return f"Not popped up, {state.removeprefix(POPPED)} ends: where the computation stopped"
     return CAPTIONS.get(state) or f"Popped up, {supported(state)}"
@@ -257,10 +256,7 @@ def supported(state: str, *more: str) -> str:
 
 
 def shape_of(archive: Archive, name: str) -> Shape:
-    """A shape by its name.
-
-    Args:
-        name: one of `shape_names`.
+    """A shape by its name, one of `shape_names`.
 
     Raises:
         OutputError: the archive has no such shape.
@@ -283,14 +279,11 @@ def shape_of(archive: Archive, name: str) -> Shape:
 def deployed_shape(archive: Archive, name: str) -> Shape:
     """A shape as the deployment passes it: the flat grid not in the axes of its drawings, but where it is laid out on
     site before its ends move.
-
-    Args:
-        name: one of `shape_names`.
     """
     shape, final = shape_of(archive, name), archive.final
     if not shape.flat or final is None:
         return shape
-    ends = np.array([rod.nodes[[0, -1]] for rod in rods_of(archive) if len(rod.nodes) > 1], dtype=np.intp).ravel()
+    ends = end_nodes(meshed_rods(archive))
     return replace(shape, positions=laid_out(shape.positions, archive.states[final], ends))
 
 

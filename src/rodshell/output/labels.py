@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import isotonic_regression
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.boxes import boxes_meet, lines_meet, lines_near
@@ -60,10 +61,8 @@ WIDE = ()
 
 
 class Room:
-    """The boxes (4, 2) that are taken, found by the square of the plane that they lie in.
-
-    within : an outer room; what is taken there is taken here too.
-    """
+    """The boxes (4, 2) that are taken, also those `within` an outer room, found by the square of the plane that they
+    lie in."""
 
     def __init__(self, square: float, within: "Room | None" = None) -> None:
         self._square = square
@@ -124,8 +123,6 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
     A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
 
     Args:
-        texts: the label of each rod.
-        rods: (m, 2, 2) both ends of each rod.
         size: of the text, in the unit of `rods`.
         at: (m, 2) whether an end is to have one; default: all.
     """
@@ -155,10 +152,8 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
     The text covers none of the lines (m, 2, 2) either, the line to it may cross them.
 
     Args:
-        end: (2,) the rod's end that it belongs to.
         way: (2,) to the side that is tried first.
         size: of the text, in the unit of `end`.
-        lines: (m, 2, 2) lines that the text must not cover.
     """
     first = float(np.arctan2(way[1], way[0]))
     half = 0.5 * size * np.array([LETTER * len(text), LINE])
@@ -174,23 +169,14 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
 
 
 def take(label: Label, size: float, room: Room) -> None:
-    """Take the label's room, and that of the line to it.
-
-    Args:
-        size: of its text, in the unit of its coordinates.
-        room: in which its box is taken.
-    """
+    """Take the room of a label, its text of a size, and that of the line to it."""
     room.take(label.box(size))
     if label.moved:
         room.take(thin(label.leader(size), THIN * size))
 
 
 def _fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
-    """Whether a label and the line to it find room; the label must cover none of the lines.
-
-    Args:
-        size: of the text; room : what is taken; lines : (m, 2, 2), all in the unit of the label.
-    """
+    """Whether a label and the line to it find room; the label must cover none of the lines."""
     box = label.box(size)
     return (
         room.free(box)
@@ -200,24 +186,14 @@ def _fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
 
 
 def _off_its_mark(line: Floats, size: float) -> Floats:
-    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is.
-
-    Args:
-        line: (2, 2) from the mark to the label.
-        size: of the text, in the unit of the line; half of it is left out at the mark.
-    """
+    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is."""
     (ax, ay), (bx, by) = line.tolist()
     share = min(0.5 * size / max(hypot(bx - ax, by - ay), 1e-12), 0.9)
     return thin(np.array([(ax + share * (bx - ax), ay + share * (by - ay)), (bx, by)]), THIN * size)
 
 
 def thin(line: Floats, width: float) -> Floats:
-    """(4, 2) corners of the room of a line (2, 2).
-
-    Args:
-        line: (2, 2) its two ends.
-        width: of the room, in the unit of the line.
-    """
+    """(4, 2) corners of the room of a line (2, 2) of some width."""
     (ax, ay), (bx, by) = line.tolist()
     half = 0.5 * width / max(hypot(bx - ax, by - ay), 1e-12)
     x, y = half * (ay - by), half * (bx - ax)  # to the left
@@ -225,27 +201,11 @@ def thin(line: Floats, width: float) -> Floats:
 
 
 def spread(positions: ArrayLike, gap: float) -> Floats:
-    """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares.
-
-    Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
-
-    Args:
-        positions: (k,) positions on a line; gap : least distance of neighbours.
-    """
+    """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares."""
     asked = np.asarray(positions, dtype=float)
-    order = np.argsort(asked, kind="stable")
-    wanted = asked[order] - gap * np.arange(len(asked))  # now they need only be ascending
-    groups: list[tuple[float, int]] = []
-    for value in wanted.tolist():
-        group = (value, 1)
-        while groups and groups[-1][0] > group[0]:
-            mean, count = groups.pop()
-            group = ((mean * count + group[0] * group[1]) / (count + group[1]), count + group[1])
-        groups.append(group)
+    order, apart = np.argsort(asked, kind="stable"), gap * np.arange(len(asked))
     result = np.empty_like(asked)
-    result[order] = np.concatenate([np.full(n, mean) for mean, n in groups] or [np.empty(0)]) + gap * np.arange(
-        len(asked)
-    )
+    result[order] = isotonic_regression(asked[order] - apart).x + apart
     return result
 
 
@@ -258,9 +218,9 @@ def _on_own_line(text: str, end: Floats, other: Floats, size: float) -> Iterable
         yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2)
 
 
-def segments(course: Floats) -> Floats:
-    """(k - 1, 2, 2) the lines of a polyline (k, 2)."""
-    return np.stack([course[:-1], course[1:]], axis=1)
+def segments(courses: Iterable[Floats]) -> Floats:
+    """(m, 2, 2) the lines of polylines (k, 2)."""
+    return np.concatenate([np.empty((0, 2, 2)), *(np.stack([line[:-1], line[1:]], axis=1) for line in courses)])
 
 
 def closed_segments(outline: Floats) -> Floats:
@@ -297,9 +257,6 @@ def outward(points: Floats) -> Floats:
     """(k, 2) unit normals, to the right of an outline that is walked through the points (k, 2); 0 for a single one.
 
     At each place across the chord of its neighbours, so that points that nearly coincide do not turn it.
-
-    Args:
-        points: (k, 2) along an outline, in their order.
     """
     along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     return _unit(np.column_stack([along[:, 1], -along[:, 0]]))
@@ -320,7 +277,9 @@ def callouts(
     """
     best: _Tried | None = None
     for size, gap in ((text * share, gap) for gap in GAPS for share in _CALLOUT_SIZES):
-        tried = _tried(names, points, away, size, gap, room, lines)
+        taken, (starts, ways) = Room(4 * size, room), _slots(points, away, size, gap)
+        labels = [_free(*slot, size, taken, lines) for slot in zip(names, points, starts, ways, strict=True)]
+        tried = _Tried(labels, size, taken)
         best = tried if best is None or tried.missing < best.missing else best
         if not best.missing or (size <= text * SMALL and best.missing > MANY):
             break
@@ -347,15 +306,6 @@ class _Tried:
     @property
     def missing(self) -> int:
         return sum(label is None for label in self.labels)
-
-
-def _tried(
-    names: Sequence[str], points: Floats, away: Floats, size: float, gap: float, room: Room, lines: Floats
-) -> _Tried:
-    taken = Room(4 * size, room)
-    starts, ways = _slots(points, away, size, gap)
-    labels = [_free(*slot, size, taken, lines) for slot in zip(names, points, starts, ways, strict=True)]
-    return _Tried(labels, size, taken)
 
 
 def _elsewhere(

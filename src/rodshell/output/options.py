@@ -51,9 +51,6 @@ class OutputOptions(CheckOptions):
         """The same with the strengths of the rod's preset material, where none was given.
 
         A strength that is given alone, such as a reduced one, has a shear strength in the preset's proportion.
-
-        Args:
-            rod: section and material of every rod.
         """
         material = rod.material
         if material is None or material.bending_strength is None:
@@ -72,10 +69,6 @@ class OutputOptions(CheckOptions):
     def limits(self, rod: Rod, asked: "Strength") -> "Limits":
         """What rods are judged by, with loads and without.
 
-        Args:
-            rod: section and material of every rod.
-            asked: what was given for it.
-
         Raises:
             InputError: a service class is given, and nothing depends on it.
         """
@@ -86,11 +79,7 @@ class OutputOptions(CheckOptions):
         )  # fmt: skip
 
     def require_known_stress(self, rod: Rod, joint: Joint) -> None:
-        """InputError where a strength is given and the stress that it stands against cannot be known.
-
-        Args:
-            rod: section and material of every rod.
-        """
+        """InputError where a strength is given and the stress that it stands against cannot be known."""
         if self.strength is not None:
             require_known_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)
 

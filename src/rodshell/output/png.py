@@ -46,13 +46,8 @@ def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
         _write(letters, text, _pixels(text.at, corner, scale), scale)
     if image.getcolors(COLOURS) is None:
         image = image.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    return _png(image)
-
-
-def _png(image: Image.Image) -> bytes:
-    """A PNG file of an image, packed by run lengths: pictures are mostly paper."""
     file = BytesIO()
-    image.save(file, "PNG", compress_type=Z_RLE)
+    image.save(file, "PNG", compress_type=Z_RLE)  # by run lengths: pictures are mostly paper
     return file.getvalue()
 
 

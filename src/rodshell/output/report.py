@@ -5,13 +5,13 @@ and draws nothing between them.
 """
 
 import base64
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from rodshell.figures.checks import OTHER_SHAPES, Clearance, Reactions
+from rodshell.figures.checks import OTHER_SHAPES, Clearance, Reactions, SelfWeight
 from rodshell.figures.fabrication import Stock
 from rodshell.figures.form import Agreement, Drape, Gate, PopUp
 from rodshell.figures.records import Ends, Record
@@ -21,9 +21,7 @@ from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
 from rodshell.output.grid import caption_of, shape_names
 from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
-from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
-from rodshell.output.schedules import joints_table as joints
-from rodshell.output.schedules import supports_table as supports
+from rodshell.output.schedules import SCHEDULES, Table, heading
 from rodshell.output.section_profiles import profiles_svg
 from rodshell.output.svg import SCALE, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
@@ -49,13 +47,7 @@ NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between
 
 
 def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing], files: Mapping[str, str]) -> str:
-    """The whole page; `plan`, `drawings` and `files` are the archive's.
-
-    Args:
-        plan: the flat plan of the archive.
-        drawings: of the archive, by name, see `drawing_set`.
-        files: the same as SVG files.
-    """
+    """The whole page; `plan`, `drawings` and the same as SVG `files` are the archive's."""
     environment = Environment(
         loader=PackageLoader("rodshell.output", "templates"),
         autoescape=True,
@@ -67,7 +59,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     def shown(svg: str) -> Markup:
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
-    results, tables = archive.results, _tables(archive)
+    results = archive.results
     shown_as = ("flat", *shells_among(archive.states))
     states = [name for name in shape_names(archive) if name in shown_as and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
@@ -90,7 +82,8 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         plan=shown(_on_page(files["plan"])) if "plan" in files else "",
         drawings=[(drawings[name].title, shown(_on_page(files[name]))) for name in IN_PAGE if name in drawings],
         tables=[
-            (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
+            (title, [heading(column) for column in table], zip(*table.values(), strict=True), note)
+            for title, table, note in _tables(archive)
         ],
         case=shown_case(archive.case_toml, archive.inputs),
         version=results.version_rodshell or "unknown",
@@ -131,25 +124,20 @@ def _note(archive: Archive) -> str:
     return (PARTLY if unknown else FOLLOWED).format(share=whole_percent(unknown), gaps=gaps)
 
 
-def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
+def _tables(archive: Archive) -> Iterator[tuple[str, Table, str]]:
     """Title, table and note of the schedules in the page."""
-    tables = [
-        ("Rods", rods_table(archive, brief=True), "Where each joint is on its rods: schedule/rods.csv, joints.csv."),
-        ("Joints", joints(archive, brief=True), "Named by the rods that meet, a/b. Final: in the popped-up shell."),
-    ]
-    if archive.results.boundary:
-        tables.append(
-            (
-                "Supports",
-                supports(archive, brief=True),
-                "With the reactions of the unloaded shell: schedule/supports.csv.",
-            )
-        )
-    if archive.results.seams:
-        tables.append(("Seams", seams_table(archive), "Forces: the sum of both rods' support forces."))
-    if archive.results.fabrication and (stock := archive.results.fabrication.stock):
-        tables.append(("Stock", stock_table(archive), _plan_of(stock)))
-    return tables
+    fabrication = archive.results.fabrication
+    notes = {
+        "rods": "Where each joint is on its rods: schedule/rods.csv, joints.csv.",
+        "joints": "Named by the rods that meet, a/b. Final: in the popped-up shell.",
+        "supports": "With the reactions of the unloaded shell: schedule/supports.csv.",
+        "seams": "Forces: the sum of both rods' support forces.",
+        "stock": _plan_of(fabrication.stock) if fabrication and fabrication.stock else "",
+    }
+    for name, note in notes.items():
+        table = SCHEDULES[name].brief(archive)
+        if any(table.values()):
+            yield SCHEDULES[name].title, table, note
 
 
 def _plan_of(stock: Stock) -> str:
@@ -312,11 +300,7 @@ def _with_strength(results: Results, columns: Sequence[str], title: str, values:
 
 
 def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]:
-    """Groups of key figures; what is not known is left out.
-
-    Args:
-        plan: the flat plan of the archive.
-    """
+    """Groups of key figures; what is not known is left out."""
     rod, drape = results.rod, results.drape
     parts: list[Record | None] = [rod.section, rod.material, rod] if rod else []
     preset = _listed(rod.preset if rod else None, _PRESET, plan.rounding)
@@ -368,20 +352,16 @@ def _weight_rows(results: Results, ends: Sequence[Ends], rounding: Rounding) -> 
     if not any(found):
         return []
     shares = [wording.share_of_weight(weight) if weight else wording.UNKNOWN for weight in found]
-    deflections = [_shown(wording.millimetres, weight.deflection if weight else None, rounding) for weight in found]
     whose = "the weakest patch, its seam held," if results.patches else "it"
-    rows = [(f"Own weight that {whose} carries", shares)]
-    return (
-        rows
-        if set(deflections) == {wording.UNKNOWN}
-        else [*rows, ("Largest deflection under its own weight", deflections)]
-    )
+    deflection = (("Largest deflection under its own weight", "deflection", wording.millimetres),)
+    weights = [weight or SelfWeight() for weight in found]
+    return [(f"Own weight that {whose} carries", shares), *_side_by_side(deflection, weights, rounding)]
 
 
 def _listed(record: Record | None, listed: tuple[Entry, ...], rounding: Rounding) -> list[Row]:
     """The figures of a record that are known."""
-    known = [(title, getattr(record, name), show) for title, name, show in listed] if record else []
-    return [(title, _shown(show, value, rounding)) for title, value, show in known if value is not None]
+    rows = _side_by_side(listed, [record], rounding) if record else []
+    return [(title, value) for title, (value,) in rows]
 
 
 def _drape_rows(drape: Drape | None, rounding: Rounding) -> list[Row]:

@@ -16,13 +16,7 @@ PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1"
 
 @dataclass(frozen=True)
 class CheckOptions:
-    """What is checked, and by which strength of the material.
-
-    Args:
-        strength: of the rods' material [Pa], by which utilisation is counted; None: a preset's, or it is not counted.
-        stages: equilibria of the deployment from flat; 0: it is not followed.
-        shear_strength: [Pa]; None: in the proportion of a preset, or stress is counted by von Mises.
-    """
+    """What is checked, and by which strength of the material."""
 
     strength: Annotated[Stress | None, "design strength in bending; default: a preset's by its code"] = None
     stages: Annotated[Stages, "equilibria of the deployment from flat; 0: it is not computed"] = 8

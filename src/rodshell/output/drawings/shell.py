@@ -1,4 +1,7 @@
-"""Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection."""
+"""Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection.
+
+`text` is the usual size of a drawing's texts [mm at 1:1].
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
@@ -24,13 +27,13 @@ from rodshell.output.drawing import (
     Text,
     corners,
 )
-from rodshell.output.drawings.flat import FlatPlan
-from rodshell.output.grid import joint_places, outlines_of, rods_of
-from rodshell.output.labels import Room, callouts, closed_segments, outward, upright
+from rodshell.output.drawings.flat import FlatPlan, side_ticks
+from rodshell.output.grid import end_nodes, joint_places, meshed_rods, outlines_of
+from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
 from rodshell.results.verdict import unknown_below
-from rodshell.results.wording import Rounding, nice_ticks, rounding_of, whole_percent
+from rodshell.results.wording import Rounding, rounding_of, whole_percent
 
 _SUPPORTS_LEGEND = (
     "Red: where each rod ends and how it continues. A thin line leads to its name: rod.0 its start, rod.1 its end.",
@@ -45,12 +48,14 @@ SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, 
 
 
 def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
-    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m].
+    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m]."""
+    return [1e3 * positions[rod.nodes] for rod in meshed_rods(archive)]
 
-    Args:
-        positions: (n, 3) nodes of a state [m].
-    """
-    return [1e3 * positions[rod.nodes] for rod in rods_of(archive) if len(rod.nodes) > 1]
+
+def final_curves(archive: Archive) -> list[Floats]:
+    """The same in the final shape, which there has to be."""
+    assert archive.final is not None
+    return rod_curves(archive, archive.states[archive.final])
 
 
 def _stopped(archive: Archive) -> str:
@@ -60,14 +65,8 @@ def _stopped(archive: Archive) -> str:
 
 
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
-    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions.
-
-    Args:
-        text: usual size of the texts [mm at 1:1].
-    """
-    pencil, final = Pencil(), archive.final
-    assert final is not None
-    curves = rod_curves(archive, archive.states[final])
+    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions."""
+    pencil, curves = Pencil(), final_curves(archive)
     heights = np.concatenate(curves)[:, 2]
     tall, rounding = float(np.ptp(heights)) + 10 * text, rounding_of(archive.results)
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
@@ -77,8 +76,9 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
             pencil.line(curve, "CUT", pen=pen)
         cloud = np.concatenate(flat)
         low, high = bounds(cloud)
-        _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, rounding)
-        _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, rounding)
+        below, beside = low - (0.0, 1.5 * text), low - (1.5 * text, 0.0)
+        _span(pencil, below, np.array([high[0], below[1]]), text, rounding)
+        _span(pencil, beside, np.array([beside[0], high[1]]), text, rounding)
         pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
         pencil.write(words, (low[0], low[1] - 5 * text), 1.2 * text, "LABEL", bold=True)
     return pencil.done("elevations", f"Elevations{_stopped(archive)}", text)
@@ -88,17 +88,13 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     """Paths of the rod ends from flat to their supports, seen from above, and the shell's side at each stage.
 
     A line through all ends shows where they are at each stage; a ring where they end.
-
-    Args:
-        text: usual size of the texts [mm at 1:1].
     """
     pencil, history = Pencil(), archive.states["history"]
     assert archive.results.deployment is not None
     stages, mm = archive.results.deployment.stages, rounding_of(archive.results).mm
     pen = Pen(INK, 0.04 * text)
-    drawn = [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
-    ends = np.concatenate([rod.nodes[[0, -1]] for rod in drawn])
-    ways, thin = 1e3 * history[:, ends, :2], Pen(SOFT, 0.05 * text)
+    drawn = meshed_rods(archive)
+    ways, thin = 1e3 * history[:, end_nodes(drawn), :2], Pen(SOFT, 0.05 * text)
     loops = [loop for loop in outlines_of(drawn) if len(loop) > 1]
     for stage, loop in product(ways[:-1], loops):
         pencil.line(stage[loop], "DIM", closed=True, pen=thin)
@@ -144,83 +140,50 @@ def _not_known(results: Results) -> str:
 
 
 def _thinned(curve: Floats) -> Floats:
-    """A curve by about every third of its nodes, its ends kept.
-
-    Args:
-        curve: (k, 2 or 3) nodes.
-    """
+    """A curve by about every third of its nodes, its ends kept."""
     return np.asarray(curve[[*range(0, len(curve) - 1, 3), len(curve) - 1]])
 
 
 def apart(curves: Iterable[Floats]) -> list[Floats]:
-    """Each curve once: in an elevation a rod covers its mirror image.
-
-    Args:
-        curves: (k, 2) points of each [mm].
-    """
+    """Each curve (k, 2) [mm] once: in an elevation a rod covers its mirror image."""
     return list({(np.rint(curve / SAME) + 0.0).tobytes(): curve for curve in curves}.values())
 
 
 def _seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
-    """The rods of the final shape, pale.
-
-    Args:
-        archive: a result with a final shape.
-        text: size of the drawing's texts [mm], by which the line width is chosen.
-    """
-    assert archive.final is not None
-    for curve in rod_curves(archive, archive.states[archive.final]):
+    """The rods of the final shape, pale."""
+    for curve in final_curves(archive):
         pencil.line(_thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
 
 
-def _span(
-    pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float, rounding: Rounding
-) -> None:
+def _span(pencil: Pencil, start: Floats, end: Floats, text: float, rounding: Rounding) -> None:
     """A dimension line with its length [mm] next to it."""
-    start, end = np.array(a), np.array(b)
-    along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    length = float(np.linalg.norm(end - start))
+    along = (end - start) / max(length, 1e-9)
     across = 0.4 * text * np.array([-along[1], along[0]])
     pencil.line([start, end], "DIM")
-    for place_ in (start, end):
-        pencil.line([place_ - across, place_ + across], "DIM")
+    for tip in (start, end):
+        pencil.line([tip - across, tip + across], "DIM")
     angle = float(np.arctan2(along[1], along[0]))
     side = 0.5 * text * np.array([-along[1], along[0]]) if angle else np.array([0.0, -1.4 * text])
     pencil.write(rounding.mm(1e-3 * length), 0.5 * (start + end) + side, text, "DIM", anchor="middle", angle=angle)
 
 
 def axes(pencil: Pencil, text: float) -> None:
-    """Ticks of x and y [mm] along two sides of all that is there.
-
-    Args:
-        pencil: draws them, around what it has drawn so far.
-        text: size of the drawing's texts [mm].
-    """
+    """Ticks of x and y [mm] along two sides of all that is there."""
     low, high = pencil.done("", "", text).box()
     low, high = low - text, high + text
     pencil.line([(low[0], high[1]), low, (high[0], low[1])], "DIM")
-    for value in nice_ticks(low[0], high[0], 6):
-        pencil.line([(value, low[1]), (value, low[1] + 0.4 * text)], "DIM")
-        pencil.write(f"{value:g}", (value, low[1] - 1.1 * text), 0.8 * text, "DIM", anchor="middle")
-    for value in nice_ticks(low[1], high[1], 6):
-        pencil.line([(low[0], value), (low[0] + 0.4 * text, value)], "DIM")
-        pencil.write(f"{value:g}", (low[0] - 0.4 * text, value - 0.3 * text), 0.8 * text, "DIM", anchor="end")
+    side_ticks(pencil, low, high, text, 6)
 
 
 # Supports
 
 
 def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
-    """Where every rod end goes, seen from above, with the direction in which its rod arrives there.
-
-    Args:
-        plan: the flat plan of the archive.
-        text: usual size of the texts [mm at 1:1].
-    """
-    pencil, final = Pencil(), archive.final
-    assert final is not None
+    """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
+    pencil, drawn = Pencil(), meshed_rods(archive)
     _seen_from_above(pencil, archive, text)
-    drawn = [rod for rod in plan.rods if len(rod.nodes) > 1]
-    curves = [curve[:, :2] for curve in rod_curves(archive, archive.states[final])]
+    curves = [curve[:, :2] for curve in final_curves(archive)]
     ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
     arrives = np.array([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).reshape(-1, 2)
     arrives /= np.maximum(np.linalg.norm(arrives, axis=1), 1e-9)[:, None]
@@ -230,7 +193,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
         pencil.mark(end, RADIUS * text, "MARK", note=name)
         pencil.line([end, end + TICK * text * way], "MARK", pen=tick)
         room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
-    lines = np.concatenate([_segments(_thinned(_thinned(curve))) for curve in curves])  # what names keep clear of
+    lines = segments(_thinned(_thinned(curve)) for curve in curves)  # what names keep clear of
     alone = ~np.isin(names, list(_sewn(archive)))
     for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
@@ -289,11 +252,6 @@ def _sewn(archive: Archive) -> set[str]:
     return {end for seam in archive.results.seams for meeting in seam.meetings for end in meeting.ends}
 
 
-def _segments(curve: Floats) -> Floats:
-    """(k - 1, 2, 2) the parts of a polyline (k, 2)."""
-    return np.stack([curve[:-1], curve[1:]], axis=1)
-
-
 def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None:
     """The numbers of the places on seams where rods meet, as in the table of the seams, where there is room."""
     size, left_out = SMALL * text, 0
@@ -318,9 +276,6 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
 
     Each number stands off all rods and diagonals of its cell, as large as finds room; where there is none the table
     has it.
-
-    Args:
-        text: usual size of the texts [mm at 1:1].
     """
     pencil, final = Pencil(), archive.final
     assert final is not None
