@@ -261,8 +261,6 @@ def bending_of(
     """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis.
 
     Args:
-        rod: the section and material of every rod.
-        shear_weight: of the shear stress against the normal stress, see `checks.bending`.
         edge_strains: (e,) axial strains that stress the edges; default: against their rest lengths.
     """
     mesh, positions = shell.mesh, shell.positions(state)
@@ -315,7 +313,7 @@ def bending(
         twist_rate: (k,) twist per length [rad/m]; without, none.
         normals: (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without
             `components`.
-        shear_weight: of the shear stress against the normal stress, see `checks.bending`.
+        shear_weight: of the shear stress against the normal stress, see the module.
         edge_strains: (e,) as of `bending_of`.
         by_joints: (k, 3) along the normals of joints, how much sharper than their nodes bend the sides of them that
             bend most [1/m]; None: joints pass no moments about their normals.
@@ -353,11 +351,7 @@ def bending(
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
-    """(e, 3) first material director m1 of each edge in a `state` (N, 3).
-
-    Args:
-        frames: the shell's bending and twist, whose frames are transported to the state.
-    """
+    """(e, 3) first material director m1 of each edge in a `state` (N, 3), to which `frames` are transported."""
     m1 = frames.refreshed(state).material_directors(state)
     result = np.zeros((len(shell.mesh.edges) + len(shell.ghosts), 3))  # of ghost edges, too
     for side in range(2):
@@ -366,11 +360,8 @@ def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
 
 
 def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
-    """(k, 3) normal of the shell at each entry of `rod_nodes`; None where some rod crosses no other.
-
-    Args:
-        positions: (n, 3) of its nodes [m].
-    """
+    """(k, 3) normal of a shell with nodes at `positions` (n, 3) [m] at each entry of `rod_nodes`; None where some rod
+    crosses no other."""
     if (mesh.grid.joint_counts() == 0).any():
         return None
     return node_normals(mesh, positions)[mesh.rod_nodes]

@@ -177,7 +177,6 @@ def check(
 
     Args:
         popped: the shells of one footprint by their end condition.
-        rod: of which they are made.
         stages: of the deployment from flat of the pinned shell; 0: none.
         shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
         progress: called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and

@@ -186,11 +186,7 @@ def by_ends(meaning: str) -> Any:
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null.
-
-    Args:
-        content: keys and values; NumPy's arrays and numbers are converted.
-    """
+    """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null."""
     lines = []
     for name, value in plain(content).items():
         if isinstance(value, list) and value and isinstance(value[0], dict):
@@ -206,11 +202,7 @@ def _dumps(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable.
-
-    Args:
-        value: dictionaries, sequences, arrays, records, numbers, texts.
-    """
+    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable."""
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None
     if isinstance(value, str):

@@ -22,11 +22,8 @@ STEPS = 8  # in which a prestress is applied that is too much for one
 def stressed(cables: Cables, structure: Structure, target: Target) -> Structure:
     """The structure with its cables stressed, in the equilibrium that it then finds.
 
-    Args:
-        target: whose openings the cables must not cross.
-
     Raises:
-        InputError: a cable crosses an opening; the shell does not withstand the prestress.
+        InputError: a cable crosses an opening of the target; the shell does not withstand the prestress.
     """
     mesh, before = structure.mesh, structure.equilibrium
     pairs = braced_diagonals(
@@ -77,7 +74,6 @@ def braced_diagonals(
     Args:
         positions: (n, 3) of its nodes [m].
         target: whose openings the diagonals must not cross.
-        pattern, across_openings: as of `Cables`.
         to_supports: whether cables continue to the supports.
 
     Raises:

@@ -200,11 +200,8 @@ def _said(progress: Progress, where: str, what: str) -> None:
 
 
 def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: Stages) -> Structure:
-    """The erected shell with its bracing locked, and then its joints.
-
-    Raises:
-        InputError: as of the bracing; the supports leave a mechanism.
-    """
+    """The erected shell with its bracing locked, and then its joints; InputErrors are those of the bracing, and that
+    the supports leave a mechanism."""
     structure, bracing = Structure.erected(popped, stages.rod), loads.bracing
     if bracing is not None:
         fitted = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
@@ -238,11 +235,7 @@ def mechanism(structure: Structure) -> str | None:
 
 
 def tributary_of(stages: Stages) -> Tributary:
-    """The areas of the target that each node of a form takes.
-
-    Args:
-        stages: of a form that has a target.
-    """
+    """The areas of the target that each node of a form takes."""
     layout, anchor = stages.layout, stages.target.summit
     if stages.seams is None:
         anchor = stages.draped.anchor or anchor

@@ -36,11 +36,9 @@ SAMPLES = 32  # of a lath's curve from joint to joint, for its length
 def laid(laths: Laths, structure: Structure, target: Target) -> Structure:
     """The structure with its laths laid, in the equilibrium that both find.
 
-    Args:
-        target: whose openings the laths must not cross.
-
     Raises:
-        InputError: a lath crosses an opening; no stable equilibrium of both is found; the laths have no rod.
+        InputError: a lath crosses an opening of the target; no stable equilibrium of both is found; the laths have no
+            rod.
     """
     mesh, before = structure.mesh, structure.equilibrium
     if laths.rod is None:

@@ -149,11 +149,7 @@ class Stability:
         whole("the number of modes", self.modes, 1, 1000)
 
     def amplitude(self, span: float) -> float | None:
-        """Largest displacement of the geometry with imperfections [m]; None: the perfect geometry alone.
-
-        Args:
-            span: of the shell [m].
-        """
+        """Largest displacement of an imperfect shell of a `span` [m], in m; None: the perfect one alone."""
         given = self.imperfection
         if not isinstance(given, str):
             return None if given is None else positive("the imperfection", given, "m")

@@ -117,11 +117,7 @@ class Limits(DesignStrength):
 
 
 def preset_limits(rod: Rod, service_class: int | None) -> Limits:
-    """The limits of a rod by its material's preset; of other materials none is known.
-
-    Args:
-        service_class: of timber, as of `Strength`.
-    """
+    """The limits of a rod by its material's preset; of other materials none is known."""
     material = rod.material
     factors = None if material is None or material.name is None else DESIGN.get(material.name)
     if material is None or factors is None:
@@ -158,11 +154,8 @@ class Utilisation:
         return None if by is None else (by, int(np.argmax(self.uses[by])))
 
     def with_permanent(self, permanent: "Utilisation") -> "Utilisation":
-        """The same, where the erected shell's own utilisation counts too, and the slip of its joints.
-
-        Args:
-            permanent: of the erected shell by the permanent strength.
-        """
+        """The same, where the erected shell's own utilisation counts too, by the permanent strength, and the slip of
+        its joints."""
         uses = dict(self.uses)
         if "slip" in permanent.uses:
             uses["slip_unloaded"] = permanent.uses["slip"]
@@ -227,11 +220,7 @@ def utilisation(
 
 def bending_under(shell: Shell, state: Floats, rod: Rod, forces: Floats, limits: Limits) -> Bending:
     """Bending and stress of a shell whose axial forces (e,) [N] are known: where rods are warm their lengths do not say
-    them.
-
-    Args:
-        shell, state, rod, forces, limits: as of `utilisation`.
-    """
+    them."""
     strains = forces / shell.stretch.stiffness
     return bending_of(shell, state, rod, shear_weight=limits.shear_weight, edge_strains=strains)
 
@@ -264,11 +253,8 @@ def net_section(section: Section | GivenSection, hole: float) -> float:
 
 
 def net_factors(mesh: GridMesh, section: Section | GivenSection, hole: float) -> Floats:
-    """(k,) stress of the net section over that of the full one, at each entry of `rod_nodes`: 1 but at joints.
-
-    Args:
-        section, hole: as of `net_section`; 0: there is no hole.
-    """
+    """(k,) stress of the net section over that of the full one, at each entry of `rod_nodes`: 1 but at joints with
+    a `hole` [m]."""
     factors = np.ones(len(mesh.rod_nodes))
     if hole:
         factors[_at_joints(mesh)] = net_section(section, hole)

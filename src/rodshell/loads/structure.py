@@ -48,11 +48,7 @@ class LathLayer:
         return np.array([pair for row in self.rows for pair in pairwise(row)], dtype=np.intp).reshape(-1, 2)
 
     def forces(self, axial: Floats) -> Floats:
-        """(d,) mean axial force from crossing to crossing [N], tension positive.
-
-        Args:
-            axial: (e,) forces of the laths' edges [N].
-        """
+        """(d,) mean axial force from crossing to crossing [N], tension positive, of those (e,) of the edges."""
         first = self.entries - (np.searchsorted(self.shell.mesh.rod_start, self.entries, side="right") - 1)
         sums = np.append(0.0, np.cumsum(axial))
         stops = np.concatenate([np.ones(len(row), dtype=bool) for row in self.rows])
@@ -121,11 +117,7 @@ class Structure:
 
     def locked_moments(self, found: Equilibrium) -> Floats:
         """(c,) moment of each locked joint about its normal in an equilibrium of the structure [N m], positive where
-        the angle from the first rod to the second has grown; empty where none is locked.
-
-        Args:
-            found: an equilibrium of this structure.
-        """
+        the angle from the first rod to the second has grown; empty where none is locked."""
         if not self.locked:
             return np.zeros(0)
         result, joints = np.zeros(len(self.mesh.grid.crossings)), [*filter(is_elastic, self.shell_at(found).between)]
@@ -134,13 +126,11 @@ class Structure:
         return result
 
     def frequencies(self, count: int) -> Floats:
-        """(k,) the lowest natural frequencies without loads, ascending [Hz]; none where they are not known.
+        """(k,) the lowest `count` natural frequencies without loads, at most, ascending [Hz]; none where they are not
+        known.
 
         The mass of rods and laths is spread along their edges, so that the frequencies of bending are of fourth order
         in their length (see `solve.modes.frequencies`); joints and cables are at the nodes.
-
-        Args:
-            count: so many, or as many as there are.
         """
         shell, mass = self.shell, np.zeros((self.size, 3))
         mass[: len(shell.mass)] = shell.mass
@@ -163,11 +153,7 @@ class Structure:
             return np.zeros(0)
 
     def laths_alone(self, found: Equilibrium) -> tuple[Shell, Floats] | None:
-        """The model of the laths of a third layer alone and its state; None: there are none.
-
-        Args:
-            found: an equilibrium of this structure.
-        """
+        """The model of the laths of a third layer alone and its state in an equilibrium; None: there are none."""
         if self.laths is None:
             return None
         layer, count = self.laths, len(self.shell.elements)
@@ -177,27 +163,15 @@ class Structure:
         return layer.shell.with_elements(alone), found.state[layer.blocks]
 
     def shell_at(self, found: Equilibrium) -> Shell:
-        """The grid's model with its source frames at an equilibrium of the structure.
-
-        Args:
-            found: an equilibrium of this structure, loaded or not.
-        """
+        """The grid's model with its source frames at an equilibrium of the structure, loaded or not."""
         return self.shell.with_elements(found.elements[: len(self.shell.elements)])
 
     def support_forces(self, found: Equilibrium) -> Reactions:
-        """What the supports exert in an equilibrium, with the springing of the bent rods.
-
-        Args:
-            found: an equilibrium of this structure, loaded or not.
-        """
+        """What the supports exert in an equilibrium, with the springing of the bent rods."""
         return reactions(self.shell, found)
 
     def reactions(self, found: Equilibrium) -> Reactions:
-        """What the supports exert in an equilibrium in addition to what they exert without loads.
-
-        Args:
-            found: an equilibrium of this structure under loads.
-        """
+        """What the supports exert in an equilibrium in addition to what they exert without loads."""
         loaded, before = self.support_forces(found), self.support_forces(self.equilibrium)
         points = found.state[self.shell.ends]
         return Reactions.at(points, loaded.forces - before.forces, loaded.moments - before.moments)

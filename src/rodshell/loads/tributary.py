@@ -175,11 +175,8 @@ def surface_triangles(
 
 
 def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
-    """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end.
-
-    Args:
-        step: longest side [m].
-    """
+    """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end; `step` is
+    the longest side [m]."""
     points, faces = _divided(target, target.surface.vertices, target.surface.faces, longest=step)
     inside = target.margin(points) >= -_ON_THE_EDGE * target.size
     single, double, sides = _across(inside, faces)

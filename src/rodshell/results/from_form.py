@@ -66,11 +66,7 @@ States = dict[str, NDArray[Any]]
 
 
 def results_of(stages: Stages) -> Results:
-    """The results of a form, before it is checked; those of patches are of one shell, with `patches` and `seams`.
-
-    Args:
-        stages: of a form in one piece, in patches, or from a table of rods.
-    """
+    """The results of a form, before it is checked; those of patches are of one shell, with `patches` and `seams`."""
     known = {
         "rod": rod_type(stages.rod),
         "joint": _joint(stages.joint),
@@ -100,11 +96,7 @@ def results_of(stages: Stages) -> Results:
 
 
 def states_of(stages: Stages) -> States:
-    """The states of a form, before it is checked.
-
-    Args:
-        stages: as of `results_of`.
-    """
+    """The states of a form, before it is checked."""
     mesh = stages.footprint.mesh
     states: States = {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
     if (draped := stages.boundary.draped) is not None and not stages.from_table:
@@ -125,11 +117,7 @@ def states_of(stages: Stages) -> States:
 
 
 def with_seam_forces(results: Results, seams: Seams, checks: Checks) -> Results:
-    """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces.
-
-    Args:
-        checks: with the reactions of all patches, rod by rod.
-    """
+    """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces."""
     row = {rod.id: k for k, rod in enumerate(results.rods)}
     forced = list[Seam]()
     for k, seam in enumerate(results.seams):
@@ -141,11 +129,7 @@ def with_seam_forces(results: Results, seams: Seams, checks: Checks) -> Results:
 
 
 def with_refinement(results: Results, found: "Refined") -> Results:
-    """The same results, with how their form was refined; a refusal is a warning.
-
-    Args:
-        results: of the form after it.
-    """
+    """The same results, with how their form was refined; a refusal is a warning."""
     gates: tuple[Gate, ...] = get_args(Gate)
     refused = [] if found.changed else [said("not_refined", found.ends, why=found.refused)]
     if found.stopped:

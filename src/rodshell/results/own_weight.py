@@ -27,20 +27,13 @@ RESERVE = 1.5  # times its own weight that the perfect shell carries: imperfecti
 
 
 def reserve(results: Results) -> float:
-    """How many times its own weight a good shell carries: creep divides stiffness by 1 + k_def [EN 1995-1-1, 2.3.2.2].
-
-    Args:
-        results: with design strengths, where k_def is known.
-    """
+    """How many times its own weight a good shell carries: creep divides stiffness by 1 + k_def [EN 1995-1-1,
+    2.3.2.2]."""
     return RESERVE * (1.0 + ((results.strength.creep if results.strength else None) or 0.0))
 
 
 def falling(results: Results) -> set[Ends]:
-    """The end conditions with which the shell, braced if it is to be, falls under its own weight.
-
-    Args:
-        results: with the checks of the self-weight.
-    """
+    """The end conditions with which the shell, braced if it is to be, falls under its own weight."""
     ends = list(results.self_weight)
     found = _carried(results, ends)
     return {end for end in _below(found, 1.0) if found[end].limit not in NOT_KNOWN}
@@ -50,7 +43,6 @@ def none_stands(results: Results, usable: Sequence[Ends], lost: Sequence[Ends]) 
     """That no end condition is shown to stand, where the shell falls with some and nothing is known of the others.
 
     Args:
-        results: with the checks of the self-weight.
         usable: with which there is a shell without another fault.
         lost: with which the pop-up did not converge.
     """
@@ -78,11 +70,7 @@ def _bracing(results: Results) -> str:
 
 def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], bool]:
     """What is said of shells that do not carry their own weight with the reserve that is asked for, or are not known
-    to; and whether one of them stands.
-
-    Args:
-        results: with the checks of the self-weight.
-    """
+    to; and whether one of them stands."""
     found, findings = _carried(results, ends), list[Said]()
     parts = _below(found, 1.0)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
@@ -158,11 +146,7 @@ def _asked(results: Results) -> str:
 
 
 def is_braced(results: Results) -> bool:
-    """Whether the shell has bracing under its loads; its own weight alone is checked without.
-
-    Args:
-        results: with the checks under loads.
-    """
+    """Whether the shell has bracing under its loads; its own weight alone is checked without."""
     return any(shell.bracing for supported in results.loads.values() for shell in supported.values())
 
 
@@ -189,21 +173,13 @@ def _times(weighed: SelfWeight) -> str:
 
 
 def light(results: Results, ends: list[Ends]) -> dict[Ends, float]:
-    """By end condition, the factors on its own weight that a shell carries, or is known to, where they are below 1.
-
-    Args:
-        results: with the checks of the self-weight.
-    """
+    """By end condition, the factors on its own weight that a shell carries, or is known to, where they are below 1."""
     return _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
 
 
 def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, tuple[str, ...]]:
     """Which rods of the same material would carry the shell with the reserve, a size that is sold or in proportion, and
-    the command that forms it of them.
-
-    Args:
-        factors: on the weight, too low, that is carried with these ends.
-    """
+    the command that forms it of them; `factors` on the weight, too low, are those that are carried now."""
     rod, kind = results.rod, (results.joint.kind if results.joint else None) or "ball"
     factors = {ends: factor for ends, factor in factors.items() if factor > 0}
     chosen = rod is not None and "section" in (rod.chosen or {})

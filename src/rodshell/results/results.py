@@ -214,12 +214,9 @@ def read_results(path: Path) -> Results:
 
 
 def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
-    """The content of a result.json with the keys of the present version.
+    """The content of a result.json of any version with the keys of the present one.
 
     Until November 2026 the format was called gridshell-result. Version 2 renamed drape.own_ends to drape.net_deviation.
-
-    Args:
-        content: of a result.json of any version.
 
     Raises:
         OutputError: another format, or a newer version.
@@ -259,11 +256,7 @@ def _renamed(table: Any, old: str, new: str) -> Any:
 
 
 def contradictions(results: Results) -> Iterator[str]:
-    """What the records say against each other: rods that do not exist, and counts that do not agree.
-
-    Args:
-        results: whose values are each valid.
-    """
+    """What the records say against each other: rods that do not exist, and counts that do not agree."""
     ids = [rod.id for rod in results.rods]
     known = set(ids)
     if len(known) < len(ids):

@@ -7,21 +7,13 @@ THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii o
 
 
 def bent_of(results: Results, shape: str) -> WorstBent:
-    """The worst bending of a shape; one without figures where nothing is known.
-
-    Args:
-        results: with or without checks of bending.
-        shape: the name of a support, or a shape of the deployment.
-    """
+    """The worst bending of a shape, that on a support by its name or one of the deployment; one without figures where
+    nothing is known."""
     return (results.bending.shapes() if results.bending else {}).get(shape) or WorstBent()
 
 
 def strength_name(results: Results, shape: str) -> str:
-    """By what the utilisation of a shape is counted: design strengths, if they are known.
-
-    Args:
-        shape: the name of a support, or a shape of the deployment.
-    """
+    """By what the utilisation of a shape is counted: design strengths, if they are known."""
     preset = results.bending.strength_of if results.bending else None
     if preset is None:
         return "the given strength"
@@ -36,11 +28,7 @@ def by_design_strength(results: Results) -> bool:
 
 
 def holds_while_erected(results: Results, used: float) -> bool:
-    """Whether a preset's rods that use more than their design strength for erection stay below what breaks them.
-
-    Args:
-        used: of the design strength for erection [-].
-    """
+    """Whether a preset's rods that use so much of their design strength for erection stay below what breaks them."""
     characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None
     strength, of_preset = (
         (results.bending.erection_strength, results.bending.strength_of) if results.bending else (0, "")

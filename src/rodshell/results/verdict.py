@@ -48,7 +48,7 @@ def verdict_of(results: Results) -> Verdict:
 
 
 def verdict(results: Results) -> Verdict:
-    """The verdict on the figures of a result.
+    """The verdict on the figures of a result; one that is missing counts as not checked.
 
     An end condition can be used if its shell converged, is stable and carries its own weight, its rods do not touch,
     hold, and are thin enough for their bends. Without one that can be used, or far off the target, the result is
@@ -60,9 +60,6 @@ def verdict(results: Results) -> Verdict:
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
     then the warnings.
-
-    Args:
-        results: with checks; a figure that is missing counts as not checked.
     """
     shells = results.pop_up
     faults = {ends: [*_shell_faults(results, ends)] for ends in shells}
@@ -490,10 +487,7 @@ def _gaps(results: Results) -> Iterator[str]:
 
 
 def _advice(clamped: Ends, pinned: Ends, gaps: Mapping[Ends, float], relative: float | None) -> Iterator[str]:
-    """Which of two supports that can both be used is worth its effort.
-
-    relative : the pinned gap over the target's size.
-    """
+    """Which of two supports that can both be used is worth its effort; `relative` is the pinned gap over the size."""
     if gaps[clamped] < MUCH_LESS * gaps[pinned] and (relative is None or relative > NEGLIGIBLE):
         share = percent(gaps[clamped] / gaps[pinned])
         yield f"Supports that hold the rods' directions ({clamped}) leave {share} of the gap that {pinned} ones leave."
