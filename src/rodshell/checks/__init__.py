@@ -1,6 +1,6 @@
 """Is it safe to build: bending and stress, contact, reactions, deployment, own weight, other shapes."""
 
-from rodshell.checks.bending import Bending, bending, bending_of, curvatures
+from rodshell.checks.bending import Bending, bending, bending_of
 from rodshell.checks.check import Checks, check
 from rodshell.checks.contact import contact_of
 from rodshell.checks.deployment import Deployment, OtherShape, deploy
@@ -23,7 +23,6 @@ __all__ = [
     "bending_of",
     "check",
     "contact_of",
-    "curvatures",
     "deploy",
     "joint_loads",
     "other_shapes",

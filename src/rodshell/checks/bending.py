@@ -132,15 +132,6 @@ def fibre_modulus(rod: Rod) -> float:
     return rod.material.youngs_modulus
 
 
-def stress_is_known(rod: Rod, *, twisted: bool) -> bool:
-    """Whether the stress of a rod is known, with that of torsion if it is `twisted`.
-
-    Args:
-        twisted: the rods can be twisted.
-    """
-    return not _missing(rod, twisted)
-
-
 def require_known_stress(rod: Rod, *, twisted: bool) -> None:
     """Refuse a given section whose stress is not known.
 
@@ -325,14 +316,17 @@ def bending(
             within = np.copysign(np.sqrt(dot(by_joints, by_joints)), components[:, 1])
             components = np.column_stack([components[:, 0], components[:, 1] + within])
     curvature = np.linalg.norm(turns, axis=1)
-    axial = axial_strains(mesh, positions) if edge_strains is None else _mean_of_edges(mesh, edge_strains)
+    if edge_strains is None:
+        lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
+        edge_strains = lengths / mesh.edge_lengths - 1.0
+    axial = _mean_of_edges(mesh, edge_strains)
     twist = np.zeros(len(curvature)) if twist_rate is None else twist_rate
     stress = strain = sheared = normal = geodesic = None
     if components is not None:
         normal, geodesic = components.T
     elif normals is not None:
         normal, geodesic = _parts(turns, tangents, normals)
-    fibre, known = fibre_distance(rod), stress_is_known(rod, twisted=bool(twist.any()))
+    fibre, known = fibre_distance(rod), not _missing(rod, twisted=bool(twist.any()))
     # the strain of a fibre k times as far is that of a bend k times as sharp
     sharp, bends, sheared_by = curvature, components, twist
     if (local := varied_at_nodes(mesh, rod)) is not None:
@@ -365,27 +359,6 @@ def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
     if (mesh.grid.joint_counts() == 0).any():
         return None
     return node_normals(mesh, positions)[mesh.rod_nodes]
-
-
-def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
-    """(k,) curvature [1/m] at each entry of `rod_nodes`.
-
-    Args:
-        positions: (n, 3) of its nodes [m].
-        clamps: (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
-    """
-    return np.asarray(np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1))
-
-
-def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:
-    """(k,) axial strain at each entry of `rod_nodes`: the mean over its edges, which at an end is one.
-
-    Args:
-        mesh: the rods, with their rest lengths.
-        positions: (n, 3) of its nodes [m].
-    """
-    lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
-    return _mean_of_edges(mesh, lengths / mesh.edge_lengths - 1.0)
 
 
 def _mean_of_edges(mesh: GridMesh, values: Floats) -> Floats:
