@@ -24,6 +24,8 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.modes import frequencies
 
+NO_PAIRS: Ints = np.empty((0, 2), dtype=np.intp)  # of crossings that bracing joins
+
 
 @dataclass(frozen=True, eq=False)
 class LathLayer:
@@ -75,7 +77,7 @@ class Structure:
     shell: Shell
     equilibrium: Equilibrium
     rod: Rod
-    braced: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.intp))
+    braced: Ints = field(default_factory=NO_PAIRS.copy)
     bracing_mass: Floats | None = None
     cables: CableStretch | None = None
     laths: LathLayer | None = None
