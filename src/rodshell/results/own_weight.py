@@ -71,49 +71,50 @@ def _bracing(results: Results) -> str:
 def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], bool]:
     """What is said of shells that do not carry their own weight with the reserve that is asked for, or are not known
     to; and whether one of them stands."""
-    found, findings = _carried(results, ends), list[Said]()
-    parts = _below(found, 1.0)
+    found, bracing, asked = _carried(results, ends), _bracing(results), reserve(results)
+    findings, parts = list[Said](), _below(found, 1.0)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
-    bracing = _bracing(results)
-    if bracing and (bare := light(results, ends)):
+    bare = _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
+    if bracing and bare:
         unknown_above = any(results.self_weight[end].limit == "not followed" for end in bare)
         carries = "is known to carry only" if unknown_above else "carries only"
-        weight = _parts(bare, "its own weight")
-        least, alone = min(bare.values()), _alone(bare)
-        findings.append(said("needs_bracing", _one(bare), least, 1, alone=alone, carries=carries, weight=weight))
+        findings.append(_of_parts("needs_bracing", bare, carries=carries, weight=_parts(bare, "its own weight")))
     standing = [end for end, weighed in found.items() if end not in parts and weighed.limit not in (None, "no mass")]
     falling = {end: part for end, part in parts.items() if end not in lost}
     unknown = {end: part for end, part in parts.items() if end in lost}
     if falling:
         others = "".join(f"; with {end} ends it carries {_times(found[end])} its own weight" for end in standing)
         advice, offers = _other_rods(results, falling)
-        findings.append(said(
-            "falls", _one(falling), min(falling.values()), 1, offers=offers, alone=_alone(falling), bracing=bracing,
-            parts=_parts(falling), others=others, advice=advice,
-        ))  # fmt: skip
-    short = {end: part for end, part in _below(found, reserve(results)).items() if end in standing and end not in lost}
+        findings.append(_of_parts("falls", falling, offers=offers, bracing=bracing, others=others, advice=advice))
+    short = {end: part for end, part in _below(found, asked).items() if end in standing and end not in lost}
     if short:
         weights = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in short)
         others = "".join(f"; with {end} ends it carries {_times(found[end])}" for end in standing if end not in short)
         advice, offers = _other_rods(results, short)
-        findings.append(said(
-            "reserve", _one(short), min(short.values()), reserve(results), offers=offers, bracing=bracing,
-            weights=weights, asked=_asked(results), others=others, advice=advice,
+        findings.append(_of_parts(
+            "reserve", short, asked, offers=offers, bracing=bracing, weights=weights, asked=_asked(results),
+            others=others, advice=advice,
         ))  # fmt: skip
     if unknown:
-        findings.append(said(
-            "not_followed: weight", _one(unknown), min(unknown.values()), 1, alone=_alone(unknown), bracing=bracing,
-            parts=_parts(unknown),
-        ))  # fmt: skip
+        findings.append(_of_parts("not_followed: weight", unknown, bracing=bracing))
     for end in standing:
         if end in lost:
             factor, times = found[end].load_factor, _times(found[end])
-            findings.append(said("not_followed: reserve", end, factor, reserve(results), bracing=bracing, times=times))
+            findings.append(said("not_followed: reserve", end, factor, asked, bracing=bracing, times=times))
     if any(weighed.limit == "no mass" for weighed in found.values()):
         findings.append(said("no_mass"))
     if any(end not in found or found[end].limit is None for end in ends):
         findings.append(said("not_checked: weight", bracing=bracing))
     return findings, bool(standing or (bracing and not falling))
+
+
+def _of_parts(
+    sentence: str, factors: Mapping[Ends, float], limit: float = 1.0, *, offers: tuple[str, ...] = (), **words: str
+) -> Said:
+    """A finding on shells by the factors on their weight that they carry; on one alone with its end condition."""
+    one = next(iter(factors)) if len(factors) == 1 else None
+    words |= {"alone": f"with {one} ends " if one else "", "parts": _parts(factors)}
+    return said(sentence, one, min(factors.values()), limit, offers=offers, **words)
 
 
 def _carried(results: Results, ends: Sequence[Ends]) -> dict[Ends, SelfWeight]:
@@ -150,16 +151,6 @@ def is_braced(results: Results) -> bool:
     return any(shell.bracing for supported in results.loads.values() for shell in supported.values())
 
 
-def _one(factors: Mapping[Ends, float]) -> Ends | None:
-    """The end condition, where a finding is about one."""
-    return next(iter(factors)) if len(factors) == 1 else None
-
-
-def _alone(factors: Mapping[Ends, float]) -> str:
-    """The end condition of a sentence that is about one."""
-    return "".join(f"with {ends} ends " for ends in factors) if len(factors) == 1 else ""
-
-
 def _parts(factors: Mapping[Ends, float], of: str = "it") -> str:
     """Parts of the weight, by end condition if there are several."""
     several = len(factors) > 1
@@ -170,11 +161,6 @@ def _parts(factors: Mapping[Ends, float], of: str = "it") -> str:
 def _times(weighed: SelfWeight) -> str:
     least = "at least " if weighed.limit == "not followed" else ""
     return f"{least}{shown_factor(weighed.load_factor)} times"
-
-
-def light(results: Results, ends: list[Ends]) -> dict[Ends, float]:
-    """By end condition, the factors on its own weight that a shell carries, or is known to, where they are below 1."""
-    return _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
 
 
 def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, tuple[str, ...]]:
