@@ -295,7 +295,7 @@ class Spans:
         stops = _at_joints(mesh)
         stops[mesh.rod_start] = stops[mesh.rod_stop - 1] = True
         entries = np.flatnonzero(stops)
-        rods = np.searchsorted(mesh.rod_start, entries, side="right") - 1
+        rods = mesh.rod_of[entries]
         same = rods[1:] == rods[:-1]
         first, last = entries[:-1][same], entries[1:][same]
         middle = (first + last - 1) // 2 - rods[:-1][same]  # edges are counted rod by rod

@@ -7,11 +7,10 @@ to that, and in the equilibrium that it finds its joints are locked, where they 
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.errors import ConvergenceError
 from rodshell.formfinding.popup import PopUp
@@ -34,30 +33,30 @@ class LathLayer:
     Args:
         shell: the model of the laths alone, each straight when it is free of stress.
         blocks: (N,) the structure's block that holds each of its blocks.
-        rows: crossings that each lath runs over.
-        entries: entries of its mesh's `rod_nodes` at these crossings, lath by lath.
+        entries: entries of its mesh's `rod_nodes` at crossings, lath by lath; `crossings` which each of them is at.
     """
 
     shell: Shell
     blocks: Ints
     rod: Rod
-    rows: tuple[tuple[int, ...], ...]
     entries: Ints
+    crossings: Ints
 
     @property
     def pairs(self) -> Ints:
         """(d, 2) neighbouring crossings on each lath."""
-        return np.array([pair for row in self.rows for pair in pairwise(row)], dtype=np.intp).reshape(-1, 2)
+        return np.column_stack([self.crossings[:-1], self.crossings[1:]])[self.same_lath]
 
     def forces(self, axial: Floats) -> Floats:
         """(d,) mean axial force from crossing to crossing [N], tension positive, of those (e,) of the edges."""
-        first = self.entries - (np.searchsorted(self.shell.mesh.rod_start, self.entries, side="right") - 1)
+        edges = self.entries - self.shell.mesh.rod_of[self.entries]  # which are counted lath by lath
         sums = np.append(0.0, np.cumsum(axial))
-        stops = np.concatenate([np.ones(len(row), dtype=bool) for row in self.rows])
-        ends = np.cumsum([len(row) for row in self.rows]) - 1
-        stops[ends] = False
-        begin = np.flatnonzero(stops)
-        return np.asarray((sums[first[begin + 1]] - sums[first[begin]]) / (first[begin + 1] - first[begin]))
+        return np.asarray(np.diff(sums[edges])[self.same_lath] / np.diff(edges)[self.same_lath])
+
+    @property
+    def same_lath(self) -> Bools:
+        """Which crossings are on one lath with the next."""
+        return np.asarray(np.diff(self.shell.mesh.rod_of[self.entries]) == 0)
 
 
 @dataclass(frozen=True, eq=False)
