@@ -356,26 +356,20 @@ def _of_bracing(
     structure: Structure, found: Equilibrium, loads: Loads, limits: Limits, duration: Duration
 ) -> float | None:
     """Largest utilisation of the bracing; None: there is none, or its strength is not known."""
-    bracing = loads.bracing
-    if structure.cables is not None and isinstance(bracing, Cables):
-        known, area = preset_limits(bracing.rod, loads.strength.service_class).bending, area_of(bracing.rod)
-        pulls = ((found, duration), (structure.equilibrium, PERMANENT))  # prestress stays
-        shares = [
-            float(structure.bracing_forces(state).max(initial=0.0)) / (known[lasting] * area)
-            for state, lasting in pulls
-            if lasting in known
-        ]
-        return max(shares, default=None)
-    if structure.laths is None:
-        return None
-    rod, edges, asked = structure.laths.rod, len(structure.mesh.edges), replace(loads.strength, slip=None)
-    of_laths = limits if rod == structure.rod else preset_limits(rod, loads.strength.service_class)
+    bracing, asked, edges = loads.bracing, loads.strength, len(structure.mesh.edges)
     shares = list[float]()
-    for state, lasting in ((found, duration), (structure.equilibrium, PERMANENT)):  # laths stay bent, as rods do
-        alone = structure.laths_alone(state)
-        assert alone is not None
-        used = utilisation(*alone, rod, forces=state.forces[edges:], limits=of_laths, asked=asked, duration=lasting)
-        shares += used.largest.values()
+    for state, lasting in ((found, duration), (structure.equilibrium, PERMANENT)):  # prestress and bends of laths stay
+        if isinstance(bracing, Cables):
+            strength = preset_limits(bracing.rod, asked.service_class).bending.get(lasting)
+            pull = float(structure.bracing_forces(state).max(initial=0.0))
+            shares += [] if strength is None else [pull / (strength * area_of(bracing.rod))]
+        elif (layer := structure.laths) is not None:
+            used = utilisation(
+                *layer.alone(state, len(structure.shell.elements)), layer.rod, forces=state.forces[edges:],
+                limits=limits if layer.rod == structure.rod else preset_limits(layer.rod, asked.service_class),
+                asked=replace(asked, slip=None), duration=lasting,
+            )  # fmt: skip
+            shares += used.largest.values()
     return max(shares, default=None)
 
 

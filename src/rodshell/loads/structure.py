@@ -58,6 +58,13 @@ class LathLayer:
         """Which crossings are on one lath with the next."""
         return np.asarray(np.diff(self.shell.mesh.rod_of[self.entries]) == 0)
 
+    def alone(self, found: Equilibrium, first: int) -> tuple[Shell, Floats]:
+        """The model and the state of the laths alone, of whose elements an equilibrium of grid and laths has the first
+        after `first` others."""
+        elements = zip(found.elements[first:], self.shell.elements, strict=False)
+        alone = tuple(replace(there, blocks=here.blocks) for there, here in elements)  # type: ignore[type-var]
+        return self.shell.with_elements(alone), found.state[self.blocks]
+
 
 @dataclass(frozen=True, eq=False)
 class Structure:
@@ -152,16 +159,6 @@ class Structure:
             return frequencies(self.equilibrium, mass, count, edge_mass=spread).frequencies
         except ConvergenceError:  # one figure of many: it is missing, and the others stand
             return np.zeros(0)
-
-    def laths_alone(self, found: Equilibrium) -> tuple[Shell, Floats] | None:
-        """The model of the laths of a third layer alone and its state in an equilibrium; None: there are none."""
-        if self.laths is None:
-            return None
-        layer, count = self.laths, len(self.shell.elements)
-        of_laths = found.elements[count : count + len(layer.shell.elements)]
-        blocks = [element.blocks for element in layer.shell.elements]
-        alone = tuple(replace(element, blocks=at) for element, at in zip(of_laths, blocks, strict=True))  # type: ignore[type-var]
-        return layer.shell.with_elements(alone), found.state[layer.blocks]
 
     def shell_at(self, found: Equilibrium) -> Shell:
         """The grid's model with its source frames at an equilibrium of the structure, loaded or not."""
