@@ -162,33 +162,15 @@ def whole_percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
-def newtons(force: float) -> str:
-    return f"{rounded(force)} N"
+def _in(unit: str, factor: float = 1.0) -> Callable[[float], str]:
+    """How a number of SI is shown in a unit, of which it is `factor` times as many."""
+    return lambda value: f"{rounded(factor * value)}{unit}"
 
 
-def newton_metres(moment: float) -> str:
-    return f"{rounded(moment)} N m"
-
-
-def stress(pascals: float) -> str:
-    """A stress [Pa] in a unit of its size."""
-    return stress_text(pascals)
-
-
-def curvature(value: float) -> str:
-    return f"{rounded(value)} 1/m"
-
-
-def twist_rate(value: float) -> str:
-    return f"{rounded(value * 180 / pi)}\N{DEGREE SIGN}/m"
-
-
-def seconds(time: float) -> str:
-    return f"{time:.2f} s"
-
-
-def degrees(angle: float) -> str:
-    return f"{angle:.1f}\N{DEGREE SIGN}"
+newtons, newton_metres, curvature = _in(" N"), _in(" N m"), _in(" 1/m")
+twist_rate = _in("\N{DEGREE SIGN}/m", 180 / pi)
+stress = stress_text
+seconds, degrees = "{:.2f} s".format, "{:.1f}\N{DEGREE SIGN}".format
 
 
 def small(value: float | None) -> str:
