@@ -5,7 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 import rodshell as rs
-from rodshell.checks import Reactions, SelfWeight, reactions, self_weight
+from rodshell.checks.reactions import Reactions, reactions
+from rodshell.checks.self_weight import self_weight
+from rodshell.figures.checks import SelfWeight
 from tests.acceptance.cases import HEMISPHERE, ROD
 from tests.acceptance.rows import Row
 from tests.acceptance.targets_random import random_case

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import bending, bending_of
-from rodshell.checks.bending import fibre_distance, fibre_strain
+from rodshell.checks.bending import bending, bending_of, fibre_distance, fibre_strain
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 
 RADIUS = 0.2

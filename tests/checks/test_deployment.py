@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import Deployment, bending, check, deploy
+from rodshell.checks import check
 from rodshell.checks import deployment as module
-from rodshell.checks.deployment import LOWEST
+from rodshell.checks.bending import bending
+from rodshell.checks.deployment import LOWEST, Deployment, deploy
 from rodshell.formfinding.popup import laid_below
 from rodshell.formfinding.trim import Boundary
 from rodshell.model import Shell

@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import eigh
 
 import rodshell as rs
-from rodshell.checks import self_weight
+from rodshell.checks.self_weight import self_weight
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.formfinding.popup import Ends
 from rodshell.layout.cells import diagonals

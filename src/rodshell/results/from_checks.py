@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks import Bending as BendingCheck
 from rodshell.checks import Checks
+from rodshell.checks.bending import Bending as BendingCheck
 from rodshell.checks.bending import worst
 from rodshell.fabrication.fabricate import Fabricated
 from rodshell.figures.checks import Bending, Contact, WorstBent
