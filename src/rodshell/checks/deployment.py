@@ -63,10 +63,8 @@ class Gap:
     """Where a deployment was lost, seen from flat and from the final shape.
 
     Args:
-        reached: share up to which the path forwards was followed, on whichever branch; 0 where none was found from
-            flat.
-        left: share down to which the path backwards is stable.
-        limit: what ends it there, as of a `LoadPath`.
+        reached: share up to which the path forwards was followed, on whichever branch; 0: none was found from flat.
+        left: share down to which the path backwards is stable, where it ends as `limit` says (see `LoadPath`).
     """
 
     reached: float

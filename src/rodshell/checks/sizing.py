@@ -102,13 +102,11 @@ class Fit:
         joint: Joint | None = None,
         progress: Progress = silent,
     ) -> Self:
-        """By the net of a layout on its target.
+        """By the net of a layout on its target, which is marched when bends are first asked for.
 
         Args:
-            layout: of the rods on it.
             anchor: x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
             joint: ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
-            progress: called by the net, which is marched when bends are first asked for.
         """
         slender = SLENDER * target.size
         room = ROOM * layout.least_spacing
@@ -243,7 +241,7 @@ def require_likely_sizes(
     Args:
         width: of the shell [m].
         spacing: the smallest between rods [m].
-        section: of the rods, if it is known; one without a size is not judged.
+        section: one without a size is not judged.
         unit: that the target's file was read in [m], if it was.
 
     Raises:

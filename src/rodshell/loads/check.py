@@ -265,13 +265,11 @@ def loaded_shell(
     limits: Limits = Limits(), duration: Duration = "short",
     progress: Callable[[str], None] = lambda what: None,
 ) -> LoadedShell:  # fmt: skip
-    """A structure under one combination.
+    """A structure under one combination, from its equilibrium without the loads.
 
     Args:
-        structure: in equilibrium without the loads.
         load: what acts at the combination's factor 1.
         loads: for how stability is looked at, and for holes and slip of joints.
-        progress: called with what is being done.
     """
     unloaded, following = structure.equilibrium, partial(_following, progress, " the loads")
     path = load_path(unloaded, load, most=MOST, progress=following)

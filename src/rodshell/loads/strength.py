@@ -170,11 +170,9 @@ def utilisation(
     forces: Floats, limits: Limits, asked: Strength, duration: Duration, bent: Bending | None = None,
     moments: Floats | None = None, slip_moment: float | None = None,
 ) -> Utilisation:  # fmt: skip
-    """Utilisation of a shell in equilibrium.
+    """Utilisation of a shell in equilibrium, its source frames being at the state.
 
     Args:
-        shell: with its source frames at the state.
-        rod: section and material of every rod.
         forces: (e,) axial force of each edge, tension positive [N].
         asked: holes, slip and effective lengths.
         bent: the shell's bending, where it is known.

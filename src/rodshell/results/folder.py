@@ -305,12 +305,8 @@ def _recover(path: Path, but: Path | None = None) -> None:
 
 @dataclass(frozen=True)
 class _Commit:
-    """What is to be done so that a new result stands in its folder, as commit.json of its stage says it.
-
-    Args:
-        files: names of files that go from the stage into the folder; removes : of files that go from the folder.
-        replaces: the files and links that stood at these names, or where a folder has to be, and may go.
-    """
+    """What is to be done so that a new result stands in its folder, as commit.json of its stage says it: which files go
+    into the folder and which out of it, and what stood there, or where a folder has to be, and may go."""
 
     files: tuple[str, ...]
     removes: tuple[str, ...]

@@ -83,13 +83,8 @@ def checked_results(
 
 
 def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod_chosen: Iterable[str] = ()) -> Results:
-    """The results with what their drawings say, and with their verdict.
-
-    Args:
-        drawings: paper, project and the like, see `Drawings`.
-        name: of the result, if not its target's.
-        rod_chosen: which of the rod's "material" and "section" were chosen to fit.
-    """
+    """The results with what their drawings say, and with their verdict; `rod_chosen` is which of the rod's "material"
+    and "section" were chosen to fit."""
     found = results.changed(drawings=Drawings(**drawings), name=name or results.name)
     chosen = dict.fromkeys(rod_chosen, True)
     if chosen and found.rod:

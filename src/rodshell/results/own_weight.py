@@ -111,10 +111,10 @@ def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], boo
 def _of_parts(
     sentence: str, factors: Mapping[Ends, float], limit: float = 1.0, *, offers: tuple[str, ...] = (), **words: str
 ) -> Said:
-    """A finding on shells by the factors on their weight that they carry; on one alone with its end condition."""
-    one = next(iter(factors)) if len(factors) == 1 else None
-    words |= {"alone": f"with {one} ends " if one else "", "parts": _parts(factors)}
-    return said(sentence, one, min(factors.values()), limit, offers=offers, **words)
+    """A finding on shells by the factors on their weight that they carry; of a single shell it names the ends."""
+    ends = next(iter(factors)) if len(factors) == 1 else None
+    words |= {"alone": f"with {ends} ends " if ends else "", "parts": _parts(factors)}
+    return said(sentence, ends, min(factors.values()), limit, offers=offers, **words)
 
 
 def _carried(results: Results, ends: Sequence[Ends]) -> dict[Ends, SelfWeight]:
