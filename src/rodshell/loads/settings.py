@@ -17,7 +17,7 @@ AcrossOpenings = Literal["refuse", "leave out"]
 
 def _pattern(value: str) -> str:
     """ "both", "one" or "every = n"."""
-    from rodshell.layout.cells import Pattern  # here, as it needs NumPy
+    from rodshell.layout.cells import Pattern  # here, as it needs SciPy
 
     Pattern.of(value)
     return value
