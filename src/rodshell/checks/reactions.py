@@ -199,15 +199,10 @@ def cut_forces(shell: Shell, state: Floats) -> Floats:
     mesh, start = shell.mesh, shell.mesh.rod_start
     gradient = _on_places(shell, state)
     if len(shell.ghosts):  # a clamp holds the ghost node before a rod's start, too
-        order = np.argsort(shell.ghosts)
-        at_ghosts = np.zeros((len(shell.ghosts), 3))
+        of_rods = np.zeros_like(state)
         for element in shell.within:
-            rows = _rows(element, state)
-            for column in range(element.blocks.shape[1]):
-                held = np.isin(element.blocks[:, column], shell.ghosts)
-                found = order[np.searchsorted(shell.ghosts[order], element.blocks[held, column])]
-                np.add.at(at_ghosts, found, rows[held, column])
-        gradient[start] += at_ghosts[::2]
+            element.evaluate(state, of_rods)
+        gradient[start] += of_rods[shell.ghosts[::2]]
     before = np.cumsum(gradient, axis=0)
     before -= np.repeat(before[start] - gradient[start], mesh.rod_stop - start, axis=0)
     inner = np.ones(len(gradient), dtype=bool)
