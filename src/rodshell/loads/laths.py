@@ -43,7 +43,7 @@ def laid(laths: Laths, structure: Structure, target: Target) -> Structure:
     mesh, before = structure.mesh, structure.equilibrium
     if laths.rod is None:
         raise InputError("these laths have no rod of their own: give one, such as that of the grid")
-    pairs = braced_diagonals(mesh, structure.positions(before), target, laths.pattern, laths.across_openings)
+    pairs = braced_diagonals(laths, structure, target)
     rows = lines(pairs, flat_joints(mesh.grid))
     normals = joint_normals(mesh, structure.positions(before))
     over = before.state[outer_nodes(mesh)] + laths.eccentricity * normals
@@ -137,7 +137,7 @@ def _joined(structure: Structure, layer: LathLayer, placed: Floats, ties: tuple[
     half = np.where(layer.same_lath, np.diff(shell.mesh.stations[layer.entries]), 0.0) / 2
     reach = np.append(half, 0.0) + np.append(0.0, half)  # the load of a lath goes to its nearest joint
     np.add.at(mass, outer_nodes(structure.mesh)[layer.crossings], layer.rod.mass_per_length * reach)
-    grid = structure.shell.with_elements(found.elements[: len(structure.shell.elements)])
+    grid = structure.shell_at(found)
     return replace(structure, shell=grid, equilibrium=found, braced=layer.pairs, bracing_mass=mass, laths=layer)
 
 
