@@ -212,7 +212,15 @@ def _cut(
     for _ in range(_BISECTIONS):
         middle, there = placed(0.5 * (low + high))
         low, high = np.where(there[:, None], middle, low), np.where(there[:, None], high, middle)
-    return _stitched(target, points, low, faces[inside[faces].all(axis=1)], single, double)
+    a, b, c, d = np.split(len(points) + np.arange(len(low)), np.cumsum([len(single), len(single), len(double)]))
+    points, (p, q) = np.vstack([points, low]), double[:, 1:].T
+    middle = len(points) + np.arange(len(double))  # of what is left of a face with two corners inside
+    points = np.vstack([points, target.retract(0.25 * (points[p] + points[q] + points[c] + points[d]))])
+    around = [np.column_stack([*side, middle]) for side in ((p, q), (q, d), (d, c), (c, p))]
+    faces = np.concatenate([faces[inside[faces].all(axis=1)], np.column_stack([single[:, 0], a, b]), *around])
+    used = np.zeros(len(points), dtype=bool)
+    used[faces] = True
+    return points[used], (np.cumsum(used) - 1)[faces]
 
 
 def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
@@ -223,25 +231,6 @@ def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
     single = np.take_along_axis(single, (inside[single].argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     double = np.take_along_axis(double, ((~inside[double]).argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     return single, double, np.concatenate([single[:, [0, 1]], single[:, [0, 2]], double[:, [1, 0]], double[:, [2, 0]]])
-
-
-def _stitched(
-    target: Target, points: Floats, ends: Floats, whole: Ints, single: Ints, double: Ints
-) -> tuple[Floats, Ints]:
-    """Whole faces, and what is left of those that were cut at the `ends` of their sides."""
-    a, b, c, d = np.split(len(points) + np.arange(len(ends)), np.cumsum([len(single), len(single), len(double)]))
-    points = np.vstack([points, ends])
-    around = [(double[:, 1], double[:, 2]), (double[:, 2], d), (d, c), (c, double[:, 1])]
-    middle = len(points) + np.arange(len(double))
-    points = np.vstack(
-        [points, target.retract(0.25 * (points[double[:, 1]] + points[double[:, 2]] + points[c] + points[d]))]
-    )
-    faces = np.concatenate(
-        [whole, np.column_stack([single[:, 0], a, b]), *(np.column_stack([p, q, middle]) for p, q in around)]
-    )
-    used = np.zeros(len(points), dtype=bool)
-    used[faces] = True
-    return points[used], (np.cumsum(used) - 1)[faces]
 
 
 def _divided(target: Target, points: Floats, faces: Ints, *, longest: float) -> tuple[Floats, Ints]:
