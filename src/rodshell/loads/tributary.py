@@ -210,10 +210,11 @@ def _cut(
     single, double, sides = _across(inside, faces)
     low, high = points[sides[:, 0]], points[sides[:, 1]]
     for _ in range(_BISECTIONS):
-        middle, there = placed(0.5 * (low + high))
-        low, high = np.where(there[:, None], middle, low), np.where(there[:, None], high, middle)
+        between, there = placed(0.5 * (low + high))
+        low, high = np.where(there[:, None], between, low), np.where(there[:, None], high, between)
     a, b, c, d = np.split(len(points) + np.arange(len(low)), np.cumsum([len(single), len(single), len(double)]))
-    points, (p, q) = np.vstack([points, low]), double[:, 1:].T
+    p, q = double[:, 1:].T
+    points = np.vstack([points, low])
     middle = len(points) + np.arange(len(double))  # of what is left of a face with two corners inside
     points = np.vstack([points, target.retract(0.25 * (points[p] + points[q] + points[c] + points[d]))])
     around = [np.column_stack([*side, middle]) for side in ((p, q), (q, d), (d, c), (c, p))]
