@@ -34,6 +34,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, State
 from rodshell.checks.reactions import joint_loads
 from rodshell.errors import InputError
+from rodshell.figures.form import Bent
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.relative_rotation import is_elastic
@@ -227,20 +228,13 @@ class Bending:
         return None if self.strain is None else np.asarray(self.strain - np.abs(self.axial_strain))
 
 
-PARTS = {
-    "max_bending_strain": "bending_strain",
-    "normal_curvature": "normal_curvature",
-    "geodesic_curvature": "geodesic_curvature",
-    "twist_rate": "twist_rate",
-    "torsion_stress": "torsion_stress",
-}
-
-
 def worst(shapes: Sequence[Bending], where: slice = slice(None)) -> dict[str, float | None]:
-    """The figures of a `Bent`, each the largest over a part of the rods' nodes in any of the shapes."""
+    """The figures of a `Bent`, each the largest over a part of the rods' nodes in any of the shapes; how much of a
+    strength that uses is counted elsewhere."""
     sharp = max(float(shape.curvature[where].max()) for shape in shapes)
     figures: dict[str, float | None] = {"min_radius": 1 / sharp if sharp > 0 else None}
-    for key, name in {"max_strain": "strain", "max_stress": "stress", **PARTS}.items():
+    for key in Bent.model_fields.keys() - {"min_radius", "utilisation"}:
+        name = key.removeprefix("max_")
         parts = [part[where] for shape in shapes if (part := getattr(shape, name)) is not None]
         figures[key] = max((float(np.abs(part).max()) for part in parts), default=None)
     return figures
