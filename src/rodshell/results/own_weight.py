@@ -11,7 +11,6 @@ from math import inf, sqrt
 from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.form import RodType
-from rodshell.figures.form import Section as RodSection
 from rodshell.figures.records import Ends
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import half_sides, sizes_sold
@@ -222,9 +221,8 @@ def _gain(rod: RodType, section: Section) -> float:
 
 def _sharper(rod: RodType, section: Section) -> float:
     """How many times as much the same bends strain this section, at most."""
-    other = half_sides(RodSection.model_validate(written(section)))
-    now = half_sides(rod.section) if rod.section else ()
-    return max((new / old for new, old in zip(other, now, strict=False)), default=inf)
+    sides = zip(section.half_widths, half_sides(rod), strict=False)
+    return max((new / old for new, old in sides), default=inf)
 
 
 def _too_much(results: Results, ends: Ends, sharper: float) -> str:

@@ -29,8 +29,7 @@ def by_design_strength(results: Results) -> bool:
 
 def holds_while_erected(results: Results, used: float) -> bool:
     """Whether a preset's rods that use so much of their design strength for erection stay below what breaks them."""
-    characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None
-    strength, of_preset = (
-        (results.bending.erection_strength, results.bending.strength_of) if results.bending else (0, "")
-    )
-    return bool(of_preset and strength and characteristic and used * strength <= characteristic)
+    bending, preset = results.bending, results.rod.preset if results.rod else None
+    if bending is None or not bending.strength_of or not bending.erection_strength or preset is None:
+        return False
+    return used * bending.erection_strength <= (preset.bending_strength or 0.0)
