@@ -209,25 +209,18 @@ def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
     if "version_gridshell" in content:
         content["version_rodshell"] = content.pop("version_gridshell")
     if version < 2:
-        content["drape"] = _renamed(content.get("drape"), "own_ends", "net_deviation")
-        patches = content.get("patches")
-        if isinstance(patches, list):
-            content["patches"] = [
-                {**patch, "drape": _renamed(patch.get("drape"), "own_ends", "net_deviation")}
-                if isinstance(patch, dict)
-                else patch
-                for patch in patches
-            ]
-        if content["drape"] is None:
-            del content["drape"]
+        content = _with_net_deviation(content)
+        if isinstance(patches := content.get("patches"), list):
+            content["patches"] = [_with_net_deviation(patch) for patch in patches]
     return content
 
 
-def _renamed(table: Any, old: str, new: str) -> Any:
-    """A table with another name of a key."""
-    if not isinstance(table, dict) or old not in table:
-        return table
-    return {new if name == old else name: value for name, value in table.items()}
+def _with_net_deviation(part: Any) -> Any:
+    """A form or a patch whose drape has that name in place of the one that it had before version 2."""
+    drape = part.get("drape") if isinstance(part, dict) else None
+    if not isinstance(drape, dict):
+        return part
+    return part | {"drape": {"net_deviation" if name == "own_ends" else name: drape[name] for name in drape}}
 
 
 def contradictions(results: Results) -> Iterator[str]:
