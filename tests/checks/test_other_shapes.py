@@ -7,8 +7,9 @@ import pytest
 from scipy.linalg import eigh
 
 import rodshell as rs
-from rodshell.checks import OtherShape, OtherShapes, check, deploy, other_shapes
-from rodshell.checks.other_shapes import _Search, spanned
+from rodshell.checks import check
+from rodshell.checks.deployment import OtherShape, deploy
+from rodshell.checks.other_shapes import OtherShapes, _Search, other_shapes, spanned
 from rodshell.joints import Joint
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports

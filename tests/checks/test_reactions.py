@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import Reactions, reactions
-from rodshell.checks.reactions import joint_loads
+from rodshell.checks.reactions import Reactions, joint_loads, reactions
 from rodshell.figures.records import Ends
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import Boundary

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import check, contact_of
+from rodshell.checks import check
 from rodshell.checks.contact import (
     APART,
     FLATTEST,
     _Edges,
     _Outline,
     contact,
+    contact_of,
     nearest_points,
 )
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid

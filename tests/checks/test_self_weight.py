@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import SelfWeight, self_weight
+from rodshell.checks.self_weight import self_weight
+from rodshell.figures.checks import SelfWeight
 from rodshell.model import Shell
 from tests.checks.shells import ROD, dome
 

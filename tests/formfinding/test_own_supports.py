@@ -159,3 +159,9 @@ def test_locked_joints_come_before_the_springs_of_supports():
     assert [element.blocks.shape for element in shell.elements] == [element.blocks.shape for element in elements]
     assert len(shell.springs) == 1
     assert structure.locked_moments(structure.equilibrium) == pytest.approx(0.0, abs=1e-9)  # at rest as it stands
+
+
+def test_a_deployment_is_that_of_the_support_that_it_leads_to():
+    form = rs.find_form(rs.Hemisphere(radius=0.2), LAYOUT, ROD, ends=rs.Support("feet"))
+    assert form.checks.deployment.ends == "feet"
+    assert form.archive().deployed == "popped_feet"

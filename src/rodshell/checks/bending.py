@@ -34,6 +34,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, State
 from rodshell.checks.reactions import joint_loads
 from rodshell.errors import InputError
+from rodshell.figures.form import Bent
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.relative_rotation import is_elastic
@@ -132,15 +133,6 @@ def fibre_modulus(rod: Rod) -> float:
     return rod.material.youngs_modulus
 
 
-def stress_is_known(rod: Rod, *, twisted: bool) -> bool:
-    """Whether the stress of a rod is known, with that of torsion if it is `twisted`.
-
-    Args:
-        twisted: the rods can be twisted.
-    """
-    return not _missing(rod, twisted)
-
-
 def require_known_stress(rod: Rod, *, twisted: bool) -> None:
     """Refuse a given section whose stress is not known.
 
@@ -236,20 +228,13 @@ class Bending:
         return None if self.strain is None else np.asarray(self.strain - np.abs(self.axial_strain))
 
 
-PARTS = {
-    "max_bending_strain": "bending_strain",
-    "normal_curvature": "normal_curvature",
-    "geodesic_curvature": "geodesic_curvature",
-    "twist_rate": "twist_rate",
-    "torsion_stress": "torsion_stress",
-}
-
-
 def worst(shapes: Sequence[Bending], where: slice = slice(None)) -> dict[str, float | None]:
-    """The figures of a `Bent`, each the largest over a part of the rods' nodes in any of the shapes."""
+    """The figures of a `Bent`, each the largest over a part of the rods' nodes in any of the shapes; how much of a
+    strength that uses is counted elsewhere."""
     sharp = max(float(shape.curvature[where].max()) for shape in shapes)
     figures: dict[str, float | None] = {"min_radius": 1 / sharp if sharp > 0 else None}
-    for key, name in {"max_strain": "strain", "max_stress": "stress", **PARTS}.items():
+    for key in Bent.model_fields.keys() - {"min_radius", "utilisation"}:
+        name = key.removeprefix("max_")
         parts = [part[where] for shape in shapes if (part := getattr(shape, name)) is not None]
         figures[key] = max((float(np.abs(part).max()) for part in parts), default=None)
     return figures
@@ -261,8 +246,6 @@ def bending_of(
     """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis.
 
     Args:
-        rod: the section and material of every rod.
-        shear_weight: of the shear stress against the normal stress, see `checks.bending`.
         edge_strains: (e,) axial strains that stress the edges; default: against their rest lengths.
     """
     mesh, positions = shell.mesh, shell.positions(state)
@@ -316,7 +299,7 @@ def bending(
         twist_rate: (k,) twist per length [rad/m]; without, none.
         normals: (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without
             `components`.
-        shear_weight: of the shear stress against the normal stress, see `checks.bending`.
+        shear_weight: of the shear stress against the normal stress, see the module.
         edge_strains: (e,) as of `bending_of`.
         by_joints: (k, 3) along the normals of joints, how much sharper than their nodes bend the sides of them that
             bend most [1/m]; None: joints pass no moments about their normals.
@@ -328,14 +311,17 @@ def bending(
             within = np.copysign(np.sqrt(dot(by_joints, by_joints)), components[:, 1])
             components = np.column_stack([components[:, 0], components[:, 1] + within])
     curvature = np.linalg.norm(turns, axis=1)
-    axial = axial_strains(mesh, positions) if edge_strains is None else _mean_of_edges(mesh, edge_strains)
+    if edge_strains is None:
+        lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
+        edge_strains = lengths / mesh.edge_lengths - 1.0
+    axial = _mean_of_edges(mesh, edge_strains)
     twist = np.zeros(len(curvature)) if twist_rate is None else twist_rate
     stress = strain = sheared = normal = geodesic = None
     if components is not None:
         normal, geodesic = components.T
     elif normals is not None:
         normal, geodesic = _parts(turns, tangents, normals)
-    fibre, known = fibre_distance(rod), stress_is_known(rod, twisted=bool(twist.any()))
+    fibre, known = fibre_distance(rod), not _missing(rod, twisted=bool(twist.any()))
     # the strain of a fibre k times as far is that of a bend k times as sharp
     sharp, bends, sheared_by = curvature, components, twist
     if (local := varied_at_nodes(mesh, rod)) is not None:
@@ -354,11 +340,7 @@ def bending(
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
-    """(e, 3) first material director m1 of each edge in a `state` (N, 3).
-
-    Args:
-        frames: the shell's bending and twist, whose frames are transported to the state.
-    """
+    """(e, 3) first material director m1 of each edge in a `state` (N, 3), to which `frames` are transported."""
     m1 = frames.refreshed(state).material_directors(state)
     result = np.zeros((len(shell.mesh.edges) + len(shell.ghosts), 3))  # of ghost edges, too
     for side in range(2):
@@ -367,35 +349,11 @@ def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
 
 
 def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
-    """(k, 3) normal of the shell at each entry of `rod_nodes`; None where some rod crosses no other.
-
-    Args:
-        positions: (n, 3) of its nodes [m].
-    """
+    """(k, 3) normal of a shell with nodes at `positions` (n, 3) [m] at each entry of `rod_nodes`; None where some rod
+    crosses no other."""
     if (mesh.grid.joint_counts() == 0).any():
         return None
     return node_normals(mesh, positions)[mesh.rod_nodes]
-
-
-def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
-    """(k,) curvature [1/m] at each entry of `rod_nodes`.
-
-    Args:
-        positions: (n, 3) of its nodes [m].
-        clamps: (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
-    """
-    return np.asarray(np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1))
-
-
-def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:
-    """(k,) axial strain at each entry of `rod_nodes`: the mean over its edges, which at an end is one.
-
-    Args:
-        mesh: the rods, with their rest lengths.
-        positions: (n, 3) of its nodes [m].
-    """
-    lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
-    return _mean_of_edges(mesh, lengths / mesh.edge_lengths - 1.0)
 
 
 def _mean_of_edges(mesh: GridMesh, values: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """All checks of a shell."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from math import inf
 from typing import Any
@@ -91,14 +91,7 @@ class Checks:
             raise KeyError(
                 f"no shell with {ends} ends was checked: it was not asked for or did not converge; checked: {known}"
             )
-        return ShellChecks(
-            self.bending[ends],
-            self.reactions[ends],
-            self.joints[ends],
-            self.contact[ends],
-            self.self_weight.get(ends),
-            self.other_shapes.get(ends),
-        )
+        return ShellChecks(**{each.name: getattr(self, each.name).get(ends) for each in fields(ShellChecks)})
 
     @property
     def clamped_from_flat(self) -> bool | None:
@@ -115,9 +108,7 @@ class Checks:
     def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
-        turned: tuple[Said, ...] = ()
-        if self.clamped_from_flat is False:
-            turned = (said("turned", finals_first(self.bending)[0]),)
+        turned = (said("turned", finals_first(self.bending)[0]),) if self.clamped_from_flat is False else ()
         return (*self._late, *way, *turned, *self.tight)
 
     @property
@@ -177,7 +168,6 @@ def check(
 
     Args:
         popped: the shells of one footprint by their end condition.
-        rod: of which they are made.
         stages: of the deployment from flat of the pinned shell; 0: none.
         shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
         progress: called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and
@@ -251,7 +241,7 @@ def _long_checks(
     missing += [*(["the deployment from flat"] if upright else []), "other stable shapes"]
     try:
         for ends, shape in done.items():
-            weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
+            weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=partial(_weighing, ends, progress))
             missing.pop(0)
         if upright is not None:
             deployment = deploy_grids(
@@ -301,25 +291,16 @@ def _other_shapes(
     for number, (ends, shape) in enumerate(stable.items()):
         most = 2 * left // 3 if number == 0 else left
         left -= most
-        yield (
-            ends,
-            other_shapes(
-                shape.shell,
-                shape.equilibrium,
-                most_factorizations=most,
-                deployment=deployment if deployment and ends == deployment.ends else None,
-                progress=partial(_starting, ends, progress),
-            ),
-        )
+        way = deployment if deployment and ends == deployment.ends else None
+        report = partial(_starting, ends, progress)
+        found = other_shapes(shape.shell, shape.equilibrium, most_factorizations=most, deployment=way, progress=report)
+        yield ends, found
 
 
 def _starting(ends: Ends, progress: Progress, start: int) -> None:
     progress("other shapes", f"{ends} ends, start {start}", 0.0)
 
 
-def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
-    def report(count: int, factor: float) -> None:
-        done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
-        progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
-
-    return report
+def _weighing(ends: Ends, progress: Progress, count: int, factor: float) -> None:
+    done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
+    progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)

@@ -43,12 +43,7 @@ APART = Clearance(clearance=None, pairs=0, rods=None, where=None)
 
 
 def contact_of(shell: Shell, state: State, rod: Rod, *, each_grid: bool = False) -> Clearance:
-    """Contact of a shell of equal rods in a `state` (N, 3).
-
-    Args:
-        rod: the section of every rod.
-        each_grid: as of `contact`.
-    """
+    """Contact of a shell of equal rods in a `state` (N, 3); see `contact`."""
     frames = shell.frames
     directors = None if frames is None else edge_directors(shell, frames, state)
     return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors, each_grid=each_grid)

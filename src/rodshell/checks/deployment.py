@@ -63,10 +63,8 @@ class Gap:
     """Where a deployment was lost, seen from flat and from the final shape.
 
     Args:
-        reached: share up to which the path forwards was followed, on whichever branch; 0 where none was found from
-            flat.
-        left: share down to which the path backwards is stable.
-        limit: what ends it there, as of a `LoadPath`.
+        reached: share up to which the path forwards was followed, on whichever branch; 0: none was found from flat.
+        left: share down to which the path backwards is stable, where it ends as `limit` says (see `LoadPath`).
     """
 
     reached: float
@@ -106,12 +104,8 @@ class Deployment(figures.Deployment):
             most = max(moved or 0.0 for moved in self.snapped_by)
             continues = ", and continues to its final shape" if self.reached_from_flat else ""
             other = "; a small difference can make it snap elsewhere" if len(self.snaps) > FEW else ""
-            found.append(
-                said(
-                    "snaps", self.ends, most, unit="m",
-                    where=where, by=length_text(most), continues=continues, other=other,
-                )
-            )  # fmt: skip
+            by = length_text(most)
+            found.append(said("snaps", self.ends, most, unit="m", where=where, by=by, continues=continues, other=other))
         if self.reached_from_flat is False:
             where = "" if self.elsewhere is None else f", {self.elsewhere.words}"
             found.append(said("guided", self.ends, where=where))
@@ -183,7 +177,7 @@ def deploy_grids(popped: PopUp, *, stages: int, progress: Progress = lambda shar
         popped: with pinned ends.
     """
     grids = popped.alone or (popped,)
-    ways = [deploy(grid.shell, grid.equilibrium, stages=stages, progress=progress) for grid in grids]
+    ways = [deploy(grid.shell, grid.equilibrium, stages=stages, ends=popped.ends, progress=progress) for grid in grids]
     if len(ways) == 1:
         return ways[0]
     shares = [share for share in ways[0].share.tolist() if all(share in way.share for way in ways)]
@@ -243,7 +237,7 @@ class _Path:
     def backwards(self, start: Equilibrium, shares: Sequence[float]) -> list[Stage]:
         """Stages at descending shares, from the final shape at the first of them down to where the path has a gap."""
         self._progress(shares[0])
-        problem = self._problem(shares[0], self.shell.elements)
+        problem = self._problem(shares[0])
         final = self._counted(find_equilibrium(problem, start.state, start.forces))
         self._pattern, found = final.problem.pattern, [(shares[0], final)]
         if not final.report.stable:
@@ -275,13 +269,12 @@ class _Path:
 
     def low(self, last: Stage, share: float) -> Equilibrium | None:
         """The equilibrium at a small share to which Newton's method leads backwards, over gaps; None if it fails."""
-        (start, here), elements = last, self.shell.elements
+        start, here = last
         if not here.report.stable:
             return None
-        found = follow(
-            lambda t: self._problem((1 - t) * start + t * share, elements), here.state, here.forces, first_step=1.0
+        found = self._counted(
+            follow(lambda t: self._problem((1 - t) * start + t * share), here.state, here.forces, first_step=1.0)
         )
-        self._counted(found)
         return found if found.report.stable else None
 
     def end(self, last: Stage, share: float) -> tuple[float, Limit]:
@@ -325,19 +318,10 @@ class _Path:
         return way.found if way.t == stop else None
 
     def _trace(self, here: Equilibrium, start: float, stop: float, *, snap: bool, most: int) -> Trace:
-        def problem_at(share: float) -> Problem:
-            return self._problem(share, self.shell.elements)
-
         way = trace(
-            problem_at,
-            here,
-            start,
-            stop,
-            shortest=SHORTEST,
-            snap=snap,
-            most_factorizations=most,
+            self._problem, here, start, stop, shortest=SHORTEST, snap=snap, most_factorizations=most,
             progress=lambda share, _: self._progress(share),
-        )
+        )  # fmt: skip
         self.factorizations += way.factorizations
         return way
 
@@ -363,8 +347,9 @@ class _Path:
         self._smooth = there.report.stable  # where one guess leads astray, the next ones do, too
         return there if self._smooth and not unaccounted(before, there) else None
 
-    def _problem(self, share: float, elements: tuple[Elements, ...]) -> Problem:
-        goals = (1 - share) * self._first + share * self._last
+    def _problem(self, share: float, elements: tuple[Elements, ...] | None = None) -> Problem:
+        """At a share of the deployment; with the elements' source frames of another shape than the final one, if so."""
+        goals, elements = (1 - share) * self._first + share * self._last, elements or self.shell.elements
         return Problem.of_shell(self.shell, self._last, goals=goals, elements=elements, pattern=self._pattern)
 
 

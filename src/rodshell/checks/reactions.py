@@ -65,8 +65,8 @@ def reactions(shell: Shell, found: Equilibrium) -> Reactions:
     """Reactions of a shell without loads, whose ends are held or pushed by the springs of supports.
 
     Args:
-        shell: with its source frames at the equilibrium.
-        found: the equilibrium; its gradient at the ends, without that of the springs, is what the supports exert.
+        found: the equilibrium, at which the shell's source frames are; its gradient at the ends, without that of the
+            springs, is what the supports exert.
     """
     state, gradient = found.state, found.gradient
     if shell.springs:  # their forces are the supports'
@@ -142,10 +142,6 @@ class JointLoads:
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:
     """Of a shell in equilibrium at `state` (N, 3), its source frames being there; with shared DOFs or eccentric.
 
-    Args:
-        shell: with shared DOFs or eccentric joints, its source frames being at the state.
-        state: (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
-
     Raises:
         InputError: the moments of an energy between rods are not known.
     """
@@ -198,24 +194,15 @@ def cut_forces(shell: Shell, state: Floats) -> Floats:
 
     Its part along the edge is the axial force, the rest the shear force: what balances the rod's own energy up to the
     cut. A moment that a joint transfers acts as a pair of forces on the nodes next to it, so that shear forces are
-    those of spans only away from joints.
-
-    Args:
-        shell: its source frames being at the state.
-        state: (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
+    those of spans only away from joints. The shell is in equilibrium at `state` (N, 3), its source frames being there.
     """
     mesh, start = shell.mesh, shell.mesh.rod_start
     gradient = _on_places(shell, state)
     if len(shell.ghosts):  # a clamp holds the ghost node before a rod's start, too
-        order = np.argsort(shell.ghosts)
-        at_ghosts = np.zeros((len(shell.ghosts), 3))
+        of_rods = np.zeros_like(state)
         for element in shell.within:
-            rows = _rows(element, state)
-            for column in range(element.blocks.shape[1]):
-                held = np.isin(element.blocks[:, column], shell.ghosts)
-                found = order[np.searchsorted(shell.ghosts[order], element.blocks[held, column])]
-                np.add.at(at_ghosts, found, rows[held, column])
-        gradient[start] += at_ghosts[::2]
+            element.evaluate(state, of_rods)
+        gradient[start] += of_rods[shell.ghosts[::2]]
     before = np.cumsum(gradient, axis=0)
     before -= np.repeat(before[start] - gradient[start], mesh.rod_stop - start, axis=0)
     inner = np.ones(len(gradient), dtype=bool)

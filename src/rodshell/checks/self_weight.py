@@ -53,8 +53,7 @@ def self_weight(
     if whole is not None:
         moved = shell.positions(whole.state) - shell.positions(found.state)
         deflection = float(np.linalg.norm(moved, axis=1).max())
-    if end.limit == "none":
-        return SelfWeight(load_factor=None, deflection=deflection, limit="none", factorizations=end.factorizations)
     return SelfWeight(
-        load_factor=end.factor, deflection=deflection, limit=shown_limit(end.limit), factorizations=end.factorizations
-    )
+        load_factor=None if end.limit == "none" else end.factor, deflection=deflection, limit=shown_limit(end.limit),
+        factorizations=end.factorizations,
+    )  # fmt: skip

@@ -102,13 +102,11 @@ class Fit:
         joint: Joint | None = None,
         progress: Progress = silent,
     ) -> Self:
-        """By the net of a layout on its target.
+        """By the net of a layout on its target, which is marched when bends are first asked for.
 
         Args:
-            layout: of the rods on it.
             anchor: x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
             joint: ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
-            progress: called by the net, which is marched when bends are first asked for.
         """
         slender = SLENDER * target.size
         room = ROOM * layout.least_spacing
@@ -143,12 +141,7 @@ class Fit:
         return cls(width, slender, 2 * slender, lambda: bends, bends_from=alone)
 
     def by_pop_ups(self, shells: Iterable[PopUp], rod: Rod, *, shear_weight: float) -> Self:
-        """The same by the bends that shells of a provisional `rod` have in equilibrium.
-
-        Args:
-            shells: popped up from flat rods that are all alike.
-            shear_weight: strength over shear strength of its material.
-        """
+        """The same by the bends that shells of a provisional `rod`, all flat rods alike, have in equilibrium."""
         bends = bends_of_pop_ups(shells, rod)
         return replace(self, bends=lambda: bends, bends_from="the bends of a pop-up", shear_weight=shear_weight)
 
@@ -207,16 +200,8 @@ class Fit:
         strength: float | None = None,
         shape: Circle | Tube | None = None,
     ) -> str:
-        """Why `section` was chosen, in words: by what, the share of the strength expected, and what keeps it thin.
-
-        Other parameters as for `section`, which chose it.
-
-        Args:
-            section: the one that was chosen.
-            material: of the rods; a preset has its own strength and the sizes in which it is sold.
-            strength: permanent [Pa]; None: the preset's.
-            shape: a circle or a tube, if one was asked for.
-        """
+        """Why `section` was chosen, in words: by what, the share of the strength expected, and what keeps it thin. The
+        parameters are those of `section`, which chose it."""
         strength = strength or permanent_strength(material)
         if strength is None:
             return "as slender as the paper's rods, since no strength is known"
@@ -256,7 +241,7 @@ def require_likely_sizes(
     Args:
         width: of the shell [m].
         spacing: the smallest between rods [m].
-        section: of the rods, if it is known; one without a size is not judged.
+        section: one without a size is not judged.
         unit: that the target's file was read in [m], if it was.
 
     Raises:
@@ -282,13 +267,8 @@ def require_likely_sizes(
 
 
 def doubt_of_unit(width: float, section: Section | GivenSection | None, unit: float | None) -> str:
-    """What is said of a shell whose spacing follows its size, if no building is as wide, and no rod is like it.
-
-    Args:
-        width: of the shell [m].
-        section: of the rods, if it is given.
-        unit: that the target's file was read in [m], if it was.
-    """
+    """What is said of a shell whose spacing follows its size, if no building is as wide, and no rod is like it. The
+    parameters are those of `require_likely_sizes`."""
     depth = 0.0 if section is None else section.depth
     if unit is None or depth * KNOWN < width < depth * limit(MOST_SLENDER):
         return ""
@@ -297,14 +277,8 @@ def doubt_of_unit(width: float, section: Section | GivenSection | None, unit: fl
 
 
 def _other_unit(name: str, size: float, width: float, unit: float | None, usual: tuple[float, float]) -> str:
-    """What to check, and sizes in another unit that would suit each other.
-
-    Args:
-        name, size: what the shell is compared with [m].
-        width: of the shell [m].
-        unit: that its file was read in [m], or None.
-        usual: ratios of width and size.
-    """
+    """What to check, and sizes in another unit that would suit each other: the ratio of the width and a `size` [m] of
+    that `name` is one of the `usual` ones."""
     meant = list[str]()
     for other in UNITS:
         factor = other if width < usual[0] * size else 1 / other
@@ -322,11 +296,7 @@ def bends_of(
 ) -> Bends:
     """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature.
 
-    No rod runs across a crease.
-
-    Args:
-        layout: of the rods on it.
-        anchor: x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+    No rod runs across a crease. The axes cross at the `anchor`, see `Fit.on`.
     """
     if isinstance(layout, SurfaceLattice):
         return Bends(*surface_net(target, layout, anchor=anchor).curvatures)
@@ -355,11 +325,7 @@ def net_bends(net: ChebyshevNet) -> Bends:
 
 
 def bends_of_pop_ups(shells: Iterable[PopUp], rod: Rod) -> Bends:
-    """The bends at every node of every rod, at joints on the side that bends more.
-
-    Args:
-        rod: section and material of every rod.
-    """
+    """The bends at every node of every rod, at joints on the side that bends more."""
     parts = list[Bends]()
     for popped in shells:
         bent = bending_of(popped.shell, popped.state, rod)
@@ -371,11 +337,7 @@ def bends_of_pop_ups(shells: Iterable[PopUp], rod: Rod) -> Bends:
 
 
 def largest_strain(rod: Rod, bends: Bends, *, shear_weight: float = VON_MISES) -> float:
-    """Largest strain of a section that bends like this, with stretch, and torsion by its stress [-].
-
-    Args:
-        shear_weight: of the shear stress against the normal stress, see `checks.bending`.
-    """
+    """Largest strain of a section that bends like this, with stretch, and torsion by its stress [-]."""
     assert rod.material is not None
     axial = bends.force * _bend_over_stretch(rod)
     stress = largest_stress(rod, bends.normal, bends.geodesic, axial, bends.twist, weight=shear_weight)

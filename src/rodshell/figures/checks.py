@@ -1,6 +1,5 @@
 """What was checked of a shell without loads, and under its own weight."""
 
-from math import inf
 from re import fullmatch
 
 from pydantic import Field
@@ -126,13 +125,6 @@ class SelfWeight(Record):
     braced_factor: Number = key("the load_factor of the shell with its bracing and locked joints")
     braced_limit: Text | None = key("as limit, of the braced shell; absent without bracing")
     factorizations: Whole | None = key("factorisations of the tangent")
-
-    @property
-    def at_least(self) -> float:
-        """The factor as a number: infinite above 100, 0 where nothing is known."""
-        if self.load_factor is not None:
-            return self.load_factor
-        return inf if self.limit == "none" else 0.0
 
 
 class EndsInTheAir(Record):

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
+import numpy as np
+
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.quantities import (
     Angle,
@@ -32,7 +35,6 @@ from rodshell.units import read_quantity, shown
 from rodshell.validation import listed, number, point, texts
 
 if TYPE_CHECKING:
-    from rodshell.arrays import Floats
     from rodshell.loads.tributary import LoadedNodes
     from rodshell.targets.heightfield import Formula
 
@@ -52,7 +54,7 @@ class SelfWeight:
     def __post_init__(self) -> None:
         checked(self, "the {}")
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
 
         Raises:
@@ -85,10 +87,8 @@ class Snow:
     def __post_init__(self) -> None:
         checked(self, "the snow's {}")
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N]."""
-        import numpy as np  # here, so that the command line's help need not wait for it
-
         if self.distribution == "uniform":
             return nodes.downwards(self.value * nodes.tributary.plan)
         along = nodes.along(self.direction)[:, 0]
@@ -148,18 +148,16 @@ class Wind:
     def _formula(self) -> "Formula | None":
         if not isinstance(self.coefficient, str):
             return None
-        from rodshell.targets.heightfield import parse_formula  # here, as it needs NumPy
+        from rodshell.targets.heightfield import parse_formula  # here, as it needs SciPy
 
         return parse_formula(self.coefficient)
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
 
         Raises:
             InputError: the formula is not finite at a node.
         """
-        import numpy as np
-
         coefficient = np.full(len(nodes.positions), 0.0 if self._formula else float(self.coefficient))
         if self._formula is not None:
             x, y = nodes.along(self.direction).T
@@ -188,13 +186,13 @@ class PointLoad:
     def __post_init__(self) -> None:
         checked(self, {"at": "the point of a load", "force": "the force of a point load"})
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
 
         Raises:
             InputError: no rod is near.
         """
-        result = 0.0 * nodes.positions
+        result = np.zeros_like(nodes.positions)
         result[nodes.nearest(self.at, "a point load")] = self.force
         return result
 
@@ -215,14 +213,12 @@ class LineLoad:
         object.__setattr__(self, "line", tuple(point("a point of a line load", place) for place in line))
         checked(self, "the {} of a line load")
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
 
         Raises:
             InputError: a part of the line is away from every rod.
         """
-        import numpy as np
-
         result, line = np.zeros_like(nodes.positions), np.array(self.line)
         lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
         for a, b, length in zip(line[:-1], line[1:], lengths, strict=True):
@@ -282,7 +278,7 @@ class Forces(Protocol):
 
     lasting: ClassVar[Duration]
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) on each node [N]."""
         ...
 

@@ -21,11 +21,7 @@ from rodshell.model.rod_sections import RodSections
 
 
 def locked(joints: LockedJoints, structure: Structure) -> Structure:
-    """The structure with its joints locked as it stands, in the same equilibrium.
-
-    Args:
-        structure: erected and braced, its joints pins.
-    """
+    """The structure, erected, braced and with pins, with its joints locked as it stands, in the same equilibrium."""
     shell, before = structure.shell, structure.equilibrium
     mesh = shell.mesh
     rod_nodes = RodNodes(mesh, shell.node_blocks, shell.first_angle)

@@ -17,7 +17,7 @@ AcrossOpenings = Literal["refuse", "leave out"]
 
 def _pattern(value: str) -> str:
     """ "both", "one" or "every = n"."""
-    from rodshell.layout.cells import Pattern  # here, as it needs NumPy
+    from rodshell.layout.cells import Pattern  # here, as it needs SciPy
 
     Pattern.of(value)
     return value
@@ -33,15 +33,9 @@ OnOpenings = Annotated[AcrossOpenings, "what becomes of diagonals across an open
 class Cables:
     """Cables that carry tension alone, straight from joint to joint, in the outer layer of rods.
 
-    Args:
-        rod: section and material of the cables; of their stiffnesses EA counts.
-        pattern: "both" diagonals of every cell, "one", or "every = n": lines of both through every n-th joint.
-        prestrain: by which the erected shell's cables are shorter, free of stress, than where they go [-]. Slack cables
-            brace nothing: factors without prestress are small.
-        ends_at: where lines of cables end: at the outermost "joints", so that the fields at the rim are not braced, or
-            at the "supports" beyond.
-        across_openings: what becomes of diagonals that leave the shell, across an opening: the bracing is refused, or
-            they are left out.
+    Of the stiffnesses of their rod EA counts. A pattern of "every = n" has lines of both diagonals through every n-th
+    joint. Slack cables brace nothing: factors without a prestrain are small. Lines that end at the outermost joints
+    leave the fields at the rim without bracing.
     """
 
     kind: ClassVar = "cables"
@@ -62,13 +56,8 @@ class Cables:
 
 @dataclass(frozen=True, kw_only=True)
 class Laths:
-    """A third layer of laths.
-
-    Args:
-        rod: section and material; None: those of the grid's rods.
-        pattern, across_openings: as of `Cables`.
-        eccentricity: 0: they share the joints' nodes.
-    """
+    """A third layer of laths: by default of the grid's rods, which share the joints' nodes where they have no
+    eccentricity."""
 
     kind: ClassVar = "laths"
     pattern: Diagonals = "one"
@@ -92,10 +81,8 @@ class LockedJoints:
     """Pins that are tightened before loads act.
 
     Args:
-        shear: stiffness of a tightened joint about its normal [N m/rad]; `inf` is rigid.
-        slip: moment about the normal that it transfers before it slips [N m]; None: not known. With `Strength.slip`
-            both count together.
-
+        shear: [N m/rad]; `inf` is rigid.
+        slip: [N m]; with `Strength.slip` both count together.
     """
 
     shear: Annotated[Stiffness, "stiffness about the normal of pins tightened after erection"]
@@ -130,12 +117,10 @@ def _imperfection(value: object) -> str | float:
 
 @dataclass(frozen=True, kw_only=True)
 class Stability:
-    """How stability is looked at.
+    """How stability is looked at: of the perfect shell, and with an imperfection in each mode, of either sign.
 
     Args:
-        imperfection: largest displacement of the geometry with imperfections [m], or a part of the span such as
-            "span/500"; None: the perfect geometry alone.
-        modes: lowest buckling modes that are looked for; an imperfection in each of them is tried, with either sign.
+        imperfection: largest displacement [m], or a part of the span such as "span/500"; None: the perfect shell alone.
     """
 
     imperfection: Annotated[
@@ -149,11 +134,7 @@ class Stability:
         whole("the number of modes", self.modes, 1, 1000)
 
     def amplitude(self, span: float) -> float | None:
-        """Largest displacement of the geometry with imperfections [m]; None: the perfect geometry alone.
-
-        Args:
-            span: of the shell [m].
-        """
+        """Largest displacement of an imperfect shell of a `span` [m], in m; None: the perfect one alone."""
         given = self.imperfection
         if not isinstance(given, str):
             return None if given is None else positive("the imperfection", given, "m")

@@ -38,7 +38,7 @@ from rodshell.layout import GridMesh
 from rodshell.loads.settings import Strength
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
-from rodshell.rods.design_strength import DESIGN, DURATIONS, Duration
+from rodshell.rods.design_strength import DESIGN, DURATIONS, DesignFactors, Duration
 from rodshell.rods.section import GivenSection, Rod, Section
 from rodshell.validation import brief
 
@@ -59,31 +59,28 @@ class Limits(DesignStrength):
         return {name: strength for name, strength in known.items() if strength is not None}
 
     @staticmethod
-    def of(
-        rod: Rod, asked: Strength, *,
-        characteristic: float | None = None, of_preset: bool = True, shear_weight: float = VON_MISES,
-    ) -> "Limits":  # fmt: skip
-        """The limits of a rod.
+    def of(rod: Rod, asked: Strength, *, given: float | None = None, shear_weight: float | None = None) -> "Limits":
+        """The limits of a rod: what is `asked`, or else one strength for every duration of load, or else the preset's.
 
         Args:
-            asked: what was given for it.
-            characteristic: bending strength [Pa]; None: not known.
-            of_preset: whether it is the preset's; a given one is taken as it is, for every duration.
-            shear_weight: bending strength over shear strength.
+            given: bending strength [Pa] in place of that of the rod's preset.
+            shear_weight: bending strength over shear strength; default: the preset's.
 
         Raises:
             InputError: a service class is given, and nothing depends on it.
         """
-        name = rod.material.name if rod.material is not None else None
-        factors = DESIGN.get(name) if name is not None else None
+        factors, service = _factors(rod), asked.service_class or 2
         moist = factors is not None and len(factors.factors) > 1
-        judged = not asked.given and of_preset and factors is not None and characteristic is not None
-        if asked.service_class is not None and not (moist and (judged or not asked.given)):
+        if asked.service_class is not None and (asked.given or not moist):
             raise InputError(
                 f"strength.service_class = {asked.service_class}: only the strengths of timber presets depend on it: "
                 "leave it out"
             )
-        service = asked.service_class or 2
+        characteristic, shear = None, None
+        if (material := rod.material) is not None:
+            characteristic, shear = material.bending_strength, material.shear_strength
+        if shear_weight is None:
+            shear_weight = characteristic / shear if characteristic and shear else VON_MISES
         bending: dict[Duration, float] = {}
         source = "no design strength is known"
         if asked.given:
@@ -93,12 +90,12 @@ class Limits(DesignStrength):
                 if known is not None:
                     bending[duration] = known
             source = "design strengths as given"
-        elif not of_preset and characteristic is not None:
-            bending = dict.fromkeys(DURATIONS, characteristic)
+        elif given is not None:
+            bending = dict.fromkeys(DURATIONS, given)
             source = "the strength as given, for every duration of load"
-        elif judged and factors is not None and characteristic is not None:
+        elif factors is not None and characteristic is not None and material is not None:
             bending = {key: share * characteristic for key, share in factors.by_duration(service).items()}
-            source = f"{name}, characteristic {1e-6 * characteristic:.4g} MPa; {factors.source}"
+            source = f"{material.name}, characteristic {1e-6 * characteristic:.4g} MPa; {factors.source}"
             source += f"; service class {service}" if moist else ""
         creep = None
         if factors is not None and factors.creep:
@@ -112,24 +109,20 @@ class Limits(DesignStrength):
             cracked=factors.cracked if factors is not None else 1.0,
             creep=creep,
             source=source,
-            given=bool(asked.given) or not of_preset,
+            given=bool(asked.given) or given is not None,
         )
 
 
 def preset_limits(rod: Rod, service_class: int | None) -> Limits:
-    """The limits of a rod by its material's preset; of other materials none is known.
+    """The limits of a rod by its material's preset; of other materials none is known."""
+    factors = _factors(rod)
+    moist = factors is not None and len(factors.factors) > 1
+    return Limits.of(rod, Strength(service_class=service_class if moist else None))
 
-    Args:
-        service_class: of timber, as of `Strength`.
-    """
-    material = rod.material
-    factors = None if material is None or material.name is None else DESIGN.get(material.name)
-    if material is None or factors is None:
-        return Limits()
-    moist, bending, shear = len(factors.factors) > 1, material.bending_strength, material.shear_strength
-    weight = VON_MISES if bending is None or shear is None else bending / shear
-    asked = Strength(service_class=service_class if moist else None)
-    return Limits.of(rod, asked, characteristic=bending, shear_weight=weight)
+
+def _factors(rod: Rod) -> DesignFactors | None:
+    """What building codes make of the strengths of the rod's preset, if it has one that they know."""
+    return None if rod.material is None or rod.material.name is None else DESIGN.get(rod.material.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,11 +151,8 @@ class Utilisation:
         return None if by is None else (by, int(np.argmax(self.uses[by])))
 
     def with_permanent(self, permanent: "Utilisation") -> "Utilisation":
-        """The same, where the erected shell's own utilisation counts too, and the slip of its joints.
-
-        Args:
-            permanent: of the erected shell by the permanent strength.
-        """
+        """The same, where the erected shell's own utilisation counts too, by the permanent strength, and the slip of
+        its joints."""
         uses = dict(self.uses)
         if "slip" in permanent.uses:
             uses["slip_unloaded"] = permanent.uses["slip"]
@@ -177,11 +167,9 @@ def utilisation(
     forces: Floats, limits: Limits, asked: Strength, duration: Duration, bent: Bending | None = None,
     moments: Floats | None = None, slip_moment: float | None = None,
 ) -> Utilisation:  # fmt: skip
-    """Utilisation of a shell in equilibrium.
+    """Utilisation of a shell in equilibrium, its source frames being at the state.
 
     Args:
-        shell: with its source frames at the state.
-        rod: section and material of every rod.
         forces: (e,) axial force of each edge, tension positive [N].
         asked: holes, slip and effective lengths.
         bent: the shell's bending, where it is known.
@@ -227,11 +215,7 @@ def utilisation(
 
 def bending_under(shell: Shell, state: Floats, rod: Rod, forces: Floats, limits: Limits) -> Bending:
     """Bending and stress of a shell whose axial forces (e,) [N] are known: where rods are warm their lengths do not say
-    them.
-
-    Args:
-        shell, state, rod, forces, limits: as of `utilisation`.
-    """
+    them."""
     strains = forces / shell.stretch.stiffness
     return bending_of(shell, state, rod, shear_weight=limits.shear_weight, edge_strains=strains)
 
@@ -264,11 +248,8 @@ def net_section(section: Section | GivenSection, hole: float) -> float:
 
 
 def net_factors(mesh: GridMesh, section: Section | GivenSection, hole: float) -> Floats:
-    """(k,) stress of the net section over that of the full one, at each entry of `rod_nodes`: 1 but at joints.
-
-    Args:
-        section, hole: as of `net_section`; 0: there is no hole.
-    """
+    """(k,) stress of the net section over that of the full one, at each entry of `rod_nodes`: 1 but at joints with
+    a `hole` [m]."""
     factors = np.ones(len(mesh.rod_nodes))
     if hole:
         factors[_at_joints(mesh)] = net_section(section, hole)
@@ -309,7 +290,7 @@ class Spans:
         stops = _at_joints(mesh)
         stops[mesh.rod_start] = stops[mesh.rod_stop - 1] = True
         entries = np.flatnonzero(stops)
-        rods = np.searchsorted(mesh.rod_start, entries, side="right") - 1
+        rods = mesh.rod_of[entries]
         same = rods[1:] == rods[:-1]
         first, last = entries[:-1][same], entries[1:][same]
         middle = (first + last - 1) // 2 - rods[:-1][same]  # edges are counted rod by rod

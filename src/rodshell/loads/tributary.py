@@ -6,10 +6,10 @@ parts where several are as near. So the areas add up to those of the surface and
 triangles' size, and those of a symmetric shell are symmetric: the triangles are laid along its rods from its anchor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import cos, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,9 +21,6 @@ from rodshell.targets import Target
 from rodshell.targets.freeform import Freeform
 from rodshell.units import length_text
 from rodshell.validation import brief
-
-if TYPE_CHECKING:
-    from rodshell.targets.freeform import Freeform
 
 ACROSS = 240  # triangles' sides across the surface's larger width, at least
 _A_SPACING = 24.0  # sides on the distance of two rods, at least
@@ -159,36 +156,32 @@ def surface_triangles(
     along, across = (side.ravel() for side in np.meshgrid(ticks, ticks, indexing="ij"))
     cos, sin = np.cos(rotate), np.sin(rotate)
     plan = np.column_stack([cos * along - sin * across, sin * along + cos * across]) + anchor
-    z, inside = _lifted(target, plan)
+    points, inside = _lifted(target, plan)
     index = np.arange(len(plan)).reshape(len(ticks), len(ticks))
     sw, se, nw, ne = index[:-1, :-1], index[1:, :-1], index[:-1, 1:], index[1:, 1:]
     used = (inside[sw] | inside[se] | inside[nw] | inside[ne]).ravel()
     sw, se, nw, ne = (part.ravel()[used] for part in (sw, se, nw, ne))
     # four triangles a square, about its middle: no direction is preferred
     middle = len(plan) + np.arange(len(sw))
-    plan = np.vstack([plan, 0.25 * (plan[sw] + plan[se] + plan[nw] + plan[ne])])
-    of_middles, within = _lifted(target, plan[len(z) :])
-    z, inside = np.append(z, of_middles), np.append(inside, within)
+    middles, within = _lifted(target, 0.25 * (plan[sw] + plan[se] + plan[nw] + plan[ne]))
+    points, inside = np.vstack([points, middles]), np.append(inside, within)
     rim = [(sw, se), (se, ne), (ne, nw), (nw, sw)]
     faces = np.concatenate([np.column_stack([p, q, middle]) for p, q in rim])
-    return _halved(target, *_cut(target, plan, z, inside, faces), longest=STEEP * step)
+    cut = _cut(target, points, inside, faces, partial(_lifted, target))
+    return _halved(target, *cut, longest=STEEP * step)
 
 
-def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
-    """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end.
-
-    Args:
-        step: longest side [m].
-    """
+def mesh_triangles(target: Freeform, *, step: float) -> tuple[Floats, Ints]:
+    """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end; `step` is
+    the longest side [m]."""
     points, faces = _divided(target, target.surface.vertices, target.surface.faces, longest=step)
     inside = target.margin(points) >= -_ON_THE_EDGE * target.size
-    single, double, sides = _across(inside, faces)
-    low, high = points[sides[:, 0]], points[sides[:, 1]]
-    for _ in range(_BISECTIONS):
-        middle = target.retract(0.5 * (low + high))
-        within = target.margin(middle)[:, None] >= 0
-        low, high = np.where(within, middle, low), np.where(within, high, middle)
-    points, faces = _stitched(target, points, low, faces[inside[faces].all(axis=1)], single, double)
+
+    def on_surface(points: Floats) -> tuple[Floats, Bools]:
+        there = target.retract(points)
+        return there, target.margin(there) >= 0
+
+    points, faces = _cut(target, points, inside, faces, on_surface)
     a, b, c = (points[faces[:, k]] for k in range(3))
     upwards = np.cross(b - a, c - a)[:, 2].sum() >= 0
     return points, faces if upwards else faces[:, ::-1]
@@ -199,21 +192,36 @@ def _step(target: Target, spacing: float) -> float:
     return max(finest, min(2.0 * target.size / ACROSS, spacing / _A_SPACING))
 
 
-def _lifted(target: Target, plan: Floats) -> tuple[Floats, Bools]:
-    """Height (k,) of the surface over points of the plan, and whether they lie inside its end."""
+def _lifted(target: Target, points: Floats) -> tuple[Floats, Bools]:
+    """The points (k, 3) of the surface over points (k, 2 or more) of the plan, and whether they lie inside its end."""
+    plan = points[:, :2]
     z = target.height_at(plan)
-    known = np.isfinite(z)
-    inside = known.copy()
-    inside[known] = target.margin(np.column_stack([plan[known], z[known]])) >= 0
-    return np.where(known, z, 0.0), inside
+    inside = np.isfinite(z)
+    lifted = np.column_stack([plan, np.where(inside, z, 0.0)])
+    inside[inside] = target.margin(lifted[inside]) >= 0
+    return lifted, inside
 
 
-def _cut(target: Target, plan: Floats, z: Floats, inside: Bools, faces: Ints) -> tuple[Floats, Ints]:
-    """The faces inside the end, those across it cut; corners are counted again."""
+def _cut(
+    target: Target, points: Floats, inside: Bools, faces: Ints, placed: Callable[[Floats], tuple[Floats, Bools]]
+) -> tuple[Floats, Ints]:
+    """The faces inside the end, those across it cut; corners are counted again. `placed` gives points on the surface,
+    and whether they lie inside: with it the sides that lead out are cut by bisection."""
     single, double, sides = _across(inside, faces)
-    ends, height = _ends_of(target, plan, z, sides[:, 0], sides[:, 1])
-    points, there = np.column_stack([plan, z]), np.column_stack([ends, height])
-    return _stitched(target, points, there, faces[inside[faces].all(axis=1)], single, double)
+    low, high = points[sides[:, 0]], points[sides[:, 1]]
+    for _ in range(_BISECTIONS):
+        between, there = placed(0.5 * (low + high))
+        low, high = np.where(there[:, None], between, low), np.where(there[:, None], high, between)
+    a, b, c, d = np.split(len(points) + np.arange(len(low)), np.cumsum([len(single), len(single), len(double)]))
+    p, q = double[:, 1:].T
+    points = np.vstack([points, low])
+    middle = len(points) + np.arange(len(double))  # of what is left of a face with two corners inside
+    points = np.vstack([points, target.retract(0.25 * (points[p] + points[q] + points[c] + points[d]))])
+    around = [np.column_stack([*side, middle]) for side in ((p, q), (q, d), (d, c), (c, p))]
+    faces = np.concatenate([faces[inside[faces].all(axis=1)], np.column_stack([single[:, 0], a, b]), *around])
+    used = np.zeros(len(points), dtype=bool)
+    used[faces] = True
+    return points[used], (np.cumsum(used) - 1)[faces]
 
 
 def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
@@ -224,25 +232,6 @@ def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
     single = np.take_along_axis(single, (inside[single].argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     double = np.take_along_axis(double, ((~inside[double]).argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     return single, double, np.concatenate([single[:, [0, 1]], single[:, [0, 2]], double[:, [1, 0]], double[:, [2, 0]]])
-
-
-def _stitched(
-    target: Target, points: Floats, ends: Floats, whole: Ints, single: Ints, double: Ints
-) -> tuple[Floats, Ints]:
-    """Whole faces, and what is left of those that were cut at the `ends` of their sides."""
-    a, b, c, d = np.split(len(points) + np.arange(len(ends)), np.cumsum([len(single), len(single), len(double)]))
-    points = np.vstack([points, ends])
-    around = [(double[:, 1], double[:, 2]), (double[:, 2], d), (d, c), (c, double[:, 1])]
-    middle = len(points) + np.arange(len(double))
-    points = np.vstack(
-        [points, target.retract(0.25 * (points[double[:, 1]] + points[double[:, 2]] + points[c] + points[d]))]
-    )
-    faces = np.concatenate(
-        [whole, np.column_stack([single[:, 0], a, b]), *(np.column_stack([p, q, middle]) for p, q in around)]
-    )
-    used = np.zeros(len(points), dtype=bool)
-    used[faces] = True
-    return points[used], (np.cumsum(used) - 1)[faces]
 
 
 def _divided(target: Target, points: Floats, faces: Ints, *, longest: float) -> tuple[Floats, Ints]:
@@ -317,14 +306,3 @@ def _halved(target: Target, points: Floats, faces: Ints, *, longest: float) -> t
         quarters = [np.column_stack(corners) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
         faces = np.concatenate([faces[~long], *quarters])
     return points, faces
-
-
-def _ends_of(target: Target, plan: Floats, z: Floats, inner: Ints, outer: Ints) -> tuple[Floats, Floats]:
-    """Where the sides from inner to outer points meet the surface's end: the last points (k, 2) inside, and heights."""
-    low, high, height = plan[inner].copy(), plan[outer].copy(), z[inner].copy()
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        there, within = _lifted(target, middle)
-        low[within], height[within] = middle[within], there[within]
-        high[~within] = middle[~within]
-    return low, height

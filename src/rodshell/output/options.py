@@ -72,11 +72,7 @@ class OutputOptions(CheckOptions):
         Raises:
             InputError: a service class is given, and nothing depends on it.
         """
-        judged_by = self.judged_by(rod)
-        return Limits.of(
-            rod, asked,
-            characteristic=judged_by.strength, of_preset=self.strength is None, shear_weight=judged_by.shear_weight,
-        )  # fmt: skip
+        return Limits.of(rod, asked, given=self.strength, shear_weight=self.judged_by(rod).shear_weight)
 
     def require_known_stress(self, rod: Rod, joint: Joint) -> None:
         """InputError where a strength is given and the stress that it stands against cannot be known."""

@@ -55,12 +55,7 @@ def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> d
 
 
 def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tuple[str, dict[str, bytes]]:
-    """The case as it is kept in a result folder, its paths relative to that, and the files to be written with it.
-
-    Args:
-        case_toml: with paths as they were given.
-        inputs: contents of files that are copied, by these paths.
-    """
+    """The case as it is kept in a result folder, its paths relative to that, and the files to be written with it."""
     copies, new_names = dict[str, bytes](), dict[str, str]()
     for name in _names(case_toml):
         if name in inputs:
@@ -72,11 +67,7 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
 
 
 def shown_case(case_toml: str, inputs: Mapping[str, bytes]) -> str:
-    """The case on a page that goes to others: paths as they are kept, of files that are not copied the names alone.
-
-    Args:
-        case_toml, inputs: as of `kept_case`.
-    """
+    """The case on a page that goes to others: paths as they are kept, of files that are not copied the names alone."""
     kept, copies = kept_case(case_toml, inputs, Path.cwd())
     return _renamed(kept, {name: Path(name).name for name in _names(kept) if name not in copies})
 
@@ -86,8 +77,7 @@ def opened_case(case_toml: str, folder: Path, file: Callable[[str], Path]) -> tu
     not read: a case may come from somebody who wants to have them in a report.
 
     Args:
-        case_toml: text of the case; folder : of the result.
-        file: the place of a file in it by its name.
+        file: the place of a file in the folder by its name.
     """
     inputs = read_inputs(case_toml, lambda name: file(name) if inside(name) and name.startswith(f"{FOLDER}/") else None)
     outside = {name: str((folder / name).absolute()) for name in _names(case_toml) if name not in inputs}
@@ -95,11 +85,8 @@ def opened_case(case_toml: str, folder: Path, file: Callable[[str], Path]) -> tu
 
 
 def input_hash(case_toml: str, inputs: Mapping[str, bytes]) -> str:
-    """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are and however called.
-
-    Args:
-        case_toml, inputs: as of `kept_case`; a file that is not copied counts as empty.
-    """
+    """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are and however called; one that
+    is not copied counts as empty."""
     names = _names(case_toml)
     digest = hashlib.sha256(_renamed(case_toml, {name: str(k) for k, name in enumerate(names)}).encode())
     for name in names:
@@ -226,21 +213,13 @@ class Archive:
         return POPPED + ((self.results.deployment.ends if self.results.deployment else None) or PINNED.name)
 
     def is_lost(self, state: str) -> bool:
-        """Whether a state is where the solve of a shell stopped before it converged.
-
-        Args:
-            state: of `states`, such as "popped_pinned".
-        """
+        """Whether a state, such as "popped_pinned", is where the solve of a shell stopped before it converged."""
         shells = {POPPED + ends: shell for ends, shell in self.results.pop_up.items()}
         return state in shells and shells[state].status not in (None, CONVERGED)
 
 
 def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
-    """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods.
-
-    Args:
-        make: a function of an archive alone.
-    """
+    """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods."""
 
     @wraps(make)
     def kept(archive: Archive) -> T:
@@ -253,20 +232,13 @@ def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
 
 
 def archive_names(archive: Archive) -> list[str]:
-    """The names of the files that `put_archive` writes.
-
-    Args:
-        archive: with or without a case.
-    """
+    """The names of the files that `put_archive` writes."""
     copies = kept_case(archive.case_toml, archive.inputs, Path())[1]
     return [*(name for name in ARCHIVE if name != "case.toml" or archive.case_toml), *copies]
 
 
 def put_archive(archive: Archive, place: ResultFolder) -> None:
     """Stage result.json, case.toml, states.npz and the copied inputs in a folder.
-
-    Args:
-        place: the folder in which the files are staged.
 
     Raises:
         OutputError: the folder cannot be written.

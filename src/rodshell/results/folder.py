@@ -75,11 +75,7 @@ class ResultFolder:
         return self.stage / NEW
 
     def put(self, name: str, content: str | bytes) -> None:
-        """Stage a file.
-
-        Args:
-            name: path of the file within the folder.
-            content: text, written as UTF-8, or bytes.
+        """Stage a file by its path within the folder; text is written as UTF-8.
 
         Raises:
             OutputError: it cannot be written.
@@ -198,9 +194,6 @@ def reading(folder: str | os.PathLike[str]) -> Iterator[Callable[[str], Path]]:
     """Where each file of a result is, by name: in its folder, or still in the stage of a commit that was killed.
 
     What `reading` gives raises an OutputError for a name where something stands that is not a file, or leads outside.
-
-    Args:
-        folder: with a result, or one that a killed process was writing.
     """
     path = Path(folder).expanduser()
     with _locked(path, shared=True):
@@ -285,11 +278,8 @@ def _is_mine(path: Path) -> bool:
 
 
 def _recover(path: Path, but: Path | None = None) -> None:
-    """Complete a commit that was killed, and remove the stages of processes that are gone.
-
-    Raises:
-        OutputError: the record of a commit is damaged, or another user's.
-    """
+    """Complete a commit that was killed, and remove the stages of processes that are gone; an OutputError says that the
+    record of a commit is damaged, or another user's."""
     for stage in _stages(path):
         if stage == but:
             continue
@@ -315,12 +305,8 @@ def _recover(path: Path, but: Path | None = None) -> None:
 
 @dataclass(frozen=True)
 class _Commit:
-    """What is to be done so that a new result stands in its folder, as commit.json of its stage says it.
-
-    Args:
-        files: names of files that go from the stage into the folder; removes : of files that go from the folder.
-        replaces: the files and links that stood at these names, or where a folder has to be, and may go.
-    """
+    """What is to be done so that a new result stands in its folder, as commit.json of its stage says it: which files go
+    into the folder and which out of it, and what stood there, or where a folder has to be, and may go."""
 
     files: tuple[str, ...]
     removes: tuple[str, ...]
@@ -328,11 +314,7 @@ class _Commit:
 
 
 def _record(stage: Path) -> _Commit:
-    """What is left to be done for a stage.
-
-    Raises:
-        OutputError: not what a writer wrote: the sentence names the stage, which is to be removed.
-    """
+    """What is left to be done for a stage; an OutputError names a stage that is not as a writer left it."""
     try:
         content = own_table(stage, RECORD)
         files, removes, replaces = (content.get(name) for name in ("files", "removes", "replaces"))
@@ -385,11 +367,8 @@ def _locked(path: Path, *, shared: bool = False) -> Iterator[None]:
 
 
 def _lock(path: Path, *, shared: bool = False, wait: bool = True) -> int | None:
-    """A descriptor that holds the folder's lock until it is closed; None on a file system without locks.
-
-    Raises:
-        BlockingIOError: another process holds it, and `wait` is False.
-    """
+    """A descriptor that holds the folder's lock until it is closed; None on a file system without locks. A
+    BlockingIOError says that another process holds it, if `wait` is False."""
     if fcntl is None or not path.is_dir():
         return None
     try:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks import Bending as BendingCheck
 from rodshell.checks import Checks
+from rodshell.checks.bending import Bending as BendingCheck
 from rodshell.checks.bending import worst
 from rodshell.fabrication.fabricate import Fabricated
 from rodshell.figures.checks import Bending, Contact, WorstBent
@@ -49,12 +49,10 @@ def checked_results(
     """The results of a form with all that was checked and made: more of each rod, and tables of the checks.
 
     Args:
-        results: of the form, before it was checked.
         mesh: of the flat grid, its rods in the order of the results.
-        strength: of the rods' material [Pa]; None: not known.
+        strength, shear_strength: of the rods' material [Pa]; None: not known.
         limits: design strengths of the rods, by which utilisation is counted where they are known.
         net: (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
-        shear_strength: of the rods' material [Pa]; None: not known.
         strength_of: the preset material that the strengths are of, where they were not given.
     """
     material = results.rod.material if results.rod else None
@@ -85,13 +83,8 @@ def checked_results(
 
 
 def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod_chosen: Iterable[str] = ()) -> Results:
-    """The results with what their drawings say, and with their verdict.
-
-    Args:
-        drawings: paper, project and the like, see `Drawings`.
-        name: of the result, if not its target's.
-        rod_chosen: which of the rod's "material" and "section" were chosen to fit.
-    """
+    """The results with what their drawings say, and with their verdict; `rod_chosen` is which of the rod's "material"
+    and "section" were chosen to fit."""
     found = results.changed(drawings=Drawings(**drawings), name=name or results.name)
     chosen = dict.fromkeys(rod_chosen, True)
     if chosen and found.rod:
@@ -104,7 +97,6 @@ def checked_states(checks: Checks, stretch_stiffness: float) -> dict[str, NDArra
     """States of the checks: curvature, stress and normal force at each entry of `rod_nodes`, and the deployment.
 
     Args:
-        checks: of all shells; states that were not checked are left out.
         stretch_stiffness: EA of the rods [N].
     """
     states: dict[str, NDArray[Any]] = {}
@@ -206,11 +198,7 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
 
 
 def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Results:
-    """The results of a form with those under loads.
-
-    Args:
-        mesh: of the flat grid, its rods in the order of the results.
-    """
+    """The results of a form with those under loads."""
     found = results.changed(
         loads={
             name: {

@@ -58,10 +58,7 @@ def packed(states: States) -> bytes:
 
 
 def read_states(path: Path, results: Results) -> dict[str, NDArray[Any]]:
-    """The arrays of a states.npz.
-
-    Args:
-        results: of the same folder, by which the number of rods and stages is known.
+    """The arrays of a states.npz, which belong to the results of the same folder.
 
     Raises:
         OutputError: it is missing, not to be opened, broken, or too large, or an array is not as it should be.
@@ -119,12 +116,7 @@ def _unpacked(path: Path, content: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
 
 
 def state_faults(states: States, results: Results) -> Iterator[str]:
-    """What is wrong with states: shapes that do not fit each other or the results, indices and numbers out of range.
-
-    Args:
-        states: arrays by name, see `Archive`.
-        results: by which the number of rods and stages is known.
-    """
+    """What is wrong with states: shapes that do not fit each other or the results, indices and numbers out of range."""
     if not results.rods:
         yield "there are no rods in result.json"
         return

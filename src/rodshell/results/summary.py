@@ -63,11 +63,7 @@ def summary_text(results: Results) -> str:
 
 
 def chosen(parts: Iterable[str]) -> str:
-    """That the program chose a rod's material, section or both.
-
-    Args:
-        parts: "material", "section" or both.
-    """
+    """That the program chose a rod's "material", "section" or both."""
     parts = list(parts)
     return f"{' and '.join(parts)} {'were' if len(parts) > 1 else 'was'} not given: chosen to fit"
 

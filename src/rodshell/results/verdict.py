@@ -5,7 +5,7 @@ Summary, report, JSON and exit code show what stands here and judge nothing them
 not checked, and then the result is not good.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
 from rodshell.figures.checks import OTHER_SHAPES, Clearance, Deployment, WorstBent
 from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
@@ -48,7 +48,7 @@ def verdict_of(results: Results) -> Verdict:
 
 
 def verdict(results: Results) -> Verdict:
-    """The verdict on the figures of a result.
+    """The verdict on the figures of a result; one that is missing counts as not checked.
 
     An end condition can be used if its shell converged, is stable and carries its own weight, its rods do not touch,
     hold, and are thin enough for their bends. Without one that can be used, or far off the target, the result is
@@ -60,9 +60,6 @@ def verdict(results: Results) -> Verdict:
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
     then the warnings.
-
-    Args:
-        results: with checks; a figure that is missing counts as not checked.
     """
     shells = results.pop_up
     faults = {ends: [*_shell_faults(results, ends)] for ends in shells}
@@ -468,38 +465,24 @@ def _mm(results: Results, metres: float | None) -> str:
 
 
 def _gaps(results: Results) -> Iterator[str]:
-    """How near the converged shells come to the target, and which support is better."""
-    faults = {ends: [*_shell_faults(results, ends)] for ends in results.pop_up}
-    known = {
-        ends: gap.max
-        for ends in finals_first(results.agreement)
-        if (gap := results.agreement.get(ends)) is not None
-        and gap.max is not None
-        and (shell := results.pop_up.get(ends)) is not None
-        and shell.status == CONVERGED
-    }
-    for ends, largest in known.items():
-        size = results.agreement[ends].max_relative
-        share = "" if size is None else f" ({percent(size)} of its size)"
-        yield f"With {ends} ends the largest gap to the target is {_mm(results, largest)}{share}."
+    """How near the converged shells come to the target, and which of two supports that can be used is worth it."""
+    known = dict[Ends, float]()
+    for ends in finals_first(results.agreement):
+        gap, shell = results.agreement[ends], results.pop_up.get(ends)
+        if gap.max is not None and shell is not None and shell.status == CONVERGED:
+            known[ends] = gap.max
+            share = "" if gap.max_relative is None else f" ({percent(gap.max_relative)} of its size)"
+            yield f"With {ends} ends the largest gap to the target is {_mm(results, gap.max)}{share}."
     clamped, pinned = clamped_among(known), clamped_among(known, False)
-    if clamped and pinned and not any(faults.values()):
-        yield from _advice(clamped, pinned, known, results.agreement[pinned].max_relative)
-    elif faults and not results.target:
+    if clamped and pinned and not any([*_shell_faults(results, ends)] for ends in results.pop_up):
+        relative = results.agreement[pinned].max_relative
+        held = f"Supports that hold the rods' directions ({clamped})"
+        if known[clamped] < MUCH_LESS * known[pinned] and (relative is None or relative > NEGLIGIBLE):
+            yield f"{held} leave {percent(known[clamped] / known[pinned])} of the gap that {pinned} ones leave."
+        elif relative is None or relative <= OFF:
+            yield f"{held} bring the unloaded shell little nearer to the target."
+    elif results.pop_up and not results.target:
         yield "This result has no target, so no gap can be stated."
-
-
-def _advice(clamped: Ends, pinned: Ends, gaps: Mapping[Ends, float], relative: float | None) -> Iterator[str]:
-    """Which of two supports that can both be used is worth its effort.
-
-    relative : the pinned gap over the target's size.
-    """
-    if gaps[clamped] < MUCH_LESS * gaps[pinned] and (relative is None or relative > NEGLIGIBLE):
-        share = percent(gaps[clamped] / gaps[pinned])
-        yield f"Supports that hold the rods' directions ({clamped}) leave {share} of the gap that {pinned} ones leave."
-    elif relative is None or relative <= OFF:
-        said_of = f"Supports that hold the rods' directions ({clamped})"
-        yield f"{said_of} bring the unloaded shell little nearer to the target."
 
 
 def _strength(results: Results) -> Iterator[str]:
