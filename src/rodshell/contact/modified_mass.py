@@ -223,7 +223,7 @@ class ModifiedMass:
         return result
 
 
-@njit(error_model="numpy")
+@njit("f3 i1 i1 b1 f2 f1")
 def _turn(directions, count, nodes, stuck, along, cosine):  # type: ignore[no-untyped-def]
     """Reflect the directions of each node so that the last is the free part of the normal `along`; it becomes zero."""
     part, mirror = np.empty(3), np.empty(3)

@@ -113,7 +113,7 @@ class UnilateralContact:
         return self
 
 
-@njit(error_model="numpy")
+@njit("f2 f2")
 def _tangents(steepest, guides):  # type: ignore[no-untyped-def]
     """(n, 3, 3) two directions across `steepest` (n, 3), the first nearest to `guides` (n, 3); the third is zero."""
     directions = np.empty((len(steepest), 3, 3))

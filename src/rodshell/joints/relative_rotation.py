@@ -152,7 +152,7 @@ def is_elastic(element: Elements) -> TypeGuard[RelativeRotation]:
     return isinstance(element, RelativeRotation)
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 i2 f2 f3 c2 f1 f3 f3 f2 f3")
 def _relative_rotation(  # type: ignore[no-untyped-def]
     x, blocks, legs, weights, stiffness, deviators, rest_angle, tangents, directors, gradient, hessians
 ):
@@ -221,7 +221,7 @@ def _relative_rotation(  # type: ignore[no-untyped-def]
 # are tangent and normal of the section of rod A, then those of rod B; the strains are (s, eA, eB), five numbers.
 
 
-@njit(error_model="numpy")
+@njit("f1 f f2 c1 f1 f2")
 def _respond(strain, rest_angle, stiffness, deviators, force, tangent):  # type: ignore[no-untyped-def]
     """Energy of a joint at the strains (s, eA, eB) (5,); its derivatives by them, `force` (5,) and `tangent` (5, 5).
 

@@ -213,7 +213,7 @@ def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: Floats, si
     return sets
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 i2 i1 f2 f1 f1 f3 f3 f2 f3")
 def _offset_tie(  # type: ignore[no-untyped-def]
     x, blocks, legs, middles, weights, stiffness, offsets, tangents, directors, gradient, hessians
 ):

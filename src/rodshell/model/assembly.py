@@ -212,7 +212,7 @@ class Assembly:
         return np.asarray(self.indptr[1:] - 1)
 
 
-@njit()
+@njit("i1 i1 i1 i1")
 def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
     """The pattern by unknowns, every diagonal present; rows above each diagonal block; where the values of each pair of
     an element's blocks begin, those of all elements in a row, (k, k) of each, -1 if they are not stored; and the
@@ -312,7 +312,7 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
     return indptr, indices, above, slots, begins, starts, ascending
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("f3 i2 i3 i1 i1 f3 i i f1", nogil=True)
 def _scatter(hessians, blocks, slots, count, above, directions, low, high, data):  # type: ignore[no-untyped-def]
     """Add T' H T of every element, in the columns of blocks from `low` to before `high`; T holds the free directions of
     its blocks as columns."""
@@ -349,7 +349,7 @@ def _scatter(hessians, blocks, slots, count, above, directions, low, high, data)
                     base += above[j] + c + 1
 
 
-@njit()
+@njit("f1 f3 i1")
 def _expand(q, directions, count):  # type: ignore[no-untyped-def]
     result, at = np.zeros((len(count), 3)), 0
     for i in range(len(count)):
@@ -360,7 +360,7 @@ def _expand(q, directions, count):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit()
+@njit("f2 f3 i1 i")
 def _reduce(gradient, directions, count, size):  # type: ignore[no-untyped-def]
     result, at = np.empty(size), 0
     for i in range(len(count)):

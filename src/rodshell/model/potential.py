@@ -92,7 +92,7 @@ def product(hessians: Sequence[Floats], sets: Sequence[Ints], motion: Floats) ->
     return result
 
 
-@njit()
+@njit("f3 i2 f2 f2")
 def _add_product(hessians, blocks, motion, result):  # type: ignore[no-untyped-def]
     """Add to `result` (n, 3) what elements with `hessians` (m, 3k, 3k) on `blocks` (m, k) make of displacements."""
     for m in range(blocks.shape[0]):

@@ -240,7 +240,7 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
     return angle, (x, y, z)
 
 
-@njit(error_model="numpy")
+@njit("f3 b2")
 def _sharpest(points, inside):  # type: ignore[no-untyped-def]
     """Indices of the inside node with the smallest angle, which has the largest cosine; that angle [rad]; and whether
     the net has all nodes next to the inside ones."""
@@ -271,7 +271,7 @@ def _nearest(ascending: Floats, values: Floats) -> Ints:
     return np.asarray(np.searchsorted(0.5 * (ascending[1:] + ascending[:-1]), values))
 
 
-@njit(error_model="numpy")
+@njit("f1 f1 f3 i1 b1 i1 f1 i1 f2")
 def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: ignore[no-untyped-def]
     """Points of the `nodes` (k,), put into `result`, at the places `s` (k,) of lines of a net, by cubics through the
     four nearest known nodes.
@@ -340,7 +340,7 @@ def _at_joints(cuts: Cuts, stations: Floats, layout: GridLayout) -> Cuts:
     return Cuts(cuts.line, np.where(np.abs(cuts.ends - joints) < _AT_JOINT * layout.edge, joints, cuts.ends))
 
 
-@njit()
+@njit("f3 b2 i1")
 def _columns(points, inside, columns):  # type: ignore[no-untyped-def]
     """The nodes (m, n, 3) in some columns of a net (n, k, 3), and which of them are inside (m, n)."""
     nodes, within = np.empty((len(columns), len(points), 3)), np.empty((len(columns), len(points)), dtype=np.bool_)

@@ -117,7 +117,7 @@ def _want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats,
     return added
 
 
-@njit()
+@njit("b2 f1 f1 i f1 f1 f f b2")
 def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # type: ignore[no-untyped-def]
     """Add to the `wanted` nodes, see `wanted_nodes`; return whether any was not wanted before. In each quadrant they
     are below a staircase that only descends, away from the axis."""
@@ -289,7 +289,7 @@ def _steps(offsets: Floats, edge: float) -> Ints:
     return np.where(edges < _FEWEST_STEPS, 2 * np.maximum(_FEWEST_STEPS // 2, edges), edges + edges % 2)
 
 
-@njit()
+@njit("f1 i1")
 def _divided(offsets, steps):  # type: ignore[no-untyped-def]
     """Material coordinates of nodes, in `steps` (n - 1,) from each of the `offsets` (n,) to the next."""
     result, filled = np.empty(steps.sum() + 1), 0

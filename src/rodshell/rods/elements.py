@@ -350,7 +350,7 @@ class Stretch:
         return self
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("f2 i2 f1 f1 f1 f1 b f2 f3", nogil=True)
 def _stretch(x, edges, rest, stiffness, multipliers, forces, exact, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_a, x_b) [m]; energies [J], from HQK Eq 1a."""
     wanted = hessians.shape[0] > 0
@@ -385,7 +385,7 @@ def _stretch(x, edges, rest, stiffness, multipliers, forces, exact, gradient, he
     return energy
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 f1")
 def _strains(x, edges, rest):  # type: ignore[no-untyped-def]
     result = np.empty(len(edges))
     for e in range(len(edges)):
@@ -396,7 +396,7 @@ def _strains(x, edges, rest):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i2 f1")
 def _elongation(x, motion, edges, rest):  # type: ignore[no-untyped-def]
     result = np.empty(len(edges))
     for e in range(len(edges)):
@@ -410,7 +410,7 @@ def _elongation(x, motion, edges, rest):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 f1 f2")
 def _add_axial(x, edges, forces, gradient):  # type: ignore[no-untyped-def]
     for e in range(len(edges)):
         a, b = edges[e, 0], edges[e, 1]

@@ -129,7 +129,7 @@ class IsotropicBendTwist(BendTwist):
         )
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("f2 i2 f1 f2 f3", nogil=True)
 def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, x_1, x_2) [m]; energies [J]. e = x_1 - x_0, f = x_2 - x_1; s, t their unit vectors.
 
@@ -204,7 +204,7 @@ def _bend_hessians(s, t, ge, gf, c, first, second, per_e, per_f, start, size, he
                 hessian[i + 6, j], hessian[i + 6, j + 3], hessian[i + 6, j + 6] = -fe, fe - ff, ff
 
 
-@njit(error_model="numpy", nogil=True, fastmath={"contract"})
+@njit("f2 i2 f2 f1 f1 f3 f1 f2 f3", nogil=True, fastmath={"contract"})
 def _isotropic_bend_twist(x, stencils, bend, twist, natural_twist, sources, source_twist, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, theta_e, x_1, theta_f, x_2) [m, rad]; energies [J].
 

@@ -410,7 +410,7 @@ class _Newton:
         return float(_mass_norm(self.motion.mass.ravel(), motion.ravel()))
 
 
-@njit(error_model="numpy")
+@njit("f f2 f3 i1 f2")
 def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyped-def]
     """Add a share of the part of `field` in the free directions."""
     for i in range(len(motion)):
@@ -421,7 +421,7 @@ def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyp
                 motion[i, k] += part * d[k]
 
 
-@njit(error_model="numpy", fastmath={"reassoc", "contract"})
+@njit("f1 f1", fastmath={"reassoc", "contract"})
 def _mass_norm(mass, motion):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(len(motion)):

@@ -220,7 +220,7 @@ def _reach(blocks: Ints, first: Ints, count: Ints) -> int:
     return max(0, int((highest - lowest).max(initial=0)))
 
 
-@njit(error_model="numpy")
+@njit("f3 i2 i1 i1 f3 b1 f2")
 def _add(hessians, blocks, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
     """Add T' H T of every element; T holds the free directions of its blocks as columns, or leaves plain ones alone.
 
@@ -281,7 +281,7 @@ def _turn(h, blocks, count, directions, turned):  # type: ignore[no-untyped-def]
                     turned[3 * a + r, 3 * b + c] = value
 
 
-@njit(error_model="numpy")
+@njit("f2 f3 i1 i1 f3 b1 f2")
 def _add_blocks(diagonal, full, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
     """Add T' (diag(diagonal) + full) T of each block."""
     for i in range(len(diagonal)):
@@ -302,7 +302,7 @@ def _add_blocks(diagonal, full, first, count, directions, plain_blocks, band):  
                 band[first[i] + c, r - c] += value
 
 
-@njit(error_model="numpy")
+@njit("f2 i i1 f3")
 def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
     """Turn rows and columns of blocks of three unknowns from x, y, z to their directions; blocked ones get a one."""
     block = np.empty((3, 3))
@@ -329,7 +329,7 @@ def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
                 band[at + r, 0] = 1.0
 
 
-@njit(error_model="numpy")
+@njit("f2 i i")
 def _factor(a, size, b):  # type: ignore[no-untyped-def]
     """L D L^T in place: a[j, k] holds A[j + k, j], and then 1 / D[j] (k = 0) and L[j + k, j].
 
@@ -357,7 +357,7 @@ def _factor(a, size, b):  # type: ignore[no-untyped-def]
     return negative, -1
 
 
-@njit(error_model="numpy", fastmath={"reassoc", "contract"})
+@njit("f2 i i f2 i1 i1 f3 f1 f2", fastmath={"reassoc", "contract"})
 def _solve(a, size, b, field, first, count, directions, x, solution):  # type: ignore[no-untyped-def]
     """Solve L D L^T for the part of the field in the free directions; `x` is room for the unknowns, b zeros behind."""
     for i in range(len(field)):

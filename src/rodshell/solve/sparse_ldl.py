@@ -297,7 +297,7 @@ def _minimum_degree(indptr: Longs, indices: Longs) -> Longs:
     return np.argsort(splu(upper + upper.T, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0).perm_c).astype(np.int64)
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("i1 f1 i1 i1 i1 i1 i1 i2 i1 i1 i1 i1 i1 f1 f1 f1 f1 f1", nogil=True)
 def _numeric(  # type: ignore[no-untyped-def]
     part, data, first, row_start, child_start, children, run_start, runs, entry_start, entry_source, entry_place,
     panel_start, update_start, stacks, unscaled, work, panels, pivots,
@@ -335,7 +335,7 @@ def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyp
     return matrix_view(stacks, update_start[s], size, padded(size))
 
 
-@njit(error_model="numpy")
+@njit("i1 i1 f1 f1 f1")
 def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     """right - A x of a matrix stored by its upper triangle; its largest entry, and that of |D x|, D being its
     diagonal."""
@@ -354,7 +354,7 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     return residual, left, size
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("i1 f1 i1 f1 i1 i1 i1 i1 f1 f1 f1", nogil=True)
 def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
     """Forward substitution in place, supernode by supernode of a `part`. What goes to unknowns outside of the part is
     added to `sums` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
@@ -378,7 +378,7 @@ def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, 
                 x[row] += values[i]
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("i1 f1 i1 i1 i1 i1 f1 f1 f1 f1", nogil=True)
 def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
     """Backward substitution in place, supernode by supernode of a `part`."""
     for k in range(len(part) - 1, -1, -1):
@@ -396,7 +396,7 @@ def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, loca
             x[begin + i] = values[i]
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("i1 f2 i1 f2 i1 i1 i1 i1 f1 f1 f1", nogil=True)
 def _forward_rows(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
     """`_forward` for each column of `x` (n, ROWS), `sums` being (m, ROWS)."""
     for s in part:
@@ -424,7 +424,7 @@ def _forward_rows(part, x, above, sums, first, row_start, rows, panel_start, pan
                     x[row, r] += values[r, i]
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("i1 f2 i1 i1 i1 i1 f1 f1 f1 f1", nogil=True)
 def _backward_rows(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
     """`_backward` for each column of `x` (n, ROWS)."""
     for k in range(len(part) - 1, -1, -1):
@@ -472,7 +472,7 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     return np.concatenate([inner, kept[along[0]]])
 
 
-@njit()
+@njit("i1 i1")
 def _without_spans(start, neighbours):  # type: ignore[no-untyped-def]
     """Blocks within spans, without the first of each, so that those of two spans are not coupled; all others; and the
     graph of these after the elimination of the first. Blocks within a span follow one after the other."""
@@ -523,7 +523,7 @@ def _without_spans(start, neighbours):  # type: ignore[no-untyped-def]
     return inner[: n - count].copy(), kept[:count].copy(), graph_start, graph[:used].copy()
 
 
-@njit()
+@njit("f2 i2 i1 i1")
 def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-def]
     """Segments of the rows of `along` (d, n), blocks sorted by each coordinate, are divided in place until they are
     small, and stay sorted; `segment` is the segment of each block."""

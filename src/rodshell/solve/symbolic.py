@@ -119,7 +119,7 @@ def start_after(count, start):  # type: ignore[no-untyped-def]
         start[k + 1] = start[k] + count[k]
 
 
-@njit()
+@njit("i1 i1 i1")
 def _block_rows(indptr, indices, begin):  # type: ignore[no-untyped-def]
     """Whether these are blocks that are coupled as wholes; and their `BlockRows`."""
     n, used, other = len(begin) - 1, 0, 0  # entries that are not where those of blocks are
@@ -146,7 +146,7 @@ def _block_rows(indptr, indices, begin):  # type: ignore[no-untyped-def]
     return other == 0, start, rows[:used].copy()
 
 
-@njit()
+@njit("i1 i1 i1 i1")
 def _coupled(indptr, begin, row_start, rows):  # type: ignore[no-untyped-def]
     """The other blocks to which each block of unknowns is coupled, and more: see `Blocks`."""
     n = len(begin) - 1
@@ -172,7 +172,7 @@ def _coupled(indptr, begin, row_start, rows):  # type: ignore[no-untyped-def]
     return start, neighbours, source, above
 
 
-@njit()
+@njit("i1 i1 i1 i1")
 def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
     """Blocks in a postorder of their elimination tree; for each, its parent, unknowns, and rows of its columns; and the
     earlier ones to which block k is coupled, earlier[first[k] : first[k + 1]]."""
@@ -272,7 +272,7 @@ def _postorder(parent):  # type: ignore[no-untyped-def]
     return post
 
 
-@njit()
+@njit("i1 i1 i1")
 def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
     """First block of each supernode: blocks of one structure, and small ones merged for a few zeros more."""
     n = len(parent)
@@ -307,7 +307,7 @@ def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
     return first[: kept + 1]
 
 
-@njit()
+@njit("i1 i1")
 def _children(parent, first):  # type: ignore[no-untyped-def]
     """Parent of each supernode, -1 for roots; and the children of each, ascending."""
     supers = len(first) - 1
@@ -332,7 +332,7 @@ def _children(parent, first):  # type: ignore[no-untyped-def]
     return up, start, children
 
 
-@njit()
+@njit("i1 i1 i1 i1")
 def _fronts(first, start, earlier, up):  # type: ignore[no-untyped-def]
     """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]].
 
@@ -368,7 +368,7 @@ def _fronts(first, start, earlier, up):  # type: ignore[no-untyped-def]
     return row_start, rows
 
 
-@njit()
+@njit("i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1")
 def _maps(  # type: ignore[no-untyped-def]
     indptr, begin, start, neighbours, source, above, order, weight, first, up, row_start, rows, child_start, children
 ):
