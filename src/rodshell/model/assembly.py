@@ -7,6 +7,7 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csc_matrix, diags
 
 from rodshell.arrays import Floats, Ints, Longs
 from rodshell.kernels import njit
@@ -205,6 +206,16 @@ class Assembly:
         columns = np.searchsorted(self.indptr, np.linspace(0, len(self.indices), count + 1))
         stops = np.searchsorted(np.cumsum(self._count), columns).tolist()
         return list(pairwise([0, *stops[1:-1], len(self._count)]))
+
+    def upper(self, data: Floats) -> csc_matrix:
+        """The upper triangle (dofs, dofs) of the matrix with the values `data` (nnz,)."""
+        size = len(self.indptr) - 1
+        return csc_matrix((data, self.indices, self.indptr), shape=(size, size))
+
+    def matrix(self, data: Floats) -> csc_matrix:
+        """Both triangles (dofs, dofs) of the matrix with the values `data` (nnz,)."""
+        upper = self.upper(data)
+        return csc_matrix(upper + upper.T - diags(upper.diagonal()))
 
     @property
     def diagonal(self) -> Ints:

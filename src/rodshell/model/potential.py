@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.sparse import csc_matrix, diags
+from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats, Ints
 from rodshell.kernels import njit
@@ -69,9 +69,7 @@ class Potential:
     def matrix(self, state: Floats, free: Freedom) -> csc_matrix:
         """(dofs, dofs) Hessian in the free directions, both triangles."""
         assembly = Assembly.of(self.blocks, free)
-        data = assembly.assemble(self.hessians(state), self.blocks, free)
-        upper = csc_matrix((data, assembly.indices, assembly.indptr), shape=(free.size, free.size))
-        return csc_matrix(upper + upper.T - diags(upper.diagonal()))
+        return assembly.matrix(assembly.assemble(self.hessians(state), self.blocks, free))
 
 
 def room_for(sets: Sequence[Ints]) -> list[Floats]:

@@ -115,7 +115,7 @@ class ArcLength:
     def _round_off(self, tangent: Tangent, lowest: Floats) -> float:
         """See `round_off`, of the lowest mode (dofs,)."""
         stretch, moved = self._loaded.problem.stretch, tangent.freedom.expand(lowest)
-        softest = lowest @ tangent.pattern.product(tangent.values, lowest) / np.square(self._unit * moved).sum()
+        softest = lowest @ tangent.pattern.solver.product(tangent.values, lowest) / np.square(self._unit * moved).sum()
         stiffest = 2 * (stretch.stiffness / stretch.rest_lengths).max(initial=0.0)  # a node between two edges
         return float(np.finfo(float).eps * stiffest / softest)
 
@@ -339,7 +339,7 @@ class ArcLength:
         # the difference of both sides: that of one has a stiffness of its own, EA times the square of the step, which
         # outweighs the modes of thin rods
         change = (self._values_near(here, step) - self._values_near(here, -step)) / (2 * step)
-        between = _products(modes, np.array([tangent.pattern.product(change, mode) for mode in modes]))
+        between = _products(modes, np.array([tangent.pattern.solver.product(change, mode) for mode in modes]))
         root = 1.0 / np.sqrt(values)
         loss = np.linalg.eigvalsh(-between * root[:, None] * root)  # 1/m: the modes' stiffness vanishes at 1/loss
         return replace(

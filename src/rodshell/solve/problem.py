@@ -7,7 +7,7 @@ enters Newton's matrix. Forces on a twist angle are moments [N m] in the first c
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +17,8 @@ from rodshell.errors import InputError
 from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Potential, Shell
 from rodshell.rods.elements import Elements, Stretch, twist_angles
-from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, product, upper_triangle
+from rodshell.solve.sparse_ldl import Multifrontal
 from rodshell.validation import array, finite, function_of, keep, number, vector
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_matrix
 
 NO_CURVATURE = np.empty((0, 3, 3))
 
@@ -113,7 +110,7 @@ class Pattern:
     blocks: tuple[Ints, ...]
     count: Ints
     assembly: Assembly
-    solver: LinearSolver
+    solver: Multifrontal
 
     def serves(self, blocks: tuple[Ints, ...], count: Ints) -> bool:
         """Whether another problem has this pattern.
@@ -124,14 +121,6 @@ class Pattern:
         """
         here, there = (*self.blocks, self.count), (*blocks, count)
         return len(here) == len(there) and all(map(np.array_equal, here, there))
-
-    def upper(self, values: Floats) -> "csc_matrix":
-        """The upper triangle (dofs, dofs) of a matrix with these `values` (nnz,)."""
-        return upper_triangle(self.assembly.indptr, self.assembly.indices, values)
-
-    def product(self, values: Floats, x: Floats) -> Floats:
-        """(dofs,) product A x of the symmetric matrix whose upper triangle has these `values` (nnz,)."""
-        return product(self.assembly.indptr, self.assembly.indices, values, x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +218,7 @@ class Problem:
         return elastic - (0.0 if self.load is None else float(np.sum(self.load * state)))
 
 
-def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | None) -> LinearSolver:
+def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | None) -> Multifrontal:
     """The solver for a pattern, ordered by where the blocks lie in the flat grid if that is known.
 
     Args:

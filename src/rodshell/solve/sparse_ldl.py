@@ -12,7 +12,7 @@ none, by minimum degree; the symbolic phase once per pattern (`symbolic`).
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -41,51 +41,12 @@ from rodshell.threads import in_threads, threads
 
 _ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
 SURELY = 1e-14  # and after this small a one, no other is looked at
-
-
 _NONE_ABOVE = np.empty(0, dtype=np.int64)
+_GIVEN_AWAY = "the memory of these factors was given to another factorisation"
 
 
 class SingularError(ArithmeticError):
     """A pivot of the factorisation is zero: nothing holds some motion."""
-
-
-class Factors(Protocol):
-    """The factors of one matrix. They never change, unless their memory is given to another factorisation."""
-
-    @property
-    def negative(self) -> int:
-        """Number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia)."""
-        ...
-
-    def solve(self, right: Floats) -> Floats:
-        """Solution for a right-hand side (n,), or for each of many (k, n), with one step of iterative refinement where
-        it is not accurate.
-
-        Accuracy is a matter of the factors more than of the right-hand side: after an accurate solution no other is
-        looked at.
-        """
-        ...
-
-
-class LinearSolver(Protocol):
-    """Factorises matrices of one pattern, upper triangle in compressed columns."""
-
-    def factor(self, data: Floats, *, reuse: Factors | None = None) -> Factors:
-        """The factors of the matrix with the values `data`, which they keep: it must not be changed afterwards.
-
-        Args:
-            data: (nnz,) values of the upper triangle, in the order of the pattern.
-            reuse: factors by the same solver that are not needed any more: the new ones take over their memory, and
-                solving with the old ones is an error from then on.
-
-        Raises:
-            SingularError: a pivot vanishes or is not finite.
-        """
-        ...
-
-
-_GIVEN_AWAY = "the memory of these factors was given to another factorisation"
 
 
 class _Scratch(NamedTuple):
@@ -97,10 +58,10 @@ class _Scratch(NamedTuple):
 
 
 class Multifrontal:
-    """Multifrontal LDL^T of matrices of one pattern.
+    """Multifrontal LDL^T of matrices of one pattern, upper triangle in compressed columns.
 
     Args:
-        indptr, indices: the pattern, upper triangle in compressed columns, every diagonal present.
+        indptr, indices: the pattern, every diagonal present.
         coordinates: (n, d) where each unknown lies, or (b, d) where each of the `blocks` does, for nested dissection;
             None orders by minimum degree.
         blocks: of unknowns that lie at one place; None: they are looked for.
@@ -129,8 +90,18 @@ class Multifrontal:
         """Stored values of the factor, with the padding of its rows."""
         return int(self.plan.panel_start[-1])
 
-    def factor(self, data: Floats, *, reuse: Factors | None = None) -> "MultifrontalFactors":
-        memory = reuse.given_away() if isinstance(reuse, MultifrontalFactors) else None
+    def factor(self, data: Floats, *, reuse: "Factors | None" = None) -> "Factors":
+        """The factors of the matrix with the values `data`, which they keep: it must not be changed afterwards.
+
+        Args:
+            data: (nnz,) values of the upper triangle, in the order of the pattern.
+            reuse: factors by this solver that are not needed any more: the new ones take over their memory, and solving
+                with the old ones is an error from then on.
+
+        Raises:
+            SingularError: a pivot vanishes or is not finite.
+        """
+        memory = None if reuse is None else reuse.given_away()
         data = np.ascontiguousarray(data, dtype=np.float64)
         panels, pivots = memory or (room(self.fill), np.empty(len(self.indptr) - 1))
         scratch = self.take_scratch()
@@ -138,7 +109,13 @@ class Multifrontal:
         self.give_back(scratch)
         if not regular:
             raise SingularError("a pivot of the factorisation vanishes")
-        return MultifrontalFactors(self, data, panels, pivots)
+        return Factors(self, data, panels, pivots)
+
+    def product(self, data: Floats, x: Floats) -> Floats:
+        """(n,) product A x of the symmetric matrix whose upper triangle has the values `data` (nnz,)."""
+        data = np.require(data, requirements="W")  # that of a tangent cannot be written to, see there
+        residual, *_ = _residual(self.indptr, self.indices, data, np.ascontiguousarray(x), np.zeros(len(x)))
+        return np.asarray(-residual)
 
     @cached_property
     def above(self) -> tuple[Longs, Longs]:
@@ -167,8 +144,12 @@ class Multifrontal:
         self._spare.append(scratch)
 
 
-class MultifrontalFactors:
-    """Factors by `Multifrontal` (see `Factors`)."""
+class Factors:
+    """The factors of one matrix. They never change, unless their memory is given to another factorisation.
+
+    Attributes:
+        negative: number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia).
+    """
 
     def __init__(self, solver: Multifrontal, data: Floats, panels: Floats, pivots: Floats) -> None:
         self._solver, self._data = solver, data
@@ -182,6 +163,12 @@ class MultifrontalFactors:
         return memory
 
     def solve(self, right: Floats) -> Floats:
+        """Solution for a right-hand side (n,), or for each of many (k, n), with one step of iterative refinement where
+        it is not accurate.
+
+        Accuracy is a matter of the factors more than of the right-hand side: after an accurate solution no other is
+        looked at.
+        """
         right = np.ascontiguousarray(right, dtype=np.float64)
         x = self._substitute(right)
         rows = () if self._surely else zip(x.reshape(-1, x.shape[-1]), right.reshape(-1, x.shape[-1]), strict=True)
@@ -233,29 +220,6 @@ class MultifrontalFactors:
         return result
 
 
-def upper_triangle(indptr: Longs, indices: Longs, data: Floats) -> "csc_matrix":
-    """The upper triangle of a matrix, in SciPy's form.
-
-    Args:
-        indptr, indices: the pattern, upper triangle in compressed columns.
-        data: (nnz,) its values.
-    """
-    return csc_matrix((data, indices, indptr), shape=(len(indptr) - 1, len(indptr) - 1))
-
-
-def product(indptr: Longs, indices: Longs, data: Floats, x: Floats) -> Floats:
-    """(n,) product A x of a symmetric matrix that is given by its upper triangle.
-
-    Args:
-        indptr, indices: the pattern, upper triangle in compressed columns, every diagonal present.
-        data: (nnz,) its values.
-        x: (n,) vector.
-    """
-    data = np.require(data, requirements="W")  # that of a tangent cannot be written to, see there
-    residual, *_ = _residual(indptr, indices, data, np.ascontiguousarray(x), np.zeros(len(x)))
-    return np.asarray(-residual)
-
-
 def _eliminate_all(
     plan: Plan, levels: list[list[Longs]], data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats
 ) -> bool:
@@ -293,7 +257,7 @@ def _minimum_degree(indptr: Longs, indices: Longs) -> Longs:
     size = len(indptr) - 1
     data = np.full(len(indices), 1e-3 / max(1, size))
     data[indptr[1:] - 1] = 0.5
-    upper = upper_triangle(indptr, indices, data)
+    upper = csc_matrix((data, indices, indptr), shape=(size, size))
     return np.argsort(splu(upper + upper.T, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0).perm_c).astype(np.int64)
 
 

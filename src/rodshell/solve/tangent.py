@@ -87,7 +87,9 @@ class Tangent:
             motions: (N, 3) displacements [m, rad], or (k, N, 3) of k cases; their part in the free directions counts.
         """
         return self._of_fields(
-            "displacements", motions, lambda rows: np.array([self.pattern.product(self.values, row) for row in rows])
+            "displacements",
+            motions,
+            lambda rows: np.array([self.pattern.solver.product(self.values, row) for row in rows]),
         )
 
     def lowest_modes(
