@@ -10,7 +10,6 @@ eliminated, what remains is the update matrix for its parent (Duff and Reid 1983
 none, by minimum degree; the symbolic phase once per pattern (`symbolic`).
 """
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -26,10 +25,8 @@ from rodshell.solve.dense import (
     PAD,
     add_rows,
     backward,
-    backward_rows,
     eliminate,
     forward,
-    forward_rows,
     padded,
     room,
     subtract_product,
@@ -183,40 +180,37 @@ class Factors:
 
     def _substitute(self, right: Floats) -> Floats:
         """Solutions for a right-hand side (n,) or for many (k, n), `ROWS` of which share the reading of the factors."""
-        if right.ndim == 1:
-            return self._solved(right, _forward, _backward)
-        result, together = np.empty_like(right), len(right) // ROWS * ROWS
-        for k in range(0, together, ROWS):
-            result[k : k + ROWS] = self._solved(right[k : k + ROWS].T, _forward_rows, _backward_rows).T
-        for k in range(together, len(right)):
-            result[k] = self._solved(right[k], _forward, _backward)
-        return result
+        rows = right.reshape(-1, right.shape[-1])
+        result = np.empty_like(rows)
+        for k in range(0, len(rows), ROWS):
+            result[k : k + ROWS] = self._solved(rows[k : k + ROWS])
+        return result.reshape(right.shape)
 
-    def _solved(self, right: Floats, upwards: Callable[..., None], downwards: Callable[..., None]) -> Floats:
-        """(n,) or (n, ROWS), by the kernels for it."""
+    def _solved(self, right: Floats) -> Floats:
+        """(m, n) of at most `ROWS` right-hand sides."""
         assert self._memory is not None, _GIVEN_AWAY
         solver, plan, (panels, pivots) = self._solver, self._solver.plan, self._memory
-        x, parts, scratch = right.take(plan.order, axis=0), solver.parts, solver.take_scratch()
+        x, parts, scratch = right.take(plan.order, axis=1), solver.parts, solver.take_scratch()
         fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
         memory, (above, place) = scratch.fronts, solver.above
         # each part's own, so that the sum does not depend on the threads
-        sums = np.zeros((last, len(above), *x.shape[1:]))
+        sums = np.zeros((last, len(x), len(above)))
 
         def rise(part: int, thread: int) -> None:
-            upwards(parts[part], x, place, sums[part], *fronts, *memory[thread])
+            _forward(parts[part], x, place, sums[part], *fronts, *memory[thread])
 
         def descend(part: int, thread: int) -> None:
-            downwards(parts[part], x, *fronts, pivots, *memory[thread])
+            _backward(parts[part], x, *fronts, pivots, *memory[thread])
 
         if last:
             in_threads(rise, last, most=len(memory))
-            x[above] += sums.sum(axis=0)
-        upwards(parts[last], x, _NONE_ABOVE, np.empty((0, *x.shape[1:])), *fronts, *memory[0])
+            x[:, above] += sums.sum(axis=0)
+        _forward(parts[last], x, _NONE_ABOVE, np.empty((len(x), 0)), *fronts, *memory[0])
         descend(last, 0)
         in_threads(descend, last, most=len(memory))
         solver.give_back(scratch)
         result = np.empty_like(x)
-        result[plan.order] = x
+        result[:, plan.order] = x
         return result
 
 
@@ -318,96 +312,63 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     return residual, left, size
 
 
-@njit("i1 f1 i1 f1 i1 i1 i1 i1 f1 f1 f1", nogil=True)
-def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
-    """Forward substitution in place, supernode by supernode of a `part`. What goes to unknowns outside of the part is
-    added to `sums` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
-    for s in part:
-        begin, at = first[s], row_start[s]
-        size, width = row_start[s + 1] - at, first[s + 1] - begin
-        panel = matrix_view(panels, panel_start[s], width, padded(size))
-        values = local[: padded(size)]
-        for i in range(width):
-            values[i] = x[begin + i]
-        for i in range(width, len(values)):
-            values[i] = 0.0
-        forward(panel, values, aside)
-        for i in range(width):
-            x[begin + i] = values[i]
-        for i in range(width, size):
-            row = rows[at + i]
-            if len(above) > 0 and above[row] >= 0:
-                sums[above[row]] += values[i]
-            else:
-                x[row] += values[i]
-
-
-@njit("i1 f1 i1 i1 i1 i1 f1 f1 f1 f1", nogil=True)
-def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
-    """Backward substitution in place, supernode by supernode of a `part`."""
-    for k in range(len(part) - 1, -1, -1):
-        s = part[k]
-        begin, at = first[s], row_start[s]
-        size, width = row_start[s + 1] - at, first[s + 1] - begin
-        panel = matrix_view(panels, panel_start[s], width, padded(size))
-        values = local[: padded(size)]
-        for i in range(size):
-            values[i] = x[rows[at + i]]
-        for i in range(size, len(values)):
-            values[i] = 0.0
-        backward(panel, pivots[begin : begin + width], values, aside)
-        for i in range(width):
-            x[begin + i] = values[i]
-
-
 @njit("i1 f2 i1 f2 i1 i1 i1 i1 f1 f1 f1", nogil=True)
-def _forward_rows(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
-    """`_forward` for each column of `x` (n, ROWS), `sums` being (m, ROWS)."""
+def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
+    """Forward substitution in place, supernode by supernode of a `part`, for each row of `x` (m, n). What goes to
+    unknowns outside of the part is added to `sums` (m, l), at the place that `above` (n,) gives them; it is -1 within
+    the part, or empty."""
+    count = len(x)
     for s in part:
         begin, at = first[s], row_start[s]
         size, width = row_start[s + 1] - at, first[s + 1] - begin
         stride = padded(size)
-        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, ROWS, stride)
-        for i in range(width):
-            for r in range(ROWS):
-                values[r, i] = x[begin + i, r]
-        for r in range(ROWS):
+        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, count, stride)
+        for r in range(count):
+            right, whole = values[r], x[r]
+            for i in range(width):
+                right[i] = whole[begin + i]
             for i in range(width, stride):
-                values[r, i] = 0.0
-        forward_rows(panel, values, aside)
-        for i in range(width):
-            for r in range(ROWS):
-                x[begin + i, r] = values[r, i]
-        for i in range(width, size):
-            row = rows[at + i]
-            if len(above) > 0 and above[row] >= 0:
-                for r in range(ROWS):
-                    sums[above[row], r] += values[r, i]
-            else:
-                for r in range(ROWS):
-                    x[row, r] += values[r, i]
+                right[i] = 0.0
+        if count == 1:
+            forward(panel, values, 1, aside)
+        else:
+            forward(panel, values, count, aside)
+        for r in range(count):
+            right, whole = values[r], x[r]
+            for i in range(width):
+                whole[begin + i] = right[i]
+            for i in range(width, size):
+                row = rows[at + i]
+                if len(above) > 0 and above[row] >= 0:
+                    sums[r, above[row]] += right[i]
+                else:
+                    whole[row] += right[i]
 
 
 @njit("i1 f2 i1 i1 i1 i1 f1 f1 f1 f1", nogil=True)
-def _backward_rows(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
-    """`_backward` for each column of `x` (n, ROWS)."""
+def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
+    """Backward substitution in place, supernode by supernode of a `part`, for each row of `x` (m, n)."""
+    count = len(x)
     for k in range(len(part) - 1, -1, -1):
         s = part[k]
         begin, at = first[s], row_start[s]
         size, width = row_start[s + 1] - at, first[s + 1] - begin
         stride = padded(size)
-        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, ROWS, stride)
-        for i in range(size):
-            row = rows[at + i]
-            for r in range(ROWS):
-                values[r, i] = x[row, r]
-        for r in range(ROWS):
+        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, count, stride)
+        for r in range(count):
+            right, whole = values[r], x[r]
+            for i in range(size):
+                right[i] = whole[rows[at + i]]
             for i in range(size, stride):
-                values[r, i] = 0.0
-        backward_rows(panel, pivots[begin : begin + width], values, aside)
-        for i in range(width):
-            for r in range(ROWS):
-                x[begin + i, r] = values[r, i]
+                right[i] = 0.0
+        if count == 1:
+            backward(panel, pivots[begin : begin + width], values, 1, aside)
+        else:
+            backward(panel, pivots[begin : begin + width], values, count, aside)
+        for r in range(count):
+            right, whole = values[r], x[r]
+            for i in range(width):
+                whole[begin + i] = right[i]
 
 
 _LEAF = 12  # blocks that are not divided further
