@@ -58,7 +58,7 @@ class Touching:
 
     @staticmethod
     def none(supports: Any, state: Floats) -> "Touching":
-        """The constraint where nothing touches.
+        """The constraint where nothing touches, as at the start of each step, whatever touched in the one before.
 
         Args:
             supports: the shell's supports, a constraint.
@@ -144,15 +144,6 @@ class ModifiedMass:
     def stops_all(self) -> bool:
         """Whether touching nodes lose their velocity along the surface, too."""
         return self.stopped == "all" and not self.friction
-
-    def touching(self, supports: Any, state: Floats) -> Touching:
-        """The constraint at the start of a step: nothing touches, whatever touched in the step before.
-
-        Args:
-            supports: the shell's supports, a constraint.
-            state: (N, 3) [m].
-        """
-        return Touching.none(supports, state)
 
     def below(self, state: Floats, touching: Touching) -> Touching | None:
         """The constraint with all nodes that are newly below the surface at `state`; None if there are none [HQK Eq 8].
