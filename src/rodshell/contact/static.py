@@ -2,14 +2,13 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.kernels import njit
 from rodshell.model import Freedom
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.targets import Target
 from rodshell.targets.target import shape_operators
 from rodshell.validation import brief
@@ -65,7 +64,7 @@ class BoundToTarget:
 
 
 @dataclass(frozen=True, eq=False)
-class UnilateralContact:
+class UnilateralContact(WithoutFrames):
     """Unilateral, frictionless contact as an energy: the augmented Lagrangian of gap >= 0 at every node.
 
     E = (max(0, p - k gap)^2 - p^2) / 2k for each node; its force is max(0, p - k gap) along the normal.
@@ -107,10 +106,6 @@ class UnilateralContact:
             push = np.where(force > 0, self.stiffness, 0.0)[:, None, None]
             hessians[:] = push * gap.normal[:, :, None] * gap.normal[:, None, :] - force[:, None, None] * gap.hessian
         return float(np.sum((force**2 - self.multipliers**2) / (2 * self.stiffness)))
-
-    def refreshed(self, state: Floats) -> Self:
-        """The contact itself: there are no source frames."""
-        return self
 
 
 @njit("f2 f2")

@@ -21,11 +21,11 @@ from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.frames import dot, unit
 from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.joints import Ball, Joint, require_joint
+from rodshell.joints.crossings import UP
 from rodshell.layout import GridMesh
 from rodshell.layout.transfer import transferred_edges, transferred_nodes
 from rodshell.model import Shell
 from rodshell.model.rod_sections import RodSections
-from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import CLAMPED, PINNED, Support, support_of

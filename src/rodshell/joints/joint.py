@@ -21,12 +21,11 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.joints.crossings import RodNodes, stencils
+from rodshell.joints.crossings import UP, RodNodes, stencils
 from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.rods.joints import Joint
 
 FIRM = 1e8  # times the half edges next to it: the stiffness of a rigid direction of a joint
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def resists(joint: Joint) -> bool:

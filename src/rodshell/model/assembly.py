@@ -14,6 +14,7 @@ from rodshell.kernels import njit
 from rodshell.threads import in_threads, threads
 from rodshell.validation import brief
 
+ANGLE = (1.0, 0.0, 0.0)  # the direction of a twist angle's block that is used
 WORTHWHILE = 300_000  # values from which on threads share the assembly
 
 

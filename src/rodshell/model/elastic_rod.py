@@ -19,7 +19,7 @@ from scipy.sparse import csc_matrix
 from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
-from rodshell.model.assembly import Freedom
+from rodshell.model.assembly import ANGLE, Freedom
 from rodshell.model.potential import Potential
 from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
 from rodshell.rods.bend_twist import BendTwist, frames_among
@@ -28,7 +28,6 @@ from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.validation import brief, described, direction, finite, flag, short, vector
 
 Natural = Literal["straight", "rest"] | ArrayLike
-_ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +202,7 @@ class ElasticRod:
 
     def freedom(self) -> Freedom:
         """Nodes free in space, angles in their component; clamps fixed: the end, its ghost and their angle."""
-        free = Freedom.free(self.block_count).with_directions(np.arange(self.block_count)[self.angles], _ANGLE)
+        free = Freedom.free(self.block_count).with_directions(np.arange(self.block_count)[self.angles], ANGLE)
         return free.with_directions(np.concatenate([self.clamped_nodes, self.ghosts, self.ghost_angles]))
 
     # States

@@ -31,11 +31,11 @@ from rodshell.joints import (
     Ties,
     require_joint,
 )
-from rodshell.joints.crossings import Corners, LinkerBend, RodNodes
+from rodshell.joints.crossings import UP, Corners, LinkerBend, RodNodes
 from rodshell.joints.joint import elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
-from rodshell.model.assembly import Freedom
+from rodshell.model.assembly import ANGLE, Freedom
 from rodshell.model.potential import Potential
 from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist, frames_among
@@ -45,9 +45,7 @@ from rodshell.rods.section import Rod
 from rodshell.rods.supports import CLAMPED, PINNED
 from rodshell.validation import flag, instance
 
-UP = (0.0, 0.0, 1.0)
 OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
-ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
 Direction = tuple[float, float, float]
 Item = TypeVar("Item")
 COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"

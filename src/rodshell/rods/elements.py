@@ -52,6 +52,14 @@ class Elements(Protocol):
         ...
 
 
+class WithoutFrames:
+    """An energy without source frames."""
+
+    def refreshed(self, state: State) -> Self:
+        """The same at every state."""
+        return self
+
+
 class BendElements(Elements, Protocol):
     """Bending between consecutive edges of rods, and twist where they have it.
 
@@ -241,7 +249,7 @@ def evaluate_all(sets: Sequence[Elements], state: State, gradient: Floats, hessi
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class Stretch(WithoutFrames):
     """Elastic edges [HQK Eq 1a].
 
     Args:
@@ -344,10 +352,6 @@ class Stretch:
         """
         limp = replace(self, stiffness=np.zeros_like(self.stiffness), forces=forces)
         limp.evaluate(state, np.zeros_like(state), hessians)
-
-    def refreshed(self, state: State) -> Self:
-        """The same: there are no source frames."""
-        return self
 
 
 @njit("f2 i2 f1 f1 f1 f1 b f2 f3", nogil=True)

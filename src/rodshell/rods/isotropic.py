@@ -23,14 +23,14 @@ from rodshell.arrays import Floats, Ints, State
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
 from rodshell.rods.bend_twist import BendTwist, spread, strain_rates
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import brief
 
 AT_ONCE = 64  # bends, whose numbers all stay in the processor's first cache
 
 
 @dataclass(frozen=True, eq=False)
-class IsotropicBend:
+class IsotropicBend(WithoutFrames):
     """Bends between consecutive edges of rods without twist angles [HQK Eq 1b].
 
     Args:
@@ -78,10 +78,6 @@ class IsotropicBend:
     def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(_isotropic_bend(state, self.blocks, self.stiffness, gradient, hessians))
-
-    def refreshed(self, state: State) -> Self:
-        """The same: there are no source frames."""
-        return self
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, StabilityError
 from rodshell.model import Assembly, Freedom, Potential
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.sparse_ldl import Factors, Multifrontal, SingularError
 from rodshell.solve.tangent import FIRST_SHIFT, generic
@@ -167,7 +167,7 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     return np.sort(values)
 
 
-class _Curvature:
+class _Curvature(WithoutFrames):
     """Given (N, 3, 3) blocks as an energy, so that they are summed with the others."""
 
     def __init__(self, full: Floats) -> None:
@@ -177,6 +177,3 @@ class _Curvature:
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         hessians[:] = self._full
         return 0.0
-
-    def refreshed(self, state: Floats) -> "_Curvature":
-        return self

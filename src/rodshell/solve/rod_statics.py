@@ -13,6 +13,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
 from rodshell.model import Freedom, Potential
+from rodshell.model.assembly import ANGLE
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.rod_line import End
 from rodshell.rods.elements import Elements, is_bends
@@ -20,8 +21,6 @@ from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.solve.path import followed
 from rodshell.solve.problem import Problem, Supports
 from rodshell.validation import array, direction, finite, flag, instance, mapping, number, short, texts, vector, whole
-
-SPIN = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -162,7 +161,7 @@ class SupportPath:
             block = index_of(node, rod.node_count, "node")
             free = free.with_directions(np.array([block]), *_orthonormal(node, directions))
         spins = [int(rod.ghost_angles[rod.clamps.index(end)]) for end in wanted.spinning]
-        free = free.with_directions(np.array(spins, dtype=np.intp), SPIN).with_directions(moved)
+        free = free.with_directions(np.array(spins, dtype=np.intp), ANGLE).with_directions(moved)
         last = np.array([goals[block] for block in goals]).reshape(-1, 3)
         return SupportPath(free, moved, state[moved], last, clamps, holds_spin)
 
