@@ -43,12 +43,7 @@ class BoundToTarget:
         return self._latest[0][1]
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
-        """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N].
-
-        Args:
-            state: (n, 3) nodes [m].
-            gradient: (n, 3) of the energy there [N].
-        """
+        """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N]."""
         _, slope, hessian = self.target.implicit(state)
         normal, curvature = np.empty_like(slope), np.empty_like(hessian)
         shape_operators(slope, hessian, -gradient, normal, curvature)
@@ -84,11 +79,7 @@ class UnilateralContact(WithoutFrames):
     __repr__ = brief
 
     def forces(self, state: Floats) -> Floats:
-        """(m,) contact forces [N] at `state` (N, 3).
-
-        Args:
-            state: (N, 3) [m].
-        """
+        """(m,) contact forces [N] at `state` (N, 3)."""
         gap = self.target.contact(state[self.blocks[:, 0]]).distance
         return np.maximum(0.0, self.multipliers - self.stiffness * gap)
 

@@ -34,7 +34,8 @@ UP = (0.0, 0.0, 1.0)  # normal of the flat grid
 
 @dataclass(frozen=True, eq=False)
 class RodNodes:
-    """A mesh as its rods see it: *rod node* k is entry k of `mesh.rod_nodes`, a node as one of its rods has it.
+    """A mesh as its rods see it: *rod node* k is entry k of `mesh.rod_nodes`, a node as one of its rods has it. Methods
+    take the indices of some, and a side: 0 before them, 1 after.
 
     Args:
         mesh: the mesh, its rods sharing their nodes at joints or lying in layers.
@@ -61,41 +62,21 @@ class RodNodes:
         return self.mesh.at_crossings
 
     def has_edge(self, rod_nodes: Ints, side: int) -> Bools:
-        """Whether the rod has an edge before (side 0) or after (side 1) each of the `rod_nodes`.
-
-        Args:
-            rod_nodes: (k,) indices of rod nodes.
-            side: 0 before, 1 after.
-        """
+        """Whether the rod has an edge on this side of each rod node."""
         rods = self.rods[rod_nodes]
         limit = self.mesh.rod_start[rods] if side == 0 else self.mesh.rod_stop[rods] - 1
         return np.asarray(rod_nodes != limit)
 
     def edge(self, rod_nodes: Ints, side: int) -> Ints:
-        """Edge before (side 0) or after (side 1) each rod node, where there is one; edges are counted rod by rod.
-
-        Args:
-            rod_nodes: (k,) indices of rod nodes.
-            side: 0 before, 1 after.
-        """
+        """Edge on this side of each rod node, where there is one; edges are counted rod by rod."""
         return np.asarray(rod_nodes - self.rods[rod_nodes] - (1 - side))
 
     def angle(self, rod_nodes: Ints, side: int) -> Ints:
-        """Block of that edge's twist angle.
-
-        Args:
-            rod_nodes: (k,) indices of rod nodes.
-            side: 0 before, 1 after.
-        """
+        """Block of that edge's twist angle."""
         return np.asarray(self.first_angle + self.edge(rod_nodes, side))
 
     def neighbour(self, rod_nodes: Ints, side: int) -> Ints:
-        """Block of the node at that edge's other end.
-
-        Args:
-            rod_nodes: (k,) indices of rod nodes.
-            side: 0 before, 1 after.
-        """
+        """Block of the node at that edge's other end."""
         return np.asarray(self.blocks[rod_nodes + (1 if side else -1)])
 
     def directions(self, rod_nodes: Ints) -> Floats:
@@ -138,18 +119,18 @@ class OfSections:
 
     @classmethod
     def starting_at(
-        cls, blocks: Ints, legs: Ints, state: State, directors: ArrayLike, *, weights: Floats, **own: Any
+        cls, blocks: Ints, legs: Ints, state: State, directors: ArrayLike, *, weights: Floats, **rest: Any
     ) -> Self:
         """Joints whose source frames are those of `state`.
 
         Args:
             blocks, legs, weights: see the class.
             directors: (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for all.
-            own: what else the energy has.
+            rest: what else the energy has, by name.
         """
         tangents = _tangents(state, blocks, legs)
         wanted = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, legs[:, 2]]]
-        return cls(np.ascontiguousarray(blocks), legs, weights, tangents, adapted(wanted, tangents), **own)
+        return cls(np.ascontiguousarray(blocks), legs, weights, tangents, adapted(wanted, tangents), **rest)
 
     @property
     def angle_columns(self) -> Ints:
@@ -351,10 +332,9 @@ class Corners:
 
     @staticmethod
     def of(rod_nodes: RodNodes, crossings: Ints, wanted: int) -> "Corners":
-        """Corners of some crossings of the grid.
+        """Corners of some crossings (m,) of the grid.
 
         Args:
-            crossings: (m,) their indices.
             wanted: 2 for two opposite corners, as in the paper, or 4 for all; where a rod ends, all that there are.
         """
         pairs = rod_nodes.at_crossings[crossings]

@@ -36,11 +36,9 @@ def resists(joint: Joint) -> bool:
 def elastic_joints(
     rod_nodes: RodNodes, crossings: Ints, joints: Sequence[Joint], rod_stiffness: Floats, size: int
 ) -> tuple[RelativeRotation, ...]:
-    """The joints that resist some rotation, as elements.
+    """The joints, one at each of some crossings (m,), that resist some rotation, as elements.
 
     Args:
-        crossings: (m,) indices of the grid's crossings.
-        joints: m, the joint at each of them.
         rod_stiffness: (k, 3) EI1, EI2 and GJ at each rod node [N m2].
         size: number of blocks of the state.
     """
@@ -170,15 +168,8 @@ def _bisectors(rod_nodes: RodNodes, pairs: Ints, directions: Floats) -> tuple[Fl
 
 
 def refuse_mixtures(node: Ints, joints: Sequence[Joint]) -> None:
-    """Refuse nodes at which three rods or more meet with joints of different kinds.
-
-    Args:
-        node: (c,) node of each crossing.
-        joints: c, the joint at each.
-
-    Raises:
-        InputError: there is such a node.
-    """
+    """Refuse a node at which three rods or more meet with joints of different kinds; `node` and `joints` are those of
+    each crossing."""
     first: dict[int, Joint] = {}
     for joint_node, joint in zip(node.tolist(), joints, strict=True):
         if first.setdefault(joint_node, joint) != joint:

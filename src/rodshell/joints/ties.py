@@ -55,12 +55,7 @@ class _Penalty:
         keep(self, positive, "N m/rad", "C2", what="the penalty stiffness {}")
 
     def with_defaults(self, rod: Rod, edge: float) -> Self:
-        """The same with the defaults for a rod filled in.
-
-        Args:
-            rod: section and material of the rods.
-            edge: length of their edges [m].
-        """
+        """The same with the defaults for rods with edges of the length `edge` [m] filled in."""
         nodes, angles = self._defaults(rod, edge)
         return replace(self, C1=self.C1 or nodes, C2=self.C2 or angles)
 
@@ -160,10 +155,9 @@ class OffsetTie(OfSections):
 
 
 def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: Floats, size: int) -> list[OffsetTie]:
-    """Ties of the eccentric crossings.
+    """Ties of the eccentric crossings of rods that lie in layers.
 
     Args:
-        rod_nodes: of the mesh, whose rods lie in layers.
         eccentricity: (c,) of each crossing of the grid [m]; those with 0 have no such tie.
         stiffness: (c,) C [N/m].
         size: number of blocks of the state.

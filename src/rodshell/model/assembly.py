@@ -47,12 +47,7 @@ class Freedom:
         return Freedom(directions, np.full(blocks, 3, dtype=np.intp))
 
     def with_directions(self, blocks: Ints, *directions: tuple[float, float, float]) -> "Freedom":
-        """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed).
-
-        Args:
-            blocks: (k,) indices of blocks.
-            directions: orthonormal vectors, up to three.
-        """
+        """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed)."""
         table, count = self.directions.copy() if directions else self.directions, self.count.copy()
         for k, direction in enumerate(directions):
             table[blocks, k] = direction
@@ -81,35 +76,19 @@ class Freedom:
         return np.flatnonzero(~self.directions[block, k].any(axis=1))
 
     def expand(self, q: Floats) -> Floats:
-        """Displacements (n, 3) of reduced DOFs (size,).
-
-        Args:
-            q: (size,) values of the reduced DOFs.
-        """
+        """Displacements (n, 3) of reduced DOFs (size,)."""
         return np.asarray(_expand(np.ascontiguousarray(q), self.directions, self.count))
 
     def reduce(self, gradient: Floats) -> Floats:
-        """Components (size,) of a gradient (n, 3) in the free directions.
-
-        Args:
-            gradient: (n, 3) [N].
-        """
+        """Components (size,) of a gradient (n, 3) in the free directions."""
         return np.asarray(_reduce(np.ascontiguousarray(gradient), self.directions, self.count, self.size))
 
     def within(self, gradient: Floats) -> Floats:
-        """The part (n, 3) of a gradient that acts along the free directions.
-
-        Args:
-            gradient: (n, 3) [N].
-        """
+        """The part of a gradient (n, 3) that acts along the free directions."""
         return self.expand(self.reduce(gradient))
 
     def reduce_diagonal(self, diagonal: Floats) -> Floats:
-        """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses.
-
-        Args:
-            diagonal: (n, 3) components of d.
-        """
+        """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses."""
         block, k = self._slots
         return np.asarray(np.einsum("ij,ij->i", diagonal[block], self.directions[block, k] ** 2))
 
@@ -145,12 +124,7 @@ class Assembly:
 
     @staticmethod
     def of(element_blocks: Sequence[Ints], freedom: Freedom) -> "Assembly":
-        """Plan the assembly of element sets on `element_blocks`, (m, k) each, in the directions of `freedom`.
-
-        Args:
-            element_blocks: of each element set, (m, k) blocks of its elements.
-            freedom: free directions of all blocks.
-        """
+        """Plan the assembly of element sets on `element_blocks`, (m, k) each, in the directions of `freedom`."""
         widths = np.array([blocks.shape[1] for blocks in element_blocks], dtype=np.int64)
         numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
         flat = np.concatenate([np.arange(0), *(blocks.ravel() for blocks in element_blocks)])
@@ -170,8 +144,7 @@ class Assembly:
         """(nnz,) values of the reduced Hessian, from the element Hessians (m, 3k, 3k) and blocks (m, k) of each set.
 
         Args:
-            hessians: of each element set, (m, 3k, 3k) element Hessians; empty: none of this set.
-            element_blocks: of each element set, (m, k) blocks of its elements.
+            hessians: of each set; empty: none of this set.
             freedom: free directions, as many of each block as in the plan.
         """
         data, every = np.zeros(len(self.indices)), zip(hessians, element_blocks, self._slots, strict=True)
@@ -186,14 +159,8 @@ class Assembly:
         return data
 
     def add(self, index: int, hessian: Floats, blocks: Ints, freedom: Freedom, data: Floats) -> None:
-        """Add the Hessians (m, 3k, 3k) of the element set `index`, on `blocks` (m, k), to the values `data` (nnz,).
-
-        Args:
-            hessian: (m, 3k, 3k) element Hessians.
-            blocks: (m, k) blocks of the elements.
-            freedom: free directions, as many of each block as in the plan.
-            data: (nnz,) values to which theirs are added.
-        """
+        """Add the Hessians (m, 3k, 3k) of the element set `index`, on `blocks` (m, k), to the values `data` (nnz,);
+        `freedom` as of `assemble`."""
         if len(blocks):
             every = 0, len(self._count)
             _scatter(hessian, blocks, self._slots[index], self._count, self._above, freedom.directions, *every, data)

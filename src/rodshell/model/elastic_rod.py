@@ -241,12 +241,7 @@ class ElasticRod:
         return state
 
     def ghost_position(self, end: End, position: Floats, tangent: Floats) -> Floats:
-        """(3,) position of the ghost node of a clamp [m].
-
-        Args:
-            position: (3,) of the end [m].
-            tangent: (3,) unit tangent along the rod there.
-        """
+        """(3,) position of a clamp's ghost node [m], by that of the end and the unit tangent along the rod there."""
         edge = 0 if end == "start" else self.edge_count - 1
         return np.asarray(position + (-1 if end == "start" else 1) * self.stretch.rest_lengths[edge] * tangent)
 
@@ -284,19 +279,11 @@ class ElasticRod:
         return self._potential.gradient(state)
 
     def hessian(self, state: State, freedom: Freedom | None = None) -> csc_matrix:
-        """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's.
-
-        Args:
-            freedom: free directions of the blocks.
-        """
+        """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's."""
         return self._potential.matrix(state, self.freedom() if freedom is None else freedom)
 
     def weight(self, gravity: ArrayLike) -> Floats:
-        """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2].
-
-        Args:
-            gravity: (3,) acceleration [m/s2].
-        """
+        """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2]."""
         load = np.zeros_like(self.mass)
         load[self.nodes] = self.mass[self.nodes] * vector("gravity", gravity)
         return load

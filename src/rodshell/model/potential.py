@@ -51,11 +51,7 @@ class Potential:
         return result
 
     def product(self, state: Floats, motion: Floats) -> Floats:
-        """(N, 3) product of the Hessian with displacements.
-
-        Args:
-            motion: (N, 3) displacements [m, rad].
-        """
+        """(N, 3) product of the Hessian with displacements (N, 3) [m, rad]."""
         result = np.zeros_like(motion)
         for of_set, blocks in zip(self.hessians(state), self.blocks, strict=True):  # summed by rows: fewer digits lost
             forces = np.einsum("mij,mj->mi", of_set, motion[blocks].reshape(len(blocks), 3 * blocks.shape[1]))
@@ -78,12 +74,7 @@ def room_for(sets: Sequence[Ints]) -> list[Floats]:
 
 
 def product(hessians: Sequence[Floats], sets: Sequence[Ints], motion: Floats) -> Floats:
-    """(N, 3) product of a sum of element Hessians with displacements.
-
-    Args:
-        hessians, sets: of each set, (m, 3k, 3k) and its blocks (m, k).
-        motion: (N, 3) displacements [m, rad].
-    """
+    """(N, 3) product of a sum of element Hessians, (m, 3k, 3k) on blocks (m, k) of each set, with displacements."""
     result = np.zeros_like(motion)
     for of_set, blocks in zip(hessians, sets, strict=True):
         _add_product(of_set, blocks, motion, result)

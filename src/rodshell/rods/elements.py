@@ -151,11 +151,7 @@ def with_frames(element: Elements, like: Elements, rows: Bools | None = None, at
 
 
 def turned(element: Elements, turn: Floats) -> Elements:
-    """An energy with its source frames turned about z.
-
-    Args:
-        turn: (2, 2), of rows x, y; or (m, 2, 2), of each element.
-    """
+    """An energy with its source frames turned about z: by (2, 2), of rows x, y, or (m, 2, 2), of each element."""
     assert is_dataclass(element)
     sources: dict[str, Any] = {}
     for name in ("source_tangents", "source_directors"):
@@ -183,11 +179,7 @@ def each_gradient(elements: Elements, state: State) -> Floats:
 
 
 def each_curvature(elements: Elements, state: State, motion: Floats) -> Floats:
-    """(m,) v'Hv of each element alone for displacements `motion` (N, 3) [J], H being its Hessian.
-
-    Args:
-        motion: (N, 3) displacements v [m, rad].
-    """
+    """(m,) v'Hv of each element alone for displacements `motion` (N, 3) [J], H being its Hessian."""
     m, k = elements.blocks.shape
     hessians = np.zeros((m, 3 * k, 3 * k))
     elements.evaluate(state, np.zeros_like(state), hessians)
@@ -202,12 +194,8 @@ def _exploded(elements: Elements, state: State) -> tuple[Elements, Floats]:
 
 
 def in_parts(elements: Elements, most: int) -> list[Elements]:
-    """Elements cut into parts of at most `most`; their arrays with a row for each are those as long as `blocks`.
-
-    Args:
-        elements: to be cut; those that cannot be are one part.
-        most: number of elements of a part.
-    """
+    """Elements cut into parts of at most `most`, or one part if they cannot be; their arrays with a row for each are
+    those as long as `blocks`."""
     count = len(elements.blocks)
     if count <= most or not is_dataclass(elements):
         return [elements]
@@ -271,22 +259,11 @@ class Stretch(WithoutFrames):
 
     @staticmethod
     def elastic(blocks: Ints, rest_lengths: Floats, stiffness: Floats) -> "Stretch":
-        """The paper's elastic edges: no multipliers. Parameters as of the class.
-
-        Args:
-            blocks: (e, 2) nodes of each edge.
-            rest_lengths: (e,) [m].
-            stiffness: (e,) EA [N].
-        """
+        """The paper's elastic edges: no multipliers. Parameters as of the class."""
         return Stretch(blocks, rest_lengths, stiffness, np.zeros(len(blocks)))
 
     def with_forces(self, forces: Floats | None, *, multipliers: Floats | None = None) -> "Stretch":
-        """The same edges with other axial `forces` (e,) [N] and, if given, other `multipliers` (e,) [N].
-
-        Args:
-            forces: (e,) axial forces of the geometric stiffness [N]; None: those of the strains.
-            multipliers: (e,) N0 [N]; None: unchanged.
-        """
+        """The same edges with other axial forces and, if given, other multipliers; parameters as of the class."""
         multipliers = self.multipliers if multipliers is None else multipliers
         return Stretch(self.blocks, self.rest_lengths, self.stiffness, multipliers, forces)
 
@@ -295,11 +272,7 @@ class Stretch(WithoutFrames):
         return np.asarray(_strains(state, self.blocks, self.rest_lengths))
 
     def elongation(self, state: State, motion: Floats) -> Floats:
-        """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`.
-
-        Args:
-            motion: (N, 3) displacements [m].
-        """
+        """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`."""
         return np.asarray(_elongation(state, motion, self.blocks, self.rest_lengths))
 
     def pulls(self, state: State) -> Floats:
@@ -313,12 +286,7 @@ class Stretch(WithoutFrames):
         return np.asarray(-self.stiffness * (1.0 + self.strains(state)) / self.rest_lengths)
 
     def add_axial(self, state: State, forces: Floats, gradient: Floats) -> None:
-        """Add to `gradient` (N, 3) that of edges with the axial `forces` (e,) [N].
-
-        Args:
-            forces: (e,) axial forces [N].
-            gradient: (N, 3), to which theirs is added [N].
-        """
+        """Add to `gradient` (N, 3) [N] that of edges with the axial `forces` (e,) [N]."""
         _add_axial(state, self.blocks, forces, gradient)
 
     def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
@@ -344,12 +312,7 @@ class Stretch(WithoutFrames):
         self.axial_stiffness(state, self.stiffness * self.elongation(state, motion), hessians)
 
     def axial_stiffness(self, state: State, forces: Floats, hessians: Floats) -> None:
-        """Geometric stiffness of axial forces alone.
-
-        Args:
-            forces: (e,) axial forces [N].
-            hessians: (e, 6, 6), which are filled [N/m].
-        """
+        """Fill `hessians` (e, 6, 6) [N/m] with the geometric stiffness of axial `forces` (e,) [N] alone."""
         limp = replace(self, stiffness=np.zeros_like(self.stiffness), forces=forces)
         limp.evaluate(state, np.zeros_like(state), hessians)
 

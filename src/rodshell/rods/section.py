@@ -357,11 +357,7 @@ class Rod:
 
 
 def scaled(section: Section, factor: float) -> Section:
-    """The same shape of section with all its lengths times `factor` [-].
-
-    Args:
-        factor: of all its lengths [-].
-    """
+    """The same shape of section with all its lengths times `factor` [-]."""
     return type(section)(**{key: factor * value for key, value in vars(section).items()})
 
 

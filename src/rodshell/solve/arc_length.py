@@ -142,13 +142,8 @@ class ArcLength:
         return replace(point, strayed=self.reach(point.state - state) / reach)
 
     def unstable_next(self, here: Point, step: float) -> Point | None:
-        """What lies a step along the tangent, if the stiffness is unstable there, as it is where it has jumped.
-
-        None where it is stable, or singular.
-
-        Args:
-            step: arc [m], so short that its end is as good as the equilibrium.
-        """
+        """What lies a step [m] along the tangent, so short that its end is as good as the equilibrium, if the stiffness
+        is unstable there, as it is where it has jumped; None where it is stable, or singular."""
         state, forces = here.state + step * here.motion, here.forces + step * here.change
         factor = here.factor + step * here.rate
         elements = self._loaded.load.elements(here.elements, state, factor)
@@ -165,11 +160,7 @@ class ArcLength:
         )  # fmt: skip
 
     def at_factor(self, factor: float, here: Point, there: Point) -> Point | None:
-        """The point at a factor between those of two neighbours on a stable path; None where it is not found.
-
-        Args:
-            here, there: points on either side of it.
-        """
+        """The point at a factor between those of two neighbours on a stable path; None where it is not found."""
         span = there.arc - here.arc
         share = (factor - here.factor) / (there.factor - here.factor)
         bend = 0.5 * share * (share - 1) * span
@@ -180,11 +171,8 @@ class ArcLength:
         return None if found is None else self._on_path(*found, here, share * span, ahead=False)
 
     def displaced(self, motion: Floats) -> Point | None:
-        """The point whose state lies on the plane across a motion (n, 3) [m, rad] through its end, near factor 1.
-
-        Args:
-            motion: from the state at t = 0.
-        """
+        """The point whose state lies on the plane across a motion (n, 3) from the state at t = 0 [m, rad] through its
+        end, near factor 1."""
         for parts in _RAMPS:
             point = self._displaced_by_parts(motion, parts)
             if point is not None:

@@ -55,8 +55,7 @@ def _place(matrix, row, column):  # type: ignore[no-untyped-def]
 
 @njit(error_model="numpy", inline="always")
 def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
-    """Eliminate the pivots of a front: D L^T in `rows` (width, stride), which holds the front's upper triangle before;
-    L^T in `panel` (width, stride), D in `pivots` (width,). False where a pivot vanishes or is not finite.
+    """Eliminate the pivots of a front; False where one vanishes or is not finite.
 
     Args:
         rows: (width, stride) the front's upper triangle, overwritten with D L^T.

@@ -92,11 +92,7 @@ class SolveReport:
         return self.converged and self.negative_modes == 0
 
     def after(self, *earlier: "SolveReport") -> "SolveReport":
-        """This report with the work of earlier solves added.
-
-        Args:
-            earlier: reports of the solves that led to this one.
-        """
+        """This report with the work of earlier solves added."""
         return replace(
             self,
             iterations=self.iterations + sum(report.iterations for report in earlier),

@@ -42,11 +42,7 @@ class Load:
 
     @classmethod
     def of(cls, load: "Load | Floats") -> "Load":
-        """A load, dead forces (N, 3) [N] being one.
-
-        Args:
-            load: a load, or dead forces (N, 3) [N, on twist angles N m].
-        """
+        """A load, dead forces (N, 3) [N, on twist angles N m] being one."""
         return load if isinstance(load, Load) else cls(forces=load)
 
     def elements(self, elements: Sequence[Elements], state: State, factor: float) -> tuple[Elements, ...]:
@@ -60,21 +56,13 @@ class Load:
         return (*structure, *(_Proportional(potential.refreshed(state), factor) for potential in before))
 
     def stretch(self, stretch: Stretch, factor: float) -> Stretch:
-        """The edges as they are free of stress under the factor.
-
-        Args:
-            stretch: at the factor 0.
-        """
+        """The edges, given as they are at the factor 0, as they are free of stress under the factor."""
         if self.strains is None:
             return stretch
         return replace(stretch, rest_lengths=stretch.rest_lengths * (1.0 + factor * self.strains))
 
     def require(self, problem: Problem, state: Floats) -> None:
-        """Raise InputError where the load does not fit a structure, or moves what is free.
-
-        Args:
-            state: (N, 3) any state of it.
-        """
+        """Raise InputError where the load does not fit a structure in any of its states, or moves what is free."""
         for name, given, shape in (
             ("forces", self.forces, state.shape),
             ("motions", self.motions, state.shape),
@@ -136,7 +124,7 @@ class LoadedAssembly:
 
         Args:
             elements: of structure and load at the factor, with their source frames at, or near, the state.
-            state, forces: (N, 3) [m, rad], and axial forces (e,) [N].
+            forces: (e,) axial forces [N].
         """
         result = self._assembly.gradient(elements, state, forces)
         return result if self.load.forces is None else result - factor * self.load.forces
@@ -169,22 +157,13 @@ class LoadedAssembly:
         return tangent, tangent.solve(right) + load.motions
 
     def stress_values(self, elements: Sequence[Elements], state: Floats, rate: Floats) -> Floats:
-        """(nnz,) values of the change of K per unit of t at t = 0, the geometry being frozen: that with the internal
-        forces, and the stiffness of the load's own potentials.
-
-        Args:
-            elements: of structure and load, with their source frames at the state.
-            state, rate: (N, 3), and its rate [m, rad].
-        """
+        """(nnz,) values of the change of K per unit of t at t = 0, by the rate (N, 3) of the state, the geometry being
+        frozen: that with the internal forces, and the stiffness of the load's own potentials."""
         change = self.change(state, rate, 0.0, 1.0)
         return self._assembly.stress_values(elements, state, change, rate)
 
     def change(self, state: State, rate: Floats, factor: float, per: float = 1.0) -> Floats:
-        """(e,) rate of the axial forces [N].
-
-        Args:
-            rate: (N, 3) of the state [m, rad].
-        """
+        """(e,) rate of the axial forces [N], by that of the state (N, 3) [m, rad]."""
         stretch = self.load.stretch(self.problem.stretch, factor)
         result = stretch.stiffness * stretch.elongation(state, rate)
         return result if self.load.strains is None else result + per * self._by_warming(stretch, state, factor)

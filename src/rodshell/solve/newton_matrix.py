@@ -32,12 +32,10 @@ class SummedMatrix(Protocol):
         ...
 
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add the Hessians of a set of elements, or of a part of it.
+        """Add the Hessians (m, 3k, 3k) of a set of elements on `blocks` (m, k), or of a part of it.
 
         Args:
             number: of the set, among those that the matrix was made for.
-            hessians: (m, 3k, 3k) of each element.
-            blocks: (m, k) of each element.
         """
         ...
 
@@ -55,11 +53,7 @@ class SummedMatrix(Protocol):
         ...
 
     def solve(self, field: Floats, free: Freedom) -> Floats:
-        """(N, 3) solution for the part of `field` (N, 3) in the free directions; zero across them.
-
-        Args:
-            field: (N, 3) right-hand side, of which the part in the free directions is used.
-        """
+        """(N, 3) solution for the part of `field` (N, 3) in the free directions; zero across them."""
         ...
 
 
@@ -101,13 +95,7 @@ class Banded:
         self.values[:] = 0.0
 
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add element Hessians (m, 3k, 3k); the number of their set does not matter.
-
-        Args:
-            number: of the set of elements; unused.
-            hessians: (m, 3k, 3k) of each element.
-            blocks: (m, k) of each element.
-        """
+        """See `SummedMatrix.add`; the number of their set does not matter."""
         self._look_at(free)
         _add(hessians, blocks, self._first, self._count, self._axes, self._plain, self.values)
 
@@ -165,13 +153,6 @@ class SparseSum:
         self._data[:] = 0.0
 
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add the Hessians of a set of elements.
-
-        Args:
-            number: of the set, among those that the matrix was made for.
-            hessians: (m, 3k, 3k) of each element.
-            blocks: (m, k) of each element.
-        """
         self._assembly.add(number, hessians, blocks, free, self._data)
 
     def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
@@ -191,12 +172,7 @@ class SparseSum:
 def narrow_or_sparse(
     element_blocks: Sequence[Ints], free: Freedom, *, coordinates: Floats | None = None
 ) -> SummedMatrix:
-    """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell.
-
-    Args:
-        element_blocks: (m, k) blocks of each element, for each set of elements.
-        coordinates: (N, d) where the blocks lie [m], by which a sparse matrix is ordered, if that is known.
-    """
+    """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell. Parameters as of these."""
     banded = Banded(element_blocks, free, widest=WIDEST)
     return banded if banded.half_bandwidth <= WIDEST else SparseSum(element_blocks, free, coordinates)
 

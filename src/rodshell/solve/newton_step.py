@@ -132,11 +132,7 @@ class NewtonStep:
         self._factored, self._free = (state, self._no_forces), free  # where the matrix is from
 
     def start(self, state: Floats, forces: Floats) -> Iterate:
-        """Where the iteration begins.
-
-        Args:
-            state, forces: (n, 3) [m, rad], and axial forces (e,) [N].
-        """
+        """Where the iteration begins: in a state (n, 3) with axial forces (e,) [N]."""
         strains = self._problem.stretch.strains(state)
         return Iterate(state=state, forces=forces, elements=self._problem.elements, strains=strains)
 

@@ -59,8 +59,8 @@ def follow(
 
     Args:
         problem_at: the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
-            same at all t, and their source frames are carried along the path. The first
-            iteration of each step carries them there with the tangent stiffness: it is the tangent predictor.
+            same at all t, and their source frames are carried along the path. The first iteration of each step carries
+            them there with the tangent stiffness: it is the tangent predictor.
         state, forces: equilibrium, or a guess of it, at t = 0.
         snap: where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
             structure itself would; its constraint must be `Supports`.
@@ -196,9 +196,6 @@ def trace(
         snap: whether to go down the energy there and on from where that leads; else the path ends there.
         most_factorizations: the path ends when they are used up.
         progress: called with t and the equilibrium there before each step; it may raise an error to end the path.
-
-    Returns:
-        The path; its t is `stop` where it arrived.
     """
     path, snaps, reports = Continuation(start, stop, abs(stop - start), shortest), list[Snap](), list[SolveReport]()
     while not path.arrived:
@@ -234,28 +231,20 @@ def trace(
 
 
 def going_on(problem: Problem, last: Equilibrium) -> Problem:
-    """The problem with the source frames and the pattern of an equilibrium of the same structure.
-
-    Args:
-        problem: the next one on a path.
-        last: the equilibrium that the next solve starts from.
-    """
+    """The next problem on a path, with the source frames and the pattern of the equilibrium that it starts from."""
     elements = tuple(map(with_frames, problem.elements, last.elements))
     return replace(problem, elements=elements, pattern=last.problem.pattern)
 
 
 def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule; parameters as of `_surplus`."""
+    by the trapezoidal rule: see `_surplus`."""
     return abs(_surplus(here, there)) > UNACCOUNTED
 
 
 def _surplus(here: Equilibrium, there: Equilibrium) -> float:
-    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell.
-
-    Args:
-        here, there: equilibria of one structure under one load, the second with prescribed `Supports`.
-    """
+    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell. Of
+    equilibria of one structure under one load, the second with prescribed `Supports`."""
     supports = there.problem.constraint
     assert isinstance(supports, Supports)
     moved, before, after = supports.moved, here.energy, there.energy

@@ -24,22 +24,15 @@ NO_CURVATURE = np.empty((0, 3, 3))
 
 
 class Constraint(Protocol):
-    """A manifold on which the state moves. The count of free directions of each block never changes."""
+    """A manifold on which the state (n, 3) moves [m, at twist angles rad]. The count of free directions of each block
+    never changes."""
 
     def freedom(self, state: Floats) -> Freedom:
-        """The free directions.
-
-        Args:
-            state: (n, 3) on the manifold [m, at twist angles rad].
-        """
+        """The free directions at a state on the manifold."""
         ...
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
-        """Contribution of the constraint forces to the Hessian.
-
-        Args:
-            state: (n, 3) on the manifold [m, rad].
-            gradient: (n, 3) of energy and load there [N, N m].
+        """Contribution of the constraint forces to the Hessian, by the gradient (n, 3) of energy and load [N, N m].
 
         Returns:
             (n, 3, 3) -lambda phi'' of each block [N/m]; or an empty array, at every state.
@@ -47,22 +40,12 @@ class Constraint(Protocol):
         ...
 
     def remaining(self, state: Floats) -> Floats | None:
-        """Prescribed displacement that is still to go.
-
-        Args:
-            state: (n, 3) the state now [m, rad].
-
-        Returns:
-            (n, 3) across the free directions [m, rad]; None where nothing moves.
-        """
+        """(n, 3) prescribed displacement across the free directions that is still to go [m, rad]; None where nothing
+        moves."""
         ...
 
     def retract(self, state: Floats) -> Floats:
-        """The state moved back onto the manifold after a step along the free directions.
-
-        Args:
-            state: (n, 3) next to the manifold [m, rad].
-        """
+        """The state moved back onto the manifold after a step along the free directions."""
         ...
 
 
@@ -113,12 +96,7 @@ class Pattern:
     solver: Multifrontal
 
     def serves(self, blocks: tuple[Ints, ...], count: Ints) -> bool:
-        """Whether another problem has this pattern.
-
-        Args:
-            blocks: (m, k) of each of its sets of energies.
-            count: (n,) free directions of each of its blocks.
-        """
+        """Whether another problem, with these `blocks` and this `count`, has this pattern."""
         here, there = (*self.blocks, self.count), (*blocks, count)
         return len(here) == len(there) and all(map(np.array_equal, here, there))
 
@@ -188,11 +166,7 @@ class Problem:
         return np.where(twist_angles(self.elements, count), 2.0 * np.pi, self.length)[:, None]
 
     def pattern_at(self, state: Floats) -> Pattern:
-        """The pattern of this problem: the one that comes with it where it serves, or a new one.
-
-        Args:
-            state: (n, 3) any state of the problem.
-        """
+        """The pattern of this problem, at any state: the one that comes with it where it serves, or a new one."""
         blocks, free = self.blocks(len(state)), self.constraint.freedom(state)
         if self.pattern is not None and self.pattern.serves(blocks, free.count):
             return self.pattern
@@ -219,12 +193,8 @@ class Problem:
 
 
 def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | None) -> Multifrontal:
-    """The solver for a pattern, ordered by where the blocks lie in the flat grid if that is known.
-
-    Args:
-        free: the free directions of the blocks.
-        flat_coordinates: (n, 2) of the blocks [m]; None: ordered by minimum degree.
-    """
+    """The solver for a pattern, ordered by where the blocks lie in the flat grid (n, 2) [m], if that is known; else by
+    minimum degree."""
     if flat_coordinates is None:
         return Multifrontal(assembly.indptr, assembly.indices)
     return Multifrontal(
@@ -279,11 +249,7 @@ class GravityForce:
         vector("the acceleration of gravity", self.acceleration)
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        """The weight of the nodes.
-
-        Args:
-            mass: (N, 3) lumped mass of each component [kg, kg m2].
-        """
+        """The weight of the nodes; parameters as of `Force.held`."""
         force = np.zeros_like(mass)
         force[self.nodes] = mass[self.nodes] * self.acceleration
         return force
@@ -311,11 +277,7 @@ class PointLoads:
         return cls(np.array([block]), np.array([[*force, 0.0, 0.0][:3]]))
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        """The sum of the loads on each block.
-
-        Args:
-            mass: (N, 3) lumped mass of each component, for its shape.
-        """
+        """The sum of the loads on each block; parameters as of `Force.held`."""
         force = np.zeros_like(mass)
         _check_blocks(self.blocks, len(mass))
         np.add.at(force, self.blocks, self.forces)
@@ -367,13 +329,7 @@ class ExplicitForce:
         function_of("the force", self.force, "a function of time, state and velocity", 0.0, None, None)
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        """The force, evaluated once for the step.
-
-        Args:
-            time: of the step's end [s].
-            state, velocity: (N, 3) at its start [m, m/s].
-            mass: (N, 3) lumped mass of each component, for its shape.
-        """
+        """The force, evaluated once for the step; parameters as of `Force.held`."""
         return _checked(self.force(time, state, velocity), mass.shape, self.force, time)
 
 
@@ -400,12 +356,7 @@ class ImplicitForce:
         _check_blocks(self.blocks, len(mass))
 
     def at(self, time: float, state: Floats, velocity: Floats, step: float) -> tuple[Floats, Floats]:
-        """The force at the end of a step.
-
-        Args:
-            time: of the end [s].
-            state, velocity: (N, 3) at the end [m, m/s].
-            step: length of the step [s].
+        """The force at the `time` of a step's end, in the `state` and at the `velocity` (N, 3) there.
 
         Returns:
             (N, 3) forces [N], and (m, 3k, 3k) minus the symmetric part of their derivative by the state at the end.

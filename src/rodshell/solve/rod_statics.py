@@ -134,12 +134,7 @@ class SupportPath:
 
     @staticmethod
     def of(rod: ElasticRod, state: Floats, wanted: RodSupports) -> "SupportPath":
-        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted.
-
-        Args:
-            state: (N, 3) node positions [m] and twist angles [rad] at the start.
-            wanted: the supports at the end.
-        """
+        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted."""
         wanted.require(rod)
         goals = dict[int, Floats]()
         for k, node in enumerate(rod.clamped_nodes):
@@ -229,13 +224,8 @@ def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) ->
 
 
 def index_of(given: int, count: int, what: str) -> int:
-    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`.
-
-    Args:
-        given: the index; a negative one counts from the end.
-        count: number of all that there are.
-        what: is counted, for messages: "node" or "edge".
-    """
+    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`, a
+    "node" or an "edge"."""
     if not isinstance(given, int | np.integer):
         raise InputError(f"a {what} is a whole number, not {short(given)}")
     if not -count <= given < count:

@@ -70,13 +70,10 @@ class Tangent:
         return self.factors.negative
 
     def solve(self, loads: Floats) -> Floats:
-        """Displacements K^-1 f in the free directions; zero across them.
+        """Displacements K^-1 f [m, rad] in the free directions; zero across them.
 
         Args:
             loads: (N, 3) forces [N, at twist angles N m], or (k, N, 3) of k cases.
-
-        Returns:
-            Displacements of the same shape [m, rad].
         """
         return self._of_fields("loads", loads, self.factors.solve)
 
@@ -216,7 +213,6 @@ class TangentAssembly:
 
         Args:
             elements: with their source frames at, or near, the state.
-            forces: (e,) axial forces of the edges [N].
         """
         return self._gradient(elements, state, forces, [NO_HESSIANS] * len(elements))[1]
 
@@ -246,7 +242,7 @@ class TangentAssembly:
         return self.pattern.assembly.assemble(self.hessians, self.blocks, free)
 
     def product(self, motion: Floats) -> Floats:
-        """(N, 3) product of the Hessian at the last state with displacements (N, 3) across the free directions too."""
+        """(N, 3) product of the Hessian at the last state with displacements, across the free directions too."""
         return product(self.hessians[:-1], self.blocks[:-1], motion)
 
     def values(
@@ -273,7 +269,6 @@ class TangentAssembly:
         """(nnz,) values of the change of K with the internal forces alone, the geometry being frozen.
 
         Args:
-            elements: with their source frames at, or near, the state.
             change: (e,) of the axial forces [N].
             motion: (N, 3) along which moments change, of the elements that are `Stressed` [m, rad].
         """
