@@ -86,9 +86,8 @@ def linear_buckling(
     """
     state, applied = permanent.state, Load.of(load)
     loaded = LoadedAssembly(permanent.problem, applied, state)
-    elements = applied.elements(permanent.elements, state, 0.0)
-    tangent, rate = loaded.tangent(elements, state, permanent.forces, 0.0)
-    stress = loaded.stress_values(elements, state, rate)
+    tangent, rate = loaded.tangent(loaded.problem, state, permanent.forces)
+    stress = loaded.stress_values(loaded.problem, state, rate)
     values, shapes = _largest(tangent, -stress, count, 1.0 / most)
     return LinearBuckling(1.0 / values, _unit_shapes(tangent, permanent, shapes), rate)
 
@@ -139,7 +138,7 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
         freedom = tangent.freedom
     except SingularError:
         assembly = TangentAssembly(equilibrium.problem, equilibrium.state)
-        freedom, values = assembly.values(equilibrium.elements, equilibrium.state, equilibrium.forces)
+        freedom, values = assembly.values(equilibrium.problem, equilibrium.state, equilibrium.forces)
         stiffness_alone = np.abs(_diagonal(assembly.pattern, values))
         scale = np.sqrt(stiffness_alone + (stiffness_alone == 0) * stiffness_alone.mean())
         shifted = values.copy()

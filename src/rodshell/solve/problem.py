@@ -5,7 +5,7 @@ step asks a force once for the part that is held over it (`held`); a force may a
 enters Newton's matrix. Forces on a twist angle are moments [N m] in the first component of its block.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol, Self
 
@@ -16,7 +16,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Potential, Shell
-from rodshell.rods.elements import Elements, Stretch, twist_angles
+from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch, evaluate_all, twist_angles
 from rodshell.solve.sparse_ldl import Multifrontal
 from rodshell.validation import array, finite, function_of, keep, number, vector
 
@@ -185,6 +185,20 @@ class Problem:
     def refreshed(self, state: Floats) -> Self:
         """The same problem with the source frames of its elements at `state` (n, 3)."""
         return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
+
+    def without_edges(self, state: Floats, hessians: Sequence[Floats]) -> Floats:
+        """(n, 3) gradient of the elements and the load at a state [N, for angles N m]; `hessians`, of each set of
+        elements, are filled unless they are empty."""
+        gradient = np.zeros_like(state) if self.load is None else -self.load
+        evaluate_all(self.elements, state, gradient, hessians)
+        return gradient
+
+    def gradient(self, state: Floats, forces: Floats) -> Floats:
+        """(n, 3) gradient of energy and load at a state [N, for angles N m], the edges carrying the axial `forces` (e,)
+        [N]."""
+        gradient = self.without_edges(state, [NO_HESSIANS] * len(self.elements))
+        self.stretch.add_axial(state, forces, gradient)
+        return gradient
 
     def potential(self, state: Floats) -> float:
         """Elastic energy at `state` (n, 3) less the work of the load [J]."""

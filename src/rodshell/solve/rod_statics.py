@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
-from rodshell.model import Freedom, Potential
+from rodshell.model import Freedom
 from rodshell.model.assembly import ANGLE
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.rod_line import End
-from rodshell.rods.elements import Elements, is_bends
+from rodshell.rods.elements import is_bends
 from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.solve.path import followed
 from rodshell.solve.problem import Problem, Supports
@@ -341,7 +341,8 @@ def solve_rod(
     else:
         axial = rod.stretch.stiffness * rod.stretch.strains(state)
         held = tuple(element.relaxed(state) for element in rod.elements)
-    before = _gradient(held, rod, state, axial)  # this load makes the start an equilibrium
+    # this load makes the start an equilibrium
+    before = Problem(held, rod.stretch, path.at(0.0), rod.length).gradient(state, axial)
 
     def problem_at(t: float) -> Problem:
         pulls = (1 - t) * before + t * load
@@ -366,14 +367,10 @@ def solve_rod(
             "to the side that it is to take; or pass stable=False to have it as it is",
             report,
         )
-    return _shape(
-        replace(rod, elements=tuple(filter(is_bends, way.found.elements))),
-        way.found.state,
-        way.found.forces,
-        load,
-        path.free,
-        report,
-    )
+    found, solved = way.found, replace(rod, elements=tuple(filter(is_bends, way.found.elements)))
+    reactions = found.gradient - path.free.within(found.gradient)
+    residual = float(np.abs(found.gradient[rod.nodes] - reactions[rod.nodes]).max())
+    return RodShape(solved, found.state, found.forces, load, reactions, replace(report, force_residual=residual))
 
 
 def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
@@ -386,17 +383,3 @@ def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
     if state.shape != (rod.block_count, 3):
         raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
     return finite("the state to start from", state, *state.shape).copy()
-
-
-def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Freedom, report: SolveReport) -> RodShape:
-    gradient = _gradient(rod.elements, rod, state, axial) - load
-    reactions = gradient - free.expand(free.reduce(gradient))
-    residual = float(np.abs(gradient[rod.nodes] - reactions[rod.nodes]).max())
-    return RodShape(rod, state, axial, load, reactions, replace(report, force_residual=residual))
-
-
-def _gradient(elements: tuple[Elements, ...], rod: ElasticRod, state: Floats, axial: Floats) -> Floats:
-    """(N, 3) of the energy, the edges carrying the axial forces (edges,) [N]."""
-    gradient = Potential(elements).gradient(state)
-    rod.stretch.add_axial(state, axial, gradient)
-    return gradient
