@@ -22,7 +22,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints, State
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
-from rodshell.rods.bend_twist import BendTwist, spread, strain_rates
+from rodshell.rods.bend_twist import BendTwist, spread
 from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import brief
 
@@ -82,7 +82,10 @@ class IsotropicBend(WithoutFrames):
 
 @dataclass(frozen=True, eq=False)
 class IsotropicBendTwist(BendTwist):
-    """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature."""
+    """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature.
+
+    In buckling bending keeps its stiffness: it knows no frames, and no strains that could stay while its moments change.
+    """
 
     moduli: ClassVar[tuple[int, ...]] = (0, 2)
     __repr__ = brief
@@ -90,17 +93,6 @@ class IsotropicBendTwist(BendTwist):
     def relaxed(self, state: State) -> Self:
         """The same elements with the twist of `state` as their natural twist: these rods are naturally straight."""
         return replace(self, natural_twist=self.strains(state)[:, 2].copy())
-
-    def stress_stiffness(self, state: State, motion: Floats, hessians: Floats) -> None:
-        """Of the change of the torsional moments: see `Stressed.stress_stiffness`.
-
-        Bending knows no frames, and no strains that could stay while its moments change: it keeps its stiffness.
-        """
-        twist = strain_rates(self, state, motion)[:, 2]
-        scrap, before = np.zeros_like(state), np.zeros_like(hessians)
-        self.evaluate(state, scrap, before)
-        replace(self, natural_twist=self.natural_twist - twist).evaluate(state, scrap, hessians)
-        hessians -= before
 
     @property
     def parts(self) -> tuple[Self, ...]:

@@ -202,10 +202,9 @@ def _largest(tangent: Tangent, other: Floats, count: int, least: float) -> tuple
     for number in range(TRIES):
         if size <= DENSE or wanted >= size - 1:
             values, vectors = eigh(matrix.toarray(), stiffness.toarray())
-            order = np.argsort(values)[::-1]
         else:
             values, vectors = _lanczos(tangent, matrix, stiffness, wanted, start=number)
-            order = np.argsort(values)[::-1]
+        order = np.argsort(values)[::-1]
         values, vectors = values[order], vectors.T[order]
         positive = values > max(least, 1e-14 * float(np.abs(values).max(initial=0.0)))
         values, vectors = values[positive], vectors[positive]
@@ -224,14 +223,13 @@ def _largest(tangent: Tangent, other: Floats, count: int, least: float) -> tuple
 
 def _between(values: Floats, count: int, least: float, *, complete: bool) -> tuple[float, int]:
     """A number in a gap below the `count`-th of the descending values, and how many are above it."""
-    rest = values[: len(values)]
-    gaps = 1.0 - rest[count:] / rest[count - 1 : -1]
+    gaps = 1.0 - values[count:] / values[count - 1 : -1]
     if complete and not (gaps > GAP).any():  # the gap is below the last of all
-        last = float(rest[-1]) if len(rest) else np.inf
-        return (least if least > 0 else 0.5 * last), len(rest)
+        last = float(values[-1]) if len(values) else np.inf
+        return (least if least > 0 else 0.5 * last), len(values)
     first = int(np.argmax(gaps > GAP)) if (gaps > GAP).any() else len(gaps) - 1
     number = count + first
-    return 0.5 * float(rest[number - 1] + rest[number]), number
+    return 0.5 * float(values[number - 1] + values[number]), number
 
 
 def _above(tangent: Tangent, other: Floats, value: float) -> int:
