@@ -21,7 +21,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
 from rodshell.model.assembly import ANGLE, Freedom
 from rodshell.model.potential import Potential
-from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
+from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods, ghost_position
 from rodshell.rods.bend_twist import BendTwist, frames_among
 from rodshell.rods.elements import BendElements, Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
@@ -237,13 +237,9 @@ class ElasticRod:
             state[self.angles, 0] = finite("the twist angles of this rod", angles, self.edge_count)
         for k, end in enumerate(self.clamps):
             tangent = direction(f'the tangent at the "{end}"', (tangents or {}).get(end, self.clamp_tangents[k]))
-            state[self.ghosts[k]] = self.ghost_position(end, state[self.clamped_nodes[k]], tangent)
+            at = state[self.clamped_nodes[k]]
+            state[self.ghosts[k]] = ghost_position(end, at, self.stretch.rest_lengths, tangent)
         return state
-
-    def ghost_position(self, end: End, position: Floats, tangent: Floats) -> Floats:
-        """(3,) position of a clamp's ghost node [m], by that of the end and the unit tangent along the rod there."""
-        edge = 0 if end == "start" else self.edge_count - 1
-        return np.asarray(position + (-1 if end == "start" else 1) * self.stretch.rest_lengths[edge] * tangent)
 
     def refreshed(self, state: Floats) -> "ElasticRod":
         """The same rod with its source frames moved to `state`: no strain and no angle changes."""

@@ -108,11 +108,6 @@ class RodLine:
         nodes = np.arange(len(self.nodes)) if self.closed else np.arange(1, len(self.nodes) - 1)
         return nodes, np.column_stack([(nodes - 1) % len(self.nodes), nodes])
 
-    def ghost(self, end: End) -> Floats:
-        """(3,) position of the ghost node of a clamped end, one last edge past it [m]."""
-        edge, node, outward = (0, 0, -1.0) if end == "start" else (-1, -1, 1.0)
-        return np.asarray(self.nodes[node] + outward * self.lengths[edge] * self.clamps[end])
-
     def end_director(self, directors: Floats, end: End) -> Floats:
         """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges, by
         the directors (e, 3) of the edges."""
@@ -188,11 +183,22 @@ class RodBends:
         """(size, 3) state at rest, and in the rows of the twist angles the directors (e, 3) of their edges."""
         state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))
         state[: len(line.nodes)], frames[self.angles] = line.nodes, directors
-        for k, end in enumerate(line.clamps):
+        for k, (end, tangent) in enumerate(line.clamps.items()):
             ghost = self.angles.stop + k
-            state[ghost] = line.ghost(end)
+            state[ghost] = ghost_position(end, line.nodes[0 if end == "start" else -1], line.lengths, tangent)
             frames[ghost + len(line.clamps)] = line.end_director(directors, end)
         return state, frames
+
+
+def ghost_position(end: End, position: Floats, lengths: Floats, tangent: Floats) -> Floats:
+    """(3,) position of the ghost node of a clamped end, one last edge of the rod past it [m].
+
+    Args:
+        position, tangent: (3,) of the end, and along the rod there.
+        lengths: (e,) of the rod's edges [m].
+    """
+    edge, outward = (0, -1.0) if end == "start" else (-1, 1.0)
+    return np.asarray(position + outward * lengths[edge] * tangent)
 
 
 def _points(rest: ArrayLike) -> int:

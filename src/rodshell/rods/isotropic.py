@@ -84,7 +84,7 @@ class IsotropicBend(WithoutFrames):
 class IsotropicBendTwist(BendTwist):
     """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature.
 
-    In buckling bending keeps its stiffness: it knows no frames, and no strains that could stay while its moments change.
+    In buckling, bending keeps its stiffness: it knows no frames, and no strains that could stay while moments change.
     """
 
     moduli: ClassVar[tuple[int, ...]] = (0, 2)

@@ -28,7 +28,7 @@ from rodshell.solve.continuation import Continuation
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.newton_matrix import SparseSum
-from rodshell.solve.problem import Problem, Supports
+from rodshell.solve.problem import PointLoads, Problem, Supports
 
 EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25
@@ -306,9 +306,8 @@ def relax(
     """
     begin = time.perf_counter()
     edges = problem.stretch.with_forces(None)
-    motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, ())
-    if problem.load is not None:
-        motion = replace(motion, forces=(_Dead(problem.load),))
+    dead = () if problem.load is None else (PointLoads(np.arange(len(state)), problem.load),)
+    motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, dead)
     stepper = ImplicitEuler(lambda blocks, free: SparseSum(blocks, free, problem.flat_coordinates))
     still, unit, length, factorizations, number = np.zeros_like(state), problem.unit(len(state)), FIRST, 0, 0
     for number in range(1, MOST_STEPS + 1):
@@ -336,16 +335,6 @@ def relax(
     found = find_stable(replace(problem, elements=motion.elements[:-1]), state, forces, progress=progress)
     work = replace(found.report, iterations=number, factorizations=factorizations, seconds=time.perf_counter() - begin)
     return replace(found, report=found.report.after(replace(work, seconds=work.seconds - found.report.seconds)))
-
-
-class _Dead:
-    """A load that does not change."""
-
-    def __init__(self, load: Floats) -> None:
-        self._load = load
-
-    def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        return self._load
 
 
 def _pace(problem: Problem, state: Floats) -> Floats:
