@@ -280,7 +280,7 @@ class _Path:
             return None
         found = follow(
             lambda t: self._problem((1 - t) * start + t * share, elements), here.state, here.forces, first_step=1.0
-        )
+        ).whole
         self._counted(found)
         return found if found.report.stable else None
 

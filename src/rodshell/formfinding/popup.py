@@ -375,7 +375,7 @@ class _Stages:
             most_factorizations=self.most_factorizations,
             most_modes=self.most_rolling,
             progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
-        )
+        ).whole
         late = found.report.status is Status.OUT_OF_TIME
         if found.report.stable or late or self.most_factorizations is not None:
             return shell, found
@@ -439,7 +439,7 @@ class _Stages:
             progress=lambda t, k, step: self.progress(
                 "pop-up", f"turning clamps, {100 * t:.0f} %, iteration {k}", step
             ),
-        )
+        ).whole
         return shell, replace(found, report=found.report.after(pinned.report))
 
 

@@ -51,45 +51,6 @@ def follow(
     *,
     first_step: float,
     snap: bool = False,
-    most_factorizations: int | None = None,
-    most_modes: int | None = None,
-    progress: Callable[[float, int, float], None] | None = None,
-) -> Equilibrium:
-    """Move from t = 0 to t = 1 by steps that shrink on failure and grow back.
-
-    Args:
-        problem_at: the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
-            same at all t, and their source frames are carried along the path. The first iteration of each step carries
-            them there with the tangent stiffness: it is the tangent predictor.
-        state, forces: equilibrium, or a guess of it, at t = 0.
-        snap: where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
-            structure itself would; its constraint must be `Supports`.
-        most_factorizations: no step is begun after so many, and no descent takes many more; None: as many as it takes.
-        most_modes: the path ends at an equilibrium with more negative modes; None: at none.
-
-    Returns:
-        The equilibrium at t = 1, or at the last t reached, with the status STALLED. Iterations,
-        factorizations and seconds of the report are those of the whole path, failed steps included.
-    """
-    path = followed(
-        problem_at, state, forces, first_step=first_step, snap=snap, most_factorizations=most_factorizations,
-        most_modes=most_modes, progress=progress,
-    )  # fmt: skip
-    last = path.reports[-1]
-    report = path.found.report.after(*(report for report in path.reports if report is not path.found.report))
-    if path.t < 1.0:
-        status = Status.OUT_OF_TIME if last.status is Status.OUT_OF_TIME else Status.STALLED
-        report = replace(report, status=status, reason=last.reason)
-    return replace(path.found, report=report)
-
-
-def followed(
-    problem_at: Callable[[float], Problem],
-    state: Floats,
-    forces: Floats,
-    *,
-    first_step: float,
-    snap: bool = False,
     neutral: float = 0.0,
     slide: bool = True,
     easy: int = EASY,
@@ -99,12 +60,20 @@ def followed(
     most_modes: int | None = None,
     progress: Callable[[float, int, float], None] | None = None,
 ) -> "Trace":
-    """As `follow`, as far as it went.
+    """Move from t = 0 to t = 1 by steps that shrink on failure and grow back; see `Trace.whole`.
 
     Args:
+        problem_at: the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
+            same at all t, and their source frames are carried along the path. The first iteration of each step carries
+            them there with the tangent stiffness: it is the tangent predictor.
+        state, forces: equilibrium, or a guess of it, at t = 0.
+        snap: where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
+            structure itself would; its constraint must be `Supports`.
         neutral, slide: as of `find_stable`.
         easy: iterations of a step that may be followed by a longer one.
         most, most_of_all: iterations of a step, and of the path; None: as many as it takes.
+        most_factorizations: no step is begun after so many, and no descent takes many more; None: as many as it takes.
+        most_modes: the path ends at an equilibrium with more negative modes; None: at none.
     """
     path, reports = Continuation(0.0, 1.0, first_step, SMALLEST_STEP), list[SolveReport]()
     last: Equilibrium | None = None
@@ -177,6 +146,17 @@ class Trace:
     def factorizations(self) -> int:
         """Of all solves, those of steps that were too long too."""
         return _made(self.reports)
+
+    @property
+    def whole(self) -> Equilibrium:
+        """The equilibrium at t = 1, or at the last t reached, with the status STALLED or OUT_OF_TIME. Its report counts
+        the work of the whole path, failed steps included."""
+        report = self.found.report.after(*(report for report in self.reports if report is not self.found.report))
+        if self.t < 1.0:
+            late = self.reports[-1].status is Status.OUT_OF_TIME
+            status = Status.OUT_OF_TIME if late else Status.STALLED
+            report = replace(report, status=status, reason=self.reports[-1].reason)
+        return replace(self.found, report=report)
 
 
 def trace(

@@ -18,7 +18,7 @@ from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.rod_line import End
 from rodshell.rods.elements import is_bends
 from rodshell.solve.equilibrium import SolveReport, Status
-from rodshell.solve.path import followed
+from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem, Supports
 from rodshell.validation import array, direction, finite, flag, instance, mapping, number, short, texts, vector, whole
 
@@ -349,7 +349,7 @@ def solve_rod(
         elements = tuple(last.between(first, t) for first, last in zip(held, rod.elements, strict=True))
         return Problem(elements, rod.stretch, path.at(t), rod.length, load=pulls)
 
-    way = followed(
+    way = follow(
         problem_at, state, axial, first_step=1.0 / steps, slide=stable, neutral=NEUTRAL * rod.bend_energy, easy=EASY,
         most=MOST, most_of_all=None,
     )  # fmt: skip
