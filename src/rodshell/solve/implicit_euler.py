@@ -268,8 +268,7 @@ class _Newton:
 
     def solve(self) -> Step | Refused:
         free = self.constraint.freedom(self.start)
-        moved = np.zeros_like(self.start)
-        _add_free(self.step, self.velocity, free.directions, free.count, moved)
+        moved = free.expand(self.step * free.reduce(self.velocity))
         going = self.constraint.remaining(self.start)
         if going is not None:
             moved += going
@@ -344,17 +343,6 @@ class _Newton:
 
     def _size(self, motion: Floats) -> float:
         return float(_mass_norm(self.motion.mass.ravel(), motion.ravel()))
-
-
-@njit("f f2 f3 i1 f2")
-def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyped-def]
-    """Add a share of the part of `field` in the free directions."""
-    for i in range(len(motion)):
-        for c in range(count[i]):
-            d = directions[i, c]
-            part = share * (d[0] * field[i, 0] + d[1] * field[i, 1] + d[2] * field[i, 2])
-            for k in range(3):
-                motion[i, k] += part * d[k]
 
 
 @njit("f1 f1", fastmath={"reassoc", "contract"})
