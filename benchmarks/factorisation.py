@@ -39,7 +39,9 @@ def system(unknowns: int) -> tuple[csc_matrix, np.ndarray]:
         Problem(shell.elements, shell.stretch, Supports(free), RADIUS, flat_coordinates=shell.flat_coordinates), state
     )
     step.take(step.start(state, np.zeros(len(shell.stretch.blocks))))
-    return step.assembly.pattern.upper(step.matrix.values), np.repeat(shell.flat_coordinates, free.count, axis=0)
+    return step.assembly.pattern.assembly.upper(step.matrix.values), np.repeat(
+        shell.flat_coordinates, free.count, axis=0
+    )
 
 
 def least(work: Callable[[], object]) -> float:

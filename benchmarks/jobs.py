@@ -91,7 +91,7 @@ def _unit() -> tuple[Callable[[], object], int]:
         step.take(start)
 
     newton()
-    return newton, step.assembly.pattern.upper(step.matrix.values).shape[0]
+    return newton, step.assembly.pattern.assembly.upper(step.matrix.values).shape[0]
 
 
 def bound_system(layout: rs.GridLayout) -> tuple[NewtonStep, np.ndarray, np.ndarray]:

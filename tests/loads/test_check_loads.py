@@ -477,8 +477,7 @@ def test_frequencies_of_a_shell_are_those_of_its_stiffness_and_mass(laths: rs.La
     structure = Structure.erected(form.popped["pinned"], form.rod)
     structure = structure if laths is None else laid(laths, structure, form.target)
     tangent = structure.equilibrium.tangent
-    upper = tangent.pattern.upper(tangent.values).toarray()
-    stiffness = upper + upper.T - np.diag(upper.diagonal())
+    stiffness = tangent.pattern.assembly.matrix(tangent.values).toarray()
     size = structure.size
     mass = np.zeros((3 * size, 3 * size))
     layers = [structure.shell, *([] if structure.laths is None else [structure.laths.shell])]

@@ -19,7 +19,7 @@ from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, St
 from rodshell.figures.findings import Said, said
 from rodshell.figures.records import Ends
 from rodshell.formfinding import PopUp
-from rodshell.model.shell import UP
+from rodshell.joints.crossings import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.quantities import MOST_STAGES
 from rodshell.rods.section import Rod

@@ -25,11 +25,11 @@ from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.checks.bending import edge_directors, shell_normals
 from rodshell.figures.checks import Clearance
 from rodshell.geometry.frames import adapted, cross, dot, unit
+from rodshell.joints.crossings import UP
 from rodshell.layout import GridMesh
 from rodshell.layout.flatgrid import Crossings
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
-from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
 
 FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees

@@ -272,9 +272,10 @@ class _Path:
         start, here = last
         if not here.report.stable:
             return None
-        found = self._counted(
-            follow(lambda t: self._problem((1 - t) * start + t * share), here.state, here.forces, first_step=1.0)
-        )
+        found = follow(
+            lambda t: self._problem((1 - t) * start + t * share), here.state, here.forces, first_step=1.0
+        ).whole
+        self._counted(found)
         return found if found.report.stable else None
 
     def end(self, last: Stage, share: float) -> tuple[float, Limit]:

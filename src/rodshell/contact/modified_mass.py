@@ -58,12 +58,7 @@ class Touching:
 
     @staticmethod
     def none(supports: Any, state: Floats) -> "Touching":
-        """The constraint where nothing touches.
-
-        Args:
-            supports: the shell's supports, a constraint.
-            state: (N, 3) [m].
-        """
+        """The constraint where nothing touches, as at the start of each step, whatever touched in the one before."""
         nowhere, no_nodes = np.empty((0, 3)), np.empty(0, dtype=np.intp)
         return Touching(supports, supports.freedom(state), no_nodes, nowhere, nowhere, np.empty(0, dtype=bool))
 
@@ -101,12 +96,8 @@ class Touching:
         return Freedom(directions, self.free.count), along, cosine
 
     def free_share(self, nodes: Ints, normals: Floats) -> Floats:
-        """(k,) cosines between the normals (k, 3) of `nodes` (k,) and the directions that their supports leave free.
-
-        Args:
-            nodes: (k,) blocks.
-            normals: (k, 3) unit vectors.
-        """
+        """(k,) cosines between the unit normals (k, 3) of `nodes` (k,) and the directions that their supports leave
+        free."""
         along = np.einsum("kcx,kx->kc", self.free.directions[nodes], normals)
         along[np.arange(3) >= self.free.count[nodes][:, None]] = 0.0
         return np.asarray(np.sqrt(dot(along, along)))
@@ -145,24 +136,12 @@ class ModifiedMass:
         """Whether touching nodes lose their velocity along the surface, too."""
         return self.stopped == "all" and not self.friction
 
-    def touching(self, supports: Any, state: Floats) -> Touching:
-        """The constraint at the start of a step: nothing touches, whatever touched in the step before.
-
-        Args:
-            supports: the shell's supports, a constraint.
-            state: (N, 3) [m].
-        """
-        return Touching.none(supports, state)
-
     def below(self, state: Floats, touching: Touching) -> Touching | None:
-        """The constraint with all nodes that are newly below the surface at `state`; None if there are none [HQK Eq 8].
+        """The constraint of a step so far with all nodes that are newly below the surface at `state`, the step's end;
+        None if there are none [HQK Eq 8].
 
         Nodes that touch already are not tested again: above a concave surface a node on its plane is below it by an
         amount quadratic in its slide, and elsewhere by round-off (ERRATA to Algorithm 1, which could loop on them).
-
-        Args:
-            state: (N, 3) at the end of the step [m].
-            touching: the constraint of the step so far.
         """
         outside = np.ones(len(state), dtype=bool)
         outside[self.nodes] = self.target.outside(state[self.nodes])
@@ -209,12 +188,7 @@ class ModifiedMass:
         return replace(touching, stuck=touching.stuck & ~slips), rubbing
 
     def landed(self, velocity: Floats, touching: Touching) -> Floats:
-        """(N, 3) the velocity after the inelastic impact.
-
-        Args:
-            velocity: (N, 3) before the impact [m/s].
-            touching: the nodes that touch, with their normals.
-        """
+        """(N, 3) the velocity after the inelastic impact of the nodes that touch [m/s]."""
         result, nodes = velocity.copy(), touching.nodes
         if self.stops_all:
             result[nodes] = 0.0
@@ -223,7 +197,7 @@ class ModifiedMass:
         return result
 
 
-@njit(error_model="numpy")
+@njit("f3 i1 i1 b1 f2 f1")
 def _turn(directions, count, nodes, stuck, along, cosine):  # type: ignore[no-untyped-def]
     """Reflect the directions of each node so that the last is the free part of the normal `along`; it becomes zero."""
     part, mirror = np.empty(3), np.empty(3)

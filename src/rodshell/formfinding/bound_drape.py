@@ -145,7 +145,7 @@ def bound_drape(
     )
 
 
-@njit()
+@njit("i2 i1 b1")
 def _mark(spans, rod_nodes, marked):  # type: ignore[no-untyped-def]
     """Mark the nodes of the pieces of rods whose first and last entry of `rod_nodes` are `spans` (m, 2)."""
     for piece in range(len(spans)):

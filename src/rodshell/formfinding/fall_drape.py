@@ -225,7 +225,7 @@ class _FallSimulation:
     @property
     def touching(self) -> Touching:
         assert self.stepper.last is not None
-        return self.stepper.last  # type: ignore[return-value]
+        return self.stepper.last
 
     def activity(self, sample: Sample) -> tuple[float, float]:
         """Kinetic energy [J] and largest out-of-balance force [N]."""

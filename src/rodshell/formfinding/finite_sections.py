@@ -130,7 +130,7 @@ def thickness_warnings(
     )
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i2 b1")
 def _curvatures(normal, positions, edges, touching):  # type: ignore[no-untyped-def]
     """(e,) the surface's curvature along each edge, by the normals at its ends [1/m]; 0 if one does not touch it."""
     result = np.zeros(len(edges))

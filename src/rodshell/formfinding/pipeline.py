@@ -103,7 +103,7 @@ def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     return np.asarray(_edge_middles(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
 
 
-@njit(error_model="numpy")
+@njit("f2 i1 i1 i1 f1")
 def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
     result, edge = np.zeros((len(rod_nodes) - len(rod_start), 3)), 0
     for rod in range(len(rod_start)):

@@ -21,11 +21,11 @@ from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.frames import dot, unit
 from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.joints import Ball, Joint, require_joint
+from rodshell.joints.crossings import UP
 from rodshell.layout import GridMesh
 from rodshell.layout.transfer import transferred_edges, transferred_nodes
 from rodshell.model import Shell
 from rodshell.model.rod_sections import RodSections
-from rodshell.model.shell import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import CLAMPED, PINNED, Support, support_of
@@ -375,7 +375,7 @@ class _Stages:
             most_factorizations=self.most_factorizations,
             most_modes=self.most_rolling,
             progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
-        )
+        ).whole
         late = found.report.status is Status.OUT_OF_TIME
         if found.report.stable or late or self.most_factorizations is not None:
             return shell, found
@@ -439,7 +439,7 @@ class _Stages:
             progress=lambda t, k, step: self.progress(
                 "pop-up", f"turning clamps, {100 * t:.0f} %, iteration {k}", step
             ),
-        )
+        ).whole
         return shell, replace(found, report=found.report.after(pinned.report))
 
 

@@ -206,7 +206,7 @@ def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     return unit(_end_tangents(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
 
 
-@njit(error_model="numpy")
+@njit("f2 i1 i1 i1 f1")
 def _end_tangents(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
     """As `end_tangents`, of about length 1."""
     result = np.empty((2 * len(rod_start), 3))

@@ -33,7 +33,7 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     return bool(each_meets(box[None], lines[None])[0])
 
 
-@njit(error_model="numpy")
+@njit("f3 f4")
 def each_meets(boxes, lines):  # type: ignore[no-untyped-def]
     """(n,) whether one of its own `lines` (n, m, 2, 2) runs through each of the rectangles `boxes` (n, 4, 2).
 

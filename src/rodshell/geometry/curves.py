@@ -10,7 +10,7 @@ from rodshell.kernels import njit
 TOUCH = 1e-6  # of the extent of all polylines: ends this close are joined
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+@njit("f2 f3 f1")  # type: ignore[untyped-decorator, unused-ignore]
 def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
     """Values (n, d) of polynomials, one for each of the parameters `s` (n,) [m].
 
@@ -51,7 +51,7 @@ def on_curve(knots: Floats, points: Floats, s: Floats) -> Floats:
     return np.asarray(_on_curve(knots, np.ascontiguousarray(points), s))
 
 
-@njit()
+@njit("f1 f2 f1")
 def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     count, axes = min(4, len(knots)), points.shape[1]
     near, around = np.empty((len(s), count)), np.empty((len(s), count, axes))
@@ -64,7 +64,7 @@ def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     return lagrange(near, around, s)
 
 
-@njit()  # type: ignore[untyped-decorator, unused-ignore]
+@njit("f1 f3 i f1 f")  # type: ignore[untyped-decorator, unused-ignore]
 def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: float) -> Floats:
     """Interpolate m lines with common knots, as `on_curve` does.
 

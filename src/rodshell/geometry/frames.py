@@ -37,7 +37,7 @@ def _is_table(a: Floats) -> bool:
     return a.ndim == 2 and a.shape[1] == 3 and a.dtype == np.float64 and a.flags.carray
 
 
-@njit()
+@njit("f2 f2")
 def _dots(a, b):  # type: ignore[no-untyped-def]
     result = np.empty(len(a))
     for n in range(len(a)):
@@ -45,7 +45,7 @@ def _dots(a, b):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(error_model="numpy")
+@njit("f2")
 def _units(a):  # type: ignore[no-untyped-def]
     result = np.empty_like(a)
     for n in range(len(a)):

@@ -16,9 +16,10 @@ reversed: its tangent, its second director and its twist angle change sign.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol, Self, TypeVar
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.geometry.frames import adapted, parallel_transport, unit
@@ -28,10 +29,13 @@ from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 
+UP = (0.0, 0.0, 1.0)  # normal of the flat grid
+
 
 @dataclass(frozen=True, eq=False)
 class RodNodes:
-    """A mesh as its rods see it: *rod node* k is entry k of `mesh.rod_nodes`, a node as one of its rods has it.
+    """A mesh as its rods see it: *rod node* k is entry k of `mesh.rod_nodes`, a node as one of its rods has it. Methods
+    take the indices of some, and a side: 0 before them, 1 after.
 
     Args:
         mesh: the mesh, its rods sharing their nodes at joints or lying in layers.
@@ -58,41 +62,21 @@ class RodNodes:
         return self.mesh.at_crossings
 
     def has_edge(self, rod_nodes: Ints, side: int) -> Bools:
-        """Whether the rod has an edge before (side 0) or after (side 1) each of the `rod_nodes`.
-
-        Args:
-            rod_nodes: (k,) indices of rod nodes.
-            side: 0 before, 1 after.
-        """
+        """Whether the rod has an edge on this side of each rod node."""
         rods = self.rods[rod_nodes]
         limit = self.mesh.rod_start[rods] if side == 0 else self.mesh.rod_stop[rods] - 1
         return np.asarray(rod_nodes != limit)
 
     def edge(self, rod_nodes: Ints, side: int) -> Ints:
-        """Edge before (side 0) or after (side 1) each rod node, where there is one; edges are counted rod by rod.
-
-        Args:
-            rod_nodes: (k,) indices of rod nodes.
-            side: 0 before, 1 after.
-        """
+        """Edge on this side of each rod node, where there is one; edges are counted rod by rod."""
         return np.asarray(rod_nodes - self.rods[rod_nodes] - (1 - side))
 
     def angle(self, rod_nodes: Ints, side: int) -> Ints:
-        """Block of that edge's twist angle.
-
-        Args:
-            rod_nodes: (k,) indices of rod nodes.
-            side: 0 before, 1 after.
-        """
+        """Block of that edge's twist angle."""
         return np.asarray(self.first_angle + self.edge(rod_nodes, side))
 
     def neighbour(self, rod_nodes: Ints, side: int) -> Ints:
-        """Block of the node at that edge's other end.
-
-        Args:
-            rod_nodes: (k,) indices of rod nodes.
-            side: 0 before, 1 after.
-        """
+        """Block of the node at that edge's other end."""
         return np.asarray(self.blocks[rod_nodes + (1 if side else -1)])
 
     def directions(self, rod_nodes: Ints) -> Floats:
@@ -115,41 +99,53 @@ class RodNodes:
         return state
 
 
-class SectionElements(Protocol):
-    """What every energy of sections has; see `RelativeRotation`."""
-
-    @property
-    def blocks(self) -> Ints: ...
-    @property
-    def legs(self) -> Ints: ...
-    @property
-    def source_tangents(self) -> Floats: ...
-    @property
-    def source_directors(self) -> Floats: ...
-
-
-T = TypeVar("T", bound=SectionElements)
-
-
-def edge_tangents(state: State, blocks: Ints, legs: Ints) -> Floats:
-    """(m, l, 3) unit tangents at `state` (N, 3) of the edges `legs` (l, 4) of the joints on `blocks` (m, k).
+@dataclass(frozen=True, eq=False)
+class OfSections:
+    """What energies of sections have in common: joints, all with the same number of edges. Build them with
+    `starting_at`.
 
     Args:
-        blocks: (m, k) nodes and twist angles of the joints.
-        legs: (l, 4) edges of each joint, see `Stencils`.
+        blocks: (m, k) the nodes and twist angles that a joint touches, each once.
+        legs: (l, 4) edges of each joint, see `Stencils`; they run as they do in their rod.
+        weights: (m, l) share of each edge in its rod's section; those of a rod add up to 1.
+        source_tangents, source_directors: (m, l, 3) t and d1 of each edge in its source frame.
     """
+
+    blocks: Ints
+    legs: Ints
+    weights: Floats
+    source_tangents: Floats
+    source_directors: Floats
+
+    @classmethod
+    def starting_at(
+        cls, blocks: Ints, legs: Ints, state: State, directors: ArrayLike, *, weights: Floats, **rest: Any
+    ) -> Self:
+        """Joints whose source frames are those of `state`.
+
+        Args:
+            blocks, legs, weights: see the class.
+            directors: (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for all.
+            rest: what else the energy has, by name.
+        """
+        tangents = _tangents(state, blocks, legs)
+        wanted = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, legs[:, 2]]]
+        return cls(np.ascontiguousarray(blocks), legs, weights, tangents, adapted(wanted, tangents), **rest)
+
+    @property
+    def angle_columns(self) -> Ints:
+        return self.legs[:, 2]
+
+    def refreshed(self, state: State) -> Self:
+        """The same joints with their source frames at `state` (N, 3)."""
+        tangents = _tangents(state, self.blocks, self.legs)
+        directors = parallel_transport(self.source_directors, self.source_tangents, tangents)
+        return replace(self, source_tangents=tangents, source_directors=adapted(directors, tangents))
+
+
+def _tangents(state: State, blocks: Ints, legs: Ints) -> Floats:
+    """(m, l, 3) unit tangents of the joints' edges."""
     return unit(state[blocks[:, legs[:, 1]]] - state[blocks[:, legs[:, 0]]])
-
-
-def with_source(elements: T, state: State) -> T:
-    """An energy of sections with its source frames moved to `state` (N, 3).
-
-    Args:
-        state: (N, 3) the state of the new source frames.
-    """
-    tangents = edge_tangents(state, elements.blocks, elements.legs)
-    directors = parallel_transport(elements.source_directors, elements.source_tangents, tangents)
-    return replace(elements, source_tangents=tangents, source_directors=adapted(directors, tangents))  # type: ignore[type-var]
 
 
 class Stencils(NamedTuple):
@@ -314,9 +310,6 @@ def spread(local, leg, other, hessian):  # type: ignore[no-untyped-def]
     hessian[3 * leg[2], 3 * other[2]] += local[3, 3]
 
 
-UP = (0.0, 0.0, 1.0)
-
-
 @dataclass(frozen=True, eq=False)
 class Corners:
     """The corners of crossings in which linkers lie.
@@ -339,10 +332,9 @@ class Corners:
 
     @staticmethod
     def of(rod_nodes: RodNodes, crossings: Ints, wanted: int) -> "Corners":
-        """Corners of some crossings of the grid.
+        """Corners of some crossings (m,) of the grid.
 
         Args:
-            crossings: (m,) their indices.
             wanted: 2 for two opposite corners, as in the paper, or 4 for all; where a rod ends, all that there are.
         """
         pairs = rod_nodes.at_crossings[crossings]

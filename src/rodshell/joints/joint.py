@@ -21,12 +21,11 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.joints.crossings import RodNodes, stencils
+from rodshell.joints.crossings import UP, RodNodes, stencils
 from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.rods.joints import Joint
 
 FIRM = 1e8  # times the half edges next to it: the stiffness of a rigid direction of a joint
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def resists(joint: Joint) -> bool:
@@ -37,11 +36,9 @@ def resists(joint: Joint) -> bool:
 def elastic_joints(
     rod_nodes: RodNodes, crossings: Ints, joints: Sequence[Joint], rod_stiffness: Floats, size: int
 ) -> tuple[RelativeRotation, ...]:
-    """The joints that resist some rotation, as elements.
+    """The joints, one at each of some crossings (m,), that resist some rotation, as elements.
 
     Args:
-        crossings: (m,) indices of the grid's crossings.
-        joints: m, the joint at each of them.
         rod_stiffness: (k, 3) EI1, EI2 and GJ at each rod node [N m2].
         size: number of blocks of the state.
     """
@@ -171,15 +168,8 @@ def _bisectors(rod_nodes: RodNodes, pairs: Ints, directions: Floats) -> tuple[Fl
 
 
 def refuse_mixtures(node: Ints, joints: Sequence[Joint]) -> None:
-    """Refuse nodes at which three rods or more meet with joints of different kinds.
-
-    Args:
-        node: (c,) node of each crossing.
-        joints: c, the joint at each.
-
-    Raises:
-        InputError: there is such a node.
-    """
+    """Refuse a node at which three rods or more meet with joints of different kinds; `node` and `joints` are those of
+    each crossing."""
     first: dict[int, Joint] = {}
     for joint_node, joint in zip(node.tolist(), joints, strict=True):
         if first.setdefault(joint_node, joint) != joint:

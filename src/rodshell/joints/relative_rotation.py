@@ -29,63 +29,29 @@ from typing import Self, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints, State
-from rodshell.geometry.frames import adapted, cross, dot
-from rodshell.joints.crossings import by_edge, edge_tangents, frame, of_edge, spread, with_source
+from rodshell.arrays import Floats, State
+from rodshell.geometry.frames import cross, dot
+from rodshell.joints.crossings import OfSections, by_edge, frame, of_edge, spread
 from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)
-class RelativeRotation:
-    """Elastic joints between two rods, all with the same number of edges. Build them with `starting_at`.
+class RelativeRotation(OfSections):
+    """Elastic joints between two rods.
 
     Args:
-        blocks: (m, k) the nodes and twist angles that a joint touches, each once.
-        legs: (l, 4) for each edge of a joint the columns of `blocks` of its first node, its second node and its twist
-            angle, and its rod: 0 for A, 1 for B. Edges run as they do in their rod.
-        weights: (m, l) share of each edge in its rod's section; those of a rod add up to 1.
         stiffness: (m, 3, 3) of shear and the two tilts at rest, the shear apart from the tilts [N m].
         deviators: (m, 2) complex, D_A and D_B by the axes of the tilts at rest [1/N m].
         rest_angle: (m,) angle from TA to TB at rest [rad].
-        source_tangents, source_directors: (m, l, 3) t and d1 of each edge in its source frame.
     """
 
-    blocks: Ints
-    legs: Ints
-    weights: Floats
     stiffness: Floats
     deviators: NDArray[np.complex128]
     rest_angle: Floats
-    source_tangents: Floats
-    source_directors: Floats
 
     __repr__ = brief
-
-    @classmethod
-    def starting_at(
-        cls,
-        blocks: Ints,
-        legs: Ints,
-        state: State,
-        directors: Floats,
-        *,
-        weights: Floats,
-        stiffness: Floats,
-        deviators: NDArray[np.complex128],
-        rest_angle: Floats,
-    ) -> Self:
-        """Joints whose source frames are those of `state`.
-
-        Args:
-            directors: (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for all.
-            blocks, legs, weights, stiffness, deviators, rest_angle: see the class.
-        """
-        tangents = edge_tangents(state, blocks, legs)
-        wanted = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, legs[:, 2]]]
-        rows = np.ascontiguousarray(blocks)
-        return cls(rows, legs, weights, stiffness, deviators, rest_angle, tangents, adapted(wanted, tangents))
 
     def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
@@ -95,14 +61,6 @@ class RelativeRotation:
                 self.source_tangents, self.source_directors, gradient, hessians,
             )
         )  # fmt: skip
-
-    @property
-    def angle_columns(self) -> Ints:
-        return self.legs[:, 2]
-
-    def refreshed(self, state: State) -> Self:
-        """The same joints with their source frames at `state` (N, 3)."""
-        return with_source(self, state)
 
     def with_stiffness_of(self, other: "RelativeRotation") -> Self:
         """The same joints as stiff as others."""
@@ -152,7 +110,7 @@ def is_elastic(element: Elements) -> TypeGuard[RelativeRotation]:
     return isinstance(element, RelativeRotation)
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 i2 f2 f3 c2 f1 f3 f3 f2 f3")
 def _relative_rotation(  # type: ignore[no-untyped-def]
     x, blocks, legs, weights, stiffness, deviators, rest_angle, tangents, directors, gradient, hessians
 ):
@@ -221,7 +179,7 @@ def _relative_rotation(  # type: ignore[no-untyped-def]
 # are tangent and normal of the section of rod A, then those of rod B; the strains are (s, eA, eB), five numbers.
 
 
-@njit(error_model="numpy")
+@njit("f1 f f2 c1 f1 f2")
 def _respond(strain, rest_angle, stiffness, deviators, force, tangent):  # type: ignore[no-untyped-def]
     """Energy of a joint at the strains (s, eA, eB) (5,); its derivatives by them, `force` (5,) and `tangent` (5, 5).
 

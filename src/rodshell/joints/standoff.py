@@ -8,19 +8,18 @@ needs no frames of the rods; the moment of its force about the crossing acts on 
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints, State
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import brief
 
 SIDES = np.kron([[0, 0, 1, 0, -1, 0], [0, 0, 0, 1, 0, -1]], np.eye(3))  # (a, b) of the six nodes' coordinates
 
 
 @dataclass(frozen=True, eq=False)
-class Standoffs:
+class Standoffs(WithoutFrames):
     """Springs between nodes and places above crossings.
 
     Args:
@@ -57,10 +56,6 @@ class Standoffs:
             curved = _second(pull, n, size, dc, across)
             hessians[:] = self.stiffness[:, None, None] * np.einsum("mij,mik->mjk", dg, dg) + curved
         return 0.5 * float(np.vdot(force, gap))
-
-    def refreshed(self, state: State) -> Self:
-        """The same: there are no source frames."""
-        return self
 
 
 def _crossing(v: Floats) -> Floats:

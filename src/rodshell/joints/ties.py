@@ -18,20 +18,10 @@ from typing import Self
 import numpy as np
 
 from rodshell.arrays import Floats, Ints, State
-from rodshell.geometry.frames import adapted
-from rodshell.joints.crossings import (
-    RodNodes,
-    by_edge,
-    edge_tangents,
-    frame,
-    of_edge,
-    spread,
-    stencils,
-    with_source,
-)
+from rodshell.joints.crossings import UP, OfSections, RodNodes, by_edge, frame, of_edge, spread, stencils
 from rodshell.kernels import njit
 from rodshell.layout.flatgrid import sides
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.rods.section import Rod
 from rodshell.validation import brief, keep, positive
 
@@ -65,12 +55,7 @@ class _Penalty:
         keep(self, positive, "N m/rad", "C2", what="the penalty stiffness {}")
 
     def with_defaults(self, rod: Rod, edge: float) -> Self:
-        """The same with the defaults for a rod filled in.
-
-        Args:
-            rod: section and material of the rods.
-            edge: length of their edges [m].
-        """
+        """The same with the defaults for rods with edges of the length `edge` [m] filled in."""
         nodes, angles = self._defaults(rod, edge)
         return replace(self, C1=self.C1 or nodes, C2=self.C2 or angles)
 
@@ -115,7 +100,7 @@ Coupling = SharedDofs | ImplicitPenalty | ExplicitPenalty
 
 
 @dataclass(frozen=True, eq=False)
-class Ties:
+class Ties(WithoutFrames):
     """Springs between pairs of blocks [HQK Eqs 5, 6]: E = C/2 |a - b|^2 of nodes and of twist angles.
 
     Args:
@@ -142,17 +127,10 @@ class Ties:
                 hessians[:, k, k + 3] = hessians[:, k + 3, k] = -self.stiffness
         return 0.5 * float(np.vdot(force, apart))
 
-    def refreshed(self, state: State) -> Self:
-        """The same: there are no source frames."""
-        return self
-
-
-UP = np.array([0.0, 0.0, 1.0])
-
 
 @dataclass(frozen=True, eq=False)
-class OffsetTie:
-    """Springs between two rods' nodes; blocks, legs, weights and sources as of `RelativeRotation`.
+class OffsetTie(OfSections):
+    """Springs between two rods' nodes.
 
     Args:
         middles: (2,) columns of `blocks` of the joint's node on A and on B.
@@ -160,14 +138,9 @@ class OffsetTie:
         offsets: (m,) d [m].
     """
 
-    blocks: Ints
-    legs: Ints
     middles: Ints
-    weights: Floats
     stiffness: Floats
     offsets: Floats
-    source_tangents: Floats
-    source_directors: Floats
 
     __repr__ = brief
 
@@ -180,20 +153,11 @@ class OffsetTie:
             )
         )  # fmt: skip
 
-    @property
-    def angle_columns(self) -> Ints:
-        return self.legs[:, 2]
-
-    def refreshed(self, state: State) -> Self:
-        """The same ties with their source frames at `state` (N, 3)."""
-        return with_source(self, state)
-
 
 def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: Floats, size: int) -> list[OffsetTie]:
-    """Ties of the eccentric crossings.
+    """Ties of the eccentric crossings of rods that lie in layers.
 
     Args:
-        rod_nodes: of the mesh, whose rods lie in layers.
         eccentricity: (c,) of each crossing of the grid [m]; those with 0 have no such tie.
         stiffness: (c,) C [N/m].
         size: number of blocks of the state.
@@ -204,16 +168,16 @@ def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: Floats, si
     pairs, flat = rod_nodes.at_crossings[eccentric], rod_nodes.flat_state(size)
     layer = sides(rod_nodes.mesh.grid)[rod_nodes.rods[pairs]]
     offsets = 0.5 * eccentricity[eccentric] * (layer[:, 1] - layer[:, 0])
-    sets = []
-    for members, blocks, legs, middles, weights in stencils(rod_nodes, pairs):
-        tangents = edge_tangents(flat, blocks, legs)
-        directors = adapted(np.broadcast_to(UP, tangents.shape), tangents)
-        of_set = stiffness[eccentric][members]
-        sets.append(OffsetTie(blocks, legs, middles, weights, of_set, offsets[members], tangents, directors))
-    return sets
+    return [
+        OffsetTie.starting_at(
+            blocks, legs, flat, UP,
+            weights=weights, middles=middles, stiffness=stiffness[eccentric][members], offsets=offsets[members],
+        )
+        for members, blocks, legs, middles, weights in stencils(rod_nodes, pairs)
+    ]  # fmt: skip
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 i2 i1 f2 f1 f1 f3 f3 f2 f3")
 def _offset_tie(  # type: ignore[no-untyped-def]
     x, blocks, legs, middles, weights, stiffness, offsets, tangents, directors, gradient, hessians
 ):

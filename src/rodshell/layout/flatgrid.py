@@ -423,7 +423,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-@njit(error_model="numpy")
+@njit("f2 f")
 def _crossings(lines, margin):  # type: ignore[no-untyped-def]
     """Pairs of rods (c, 2) that cross, and where on both (c, 2) [m]; closer to an end than `margin` [m] they do not.
 

@@ -258,7 +258,7 @@ class _Stencils(NamedTuple):
     voronoi_lengths: Floats
 
 
-@njit()
+@njit("i1 i1 f1")
 def _edges_and_bends(rod_nodes, rod_start, stations):  # type: ignore[no-untyped-def]
     edge_count, bend_count, stop = 0, 0, len(rod_nodes)
     for rod in range(len(rod_start) - 1, -1, -1):
@@ -325,7 +325,7 @@ def _fixed_points(grid: FlatGrid, marks: Sequence[Sequence[float]]) -> tuple[Int
     return found
 
 
-@njit()
+@njit("i2 f2 f1 i1")
 def _fixed(crossings, at, given, begin):  # type: ignore[no-untyped-def]
     """See `_fixed_points`: `crossings` (c, 2) and where they are (c, 2); the `given` points, rod by rod, of which those
     of each rod `begin` (m + 1,) there."""
@@ -414,7 +414,7 @@ def _merge_joints(order, rod, s, sides, tiny):  # type: ignore[no-untyped-def]
     return node, joints
 
 
-@njit(error_model="numpy")
+@njit("f2 i1 f1 i1 i1 i")
 def _divided(lines, begin, s, nodes, edges, count):  # type: ignore[no-untyped-def]
     """Node positions, `rod_nodes`, `rod_start` and stations of rods with origin and direction `lines` (m, 4).
 
@@ -466,7 +466,7 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float = 0.0) ->
     return GridMesh(grid, mesh.flat.take(nodes, axis=0), *part), nodes
 
 
-@njit()
+@njit("i2 i1 f1 i2 i1 i f1")
 def _cut(spans, rod_nodes, stations, crossings, crossing_nodes, node_count, limits):  # type: ignore[no-untyped-def]
     """Nodes of the part in the mesh; its `rod_nodes`, `rod_start`, stations and joint nodes; the number of nodes that
     are left out, because they are closer than `limits` (m,) [m] to an end and not at a joint.
@@ -517,7 +517,7 @@ def spans_along(mesh: GridMesh, ends: Floats, whole: Ints) -> Ints:
     return np.asarray(_spans(mesh.rod_start[whole], mesh.rod_stop[whole] - 1, mesh.stations, ends))
 
 
-@njit()
+@njit("i1 i1 f1 f2")
 def _spans(first, last, stations, ends):  # type: ignore[no-untyped-def]
     spans = np.empty((len(ends), 2), dtype=np.int64)
     for k in range(len(ends)):

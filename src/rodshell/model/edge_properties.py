@@ -65,11 +65,7 @@ class EdgeProperties:
         return EdgeProperties(shell, joint, np.append(inner, ends), np.append(inner + 1, ends), table)
 
     def varied(self, table: Floats) -> "EdgeProperties":
-        """The shell whose edges have other properties.
-
-        Args:
-            table: (e, 5) the properties of the edges.
-        """
+        """The shell whose edges have other properties (e, 5)."""
         joints = iter(self._joints(self._at_nodes(table)))
         elements = tuple(self._with_stiffness(element, table, joints) for element in self.shell.elements)
         edges = self.shell.stretch
@@ -77,19 +73,11 @@ class EdgeProperties:
         return replace(self, shell=replace(self.shell.with_elements(elements), stretch=stretch), table=table)
 
     def at(self, elements: Sequence[Elements]) -> "EdgeProperties":
-        """The same with other source frames.
-
-        Args:
-            elements: those of the shell, with their source frames at another state.
-        """
+        """The same with the shell's `elements` as they are with their source frames at another state."""
         return replace(self, shell=self.shell.with_elements(tuple(elements)))
 
     def load(self, size: int) -> Floats:
-        """(size, 3) weight of the edges, half at either node, downwards [N].
-
-        Args:
-            size: number of blocks of the state.
-        """
+        """(size, 3) weight of the edges on the blocks, half at either node, downwards [N]."""
         result = np.zeros((size, 3))
         if self.weight is not None:
             half = 0.5 * self.weight * self.table[:, EA] * self.table[:, LENGTH]

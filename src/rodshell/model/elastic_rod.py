@@ -19,16 +19,15 @@ from scipy.sparse import csc_matrix
 from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
-from rodshell.model.assembly import Freedom
+from rodshell.model.assembly import ANGLE, Freedom
 from rodshell.model.potential import Potential
-from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
+from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods, ghost_position
 from rodshell.rods.bend_twist import BendTwist, frames_among
 from rodshell.rods.elements import BendElements, Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.validation import brief, described, direction, finite, flag, short, vector
 
 Natural = Literal["straight", "rest"] | ArrayLike
-_ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +202,7 @@ class ElasticRod:
 
     def freedom(self) -> Freedom:
         """Nodes free in space, angles in their component; clamps fixed: the end, its ghost and their angle."""
-        free = Freedom.free(self.block_count).with_directions(np.arange(self.block_count)[self.angles], _ANGLE)
+        free = Freedom.free(self.block_count).with_directions(np.arange(self.block_count)[self.angles], ANGLE)
         return free.with_directions(np.concatenate([self.clamped_nodes, self.ghosts, self.ghost_angles]))
 
     # States
@@ -238,18 +237,9 @@ class ElasticRod:
             state[self.angles, 0] = finite("the twist angles of this rod", angles, self.edge_count)
         for k, end in enumerate(self.clamps):
             tangent = direction(f'the tangent at the "{end}"', (tangents or {}).get(end, self.clamp_tangents[k]))
-            state[self.ghosts[k]] = self.ghost_position(end, state[self.clamped_nodes[k]], tangent)
+            at = state[self.clamped_nodes[k]]
+            state[self.ghosts[k]] = ghost_position(end, at, self.stretch.rest_lengths, tangent)
         return state
-
-    def ghost_position(self, end: End, position: Floats, tangent: Floats) -> Floats:
-        """(3,) position of the ghost node of a clamp [m].
-
-        Args:
-            position: (3,) of the end [m].
-            tangent: (3,) unit tangent along the rod there.
-        """
-        edge = 0 if end == "start" else self.edge_count - 1
-        return np.asarray(position + (-1 if end == "start" else 1) * self.stretch.rest_lengths[edge] * tangent)
 
     def refreshed(self, state: Floats) -> "ElasticRod":
         """The same rod with its source frames moved to `state`: no strain and no angle changes."""
@@ -285,19 +275,11 @@ class ElasticRod:
         return self._potential.gradient(state)
 
     def hessian(self, state: State, freedom: Freedom | None = None) -> csc_matrix:
-        """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's.
-
-        Args:
-            freedom: free directions of the blocks.
-        """
+        """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's."""
         return self._potential.matrix(state, self.freedom() if freedom is None else freedom)
 
     def weight(self, gravity: ArrayLike) -> Floats:
-        """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2].
-
-        Args:
-            gravity: (3,) acceleration [m/s2].
-        """
+        """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2]."""
         load = np.zeros_like(self.mass)
         load[self.nodes] = self.mass[self.nodes] * vector("gravity", gravity)
         return load

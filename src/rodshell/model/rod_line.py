@@ -45,11 +45,9 @@ class RodLine:
 
     @staticmethod
     def of(rest: ArrayLike, *, closed: bool, clamped: Clamps) -> "RodLine":
-        """The line through nodes, clamped at some ends.
+        """The line through the nodes (n, 3) of an unloaded rod [m], or a ring, clamped at some ends.
 
         Args:
-            rest: (n, 3) nodes of the unloaded rod [m].
-            closed: a ring: the last edge leads back to the first node.
             clamped: "start" and "end" as far as they are clamped, or these with a tangent (3,) along the rod; without,
                 the tangent is extrapolated from the last two edges.
 
@@ -75,9 +73,6 @@ class RodLine:
 
     def rods(self, rod: Rods) -> list[Rod]:
         """The rod of each edge: the same for all, one for each, or a function of the arc length of its middle [m].
-
-        Args:
-            rod: one rod, a sequence of them, or a function.
 
         Raises:
             InputError: they are not rods, or not as many as there are edges.
@@ -113,17 +108,9 @@ class RodLine:
         nodes = np.arange(len(self.nodes)) if self.closed else np.arange(1, len(self.nodes) - 1)
         return nodes, np.column_stack([(nodes - 1) % len(self.nodes), nodes])
 
-    def ghost(self, end: End) -> Floats:
-        """(3,) position of the ghost node of a clamped end, one last edge past it [m]."""
-        edge, node, outward = (0, 0, -1.0) if end == "start" else (-1, -1, 1.0)
-        return np.asarray(self.nodes[node] + outward * self.lengths[edge] * self.clamps[end])
-
     def end_director(self, directors: Floats, end: End) -> Floats:
-        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges.
-
-        Args:
-            directors: (e, 3) first material directors of the edges.
-        """
+        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges, by
+        the directors (e, 3) of the edges."""
         order = slice(0, 2) if end == "start" else slice(-1, -3, -1)
         (d0, d1), (t0, t1), (l0, l1) = directors[order], self.tangents[order], self.lengths[order]
         twist = signed_angle(parallel_transport(d1, t1, t0), d0, t0)  # from the inner edge to the last
@@ -132,11 +119,8 @@ class RodLine:
         return np.asarray(np.cos(turn) * moved + np.sin(turn) * cross(tangent, moved))
 
     def mass(self, size: int, rods: list[Rod], angles: slice) -> Floats:
-        """(size, 3) lumped mass of each block: half of each edge's at either node [kg]; rotary inertia [kg m2].
-
-        Args:
-            angles: blocks of the twist angles, or empty.
-        """
+        """(size, 3) lumped mass of each block: half of each edge's at either node [kg]; rotary inertia [kg m2] in those
+        of the twist angles, if there are any."""
         mass = np.zeros((size, 3))
         half = 0.5 * self.lengths * [rod.mass_per_length for rod in rods]
         for side in range(2):
@@ -196,18 +180,25 @@ class RodBends:
         return RodBends(size, angles, blocks, lengths, at_bends, like)
 
     def rest_state(self, line: RodLine, directors: Floats) -> tuple[Floats, Floats]:
-        """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges.
-
-        Args:
-            directors: (e, 3) first material directors of its edges.
-        """
+        """(size, 3) state at rest, and in the rows of the twist angles the directors (e, 3) of their edges."""
         state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))
         state[: len(line.nodes)], frames[self.angles] = line.nodes, directors
-        for k, end in enumerate(line.clamps):
+        for k, (end, tangent) in enumerate(line.clamps.items()):
             ghost = self.angles.stop + k
-            state[ghost] = line.ghost(end)
+            state[ghost] = ghost_position(end, line.nodes[0 if end == "start" else -1], line.lengths, tangent)
             frames[ghost + len(line.clamps)] = line.end_director(directors, end)
         return state, frames
+
+
+def ghost_position(end: End, position: Floats, lengths: Floats, tangent: Floats) -> Floats:
+    """(3,) position of the ghost node of a clamped end, one last edge of the rod past it [m].
+
+    Args:
+        position, tangent: (3,) of the end, and along the rod there.
+        lengths: (e,) of the rod's edges [m].
+    """
+    edge, outward = (0, -1.0) if end == "start" else (-1, 1.0)
+    return np.asarray(position + outward * lengths[edge] * tangent)
 
 
 def _points(rest: ArrayLike) -> int:

@@ -42,8 +42,7 @@ class RodSections:
         """The sections of a mesh.
 
         Args:
-            mesh: of m rods, with their profiles.
-            rods: m, what each is where its factor is 1.
+            rods: of each of its rods what it is where the factor of its profile is 1.
 
         Raises:
             InputError: a profile changes a length that the section does not have.
@@ -114,12 +113,8 @@ def shares(mesh: GridMesh, entries: Ints) -> Floats:
 
 
 def varied_at_nodes(mesh: GridMesh, rod: Rod) -> Varied | None:
-    """What the sections change at each entry (k,) of `rod_nodes`; None where all rods are uniform.
-
-    Args:
-        mesh: the rods, with their profiles.
-        rod: what each is where its factor is 1.
-    """
+    """What the sections change at each entry (k,) of `rod_nodes`, from rods that are all the same where their factor is
+    1; None where all rods are uniform."""
     found = list(varied_rods(mesh, rod))
     if not found:
         return None

@@ -31,11 +31,11 @@ from rodshell.joints import (
     Ties,
     require_joint,
 )
-from rodshell.joints.crossings import Corners, LinkerBend, RodNodes
+from rodshell.joints.crossings import UP, Corners, LinkerBend, RodNodes
 from rodshell.joints.joint import elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
-from rodshell.model.assembly import Freedom
+from rodshell.model.assembly import ANGLE, Freedom
 from rodshell.model.potential import Potential
 from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist, frames_among
@@ -45,9 +45,7 @@ from rodshell.rods.section import Rod
 from rodshell.rods.supports import CLAMPED, PINNED
 from rodshell.validation import flag, instance
 
-UP = (0.0, 0.0, 1.0)
 OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
-ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
 Direction = tuple[float, float, float]
 Item = TypeVar("Item")
 COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
@@ -235,11 +233,7 @@ class Shell:
         return free.with_directions(turning, ANGLE).with_directions(self.spinning)
 
     def with_elements(self, elements: tuple[Elements, ...]) -> "Shell":
-        """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere.
-
-        Args:
-            elements: those within rods and linkers, those between them, those of supports.
-        """
+        """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere."""
         first, last = len(self.within), len(self.within) + len(self.between)
         return replace(self, within=elements[:first], between=elements[first:last], springs=elements[last:])
 
@@ -252,22 +246,15 @@ class Shell:
         return np.concatenate([self.mesh.grid_of_nodes, of_ends[: len(self.ghosts)], of_angles])[self.like]
 
     def turned(self, turns: Floats) -> "Shell":
-        """The same shell of flat grids that are turned in their plane, so that no edge of a shell that lies the other
-        way round has to be turned right round from there.
-
-        Args:
-            turns: (g, 2, 2) of each grid, of rows x, y.
-        """
+        """The same shell of flat grids that are turned in their plane (g, 2, 2), of rows x, y, so that no edge of a
+        shell that lies the other way round has to be turned right round from there."""
         of_grids = [turns[self.grid_of[element.blocks[:, 0]]] for element in self.elements]
         frames = self.with_elements(tuple(map(turned, self.elements, of_grids)))
         return replace(frames, turns=self.turns @ turns)
 
     def with_frames_of(self, elements: tuple[Elements, ...]) -> "Shell":
-        """The same shell with the source frames of another one, so that twist angles mean the same in both.
-
-        Args:
-            elements: of a shell on the same mesh with other stiffnesses, in the same order.
-        """
+        """The same shell with the source frames of the elements of another one on the same mesh, with other
+        stiffnesses, so that twist angles mean the same in both."""
         return self.with_elements(tuple(map(with_frames, self.elements, elements)))
 
     def held_ends(self) -> Freedom:
@@ -287,12 +274,7 @@ class Shell:
         self.turn_edges(state, signed_angle(moved, wanted, now))
 
     def turn_edges(self, state: Floats, turns: Floats) -> None:
-        """Add `turns` (e,) [rad] to the twist angles in `state` of the rods' edges and their copies.
-
-        Args:
-            state: (N, 3), which is changed.
-            turns: (e,) of the mesh's edges [rad].
-        """
+        """Add `turns` (e,) [rad] to the twist angles in `state` of the mesh's edges and their copies."""
         first = self.mesh.node_count + len(self.ghosts)
         turning = np.flatnonzero((self.like >= first) & (self.like < first + len(turns)))
         state[turning, 0] += turns[self.like[turning] - first]

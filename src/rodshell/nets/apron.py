@@ -83,7 +83,7 @@ class _Family:
         return rods, np.searchsorted(kept, self.stretch_of)
 
 
-@njit()
+@njit("f1 f1 b2 f2 f")
 def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-untyped-def]
     """Of each node (m, n) its stretch; of each stretch (k,) its line; of each rod (r,) its stretch; of each stretch its
     first rod, or -1, and where its rods start and end (k, 2); and the joints (m, n), see `_Family`. Each of `rods`
@@ -125,7 +125,7 @@ def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-unt
     return stretches, line_of, stretch_of, first_rod, ends, joints
 
 
-@njit()
+@njit("f1 i2 b2 i1 f2")
 def _prolong(stations, stretches, joints, first_rod, ends):  # type: ignore[no-untyped-def]
     """The stretches (k,) with rods, or with at least two `joints` (m, n), and their ends (k, 2), moved to these."""
     count, kept, used = np.zeros(len(ends), dtype=np.int64), np.empty(len(ends), dtype=np.int64), 0

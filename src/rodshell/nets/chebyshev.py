@@ -233,7 +233,7 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
     return angle, (x, y, z)
 
 
-@njit(error_model="numpy")
+@njit("f3 b2")
 def _sharpest(points, inside):  # type: ignore[no-untyped-def]
     """Indices of the inside node with the smallest angle, which has the largest cosine; that angle [rad]; and whether
     the net has all nodes next to the inside ones."""
@@ -264,7 +264,7 @@ def _nearest(ascending: Floats, values: Floats) -> Ints:
     return np.asarray(np.searchsorted(0.5 * (ascending[1:] + ascending[:-1]), values))
 
 
-@njit(error_model="numpy")
+@njit("f1 f1 f3 i1 b1 i1 f1 i1 f2")
 def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: ignore[no-untyped-def]
     """Points of the `nodes` (k,), put into `result`, at the places `s` (k,) of lines of a net, by cubics through the
     four nearest known nodes.

@@ -169,7 +169,7 @@ def geodesics(
     return [path[: len(s), k] for k, s in enumerate(steps)]
 
 
-@njit()
+@njit("f2 i i1 i f2 f2 f1")
 def _still_going(chords, n, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
     """Of the first `count` geodesics those that have a chord n and were not lost, moved to the front."""
     left = 0
@@ -182,7 +182,7 @@ def _still_going(chords, n, row, count, here, tangent, turn):  # type: ignore[no
     return left
 
 
-@njit(error_model="numpy")
+@njit("f1 i1 f2 f2 f2 f2 f2 f1")
 def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # type: ignore[no-untyped-def]
     """Unit normals at the points `here`, unit tangents `flat` across them, and a first guess (n, 3) of the next points:
     chords that `turn` out of the tangent plane as the last ones did."""
@@ -202,7 +202,7 @@ def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # t
     return ahead
 
 
-@njit(error_model="numpy")
+@njit("f1 i1 f2 f2 f2 f1 f2 f f1 f1 f2")
 def _turn_chords(  # type: ignore[no-untyped-def]
     chord, row, here, flat, normal, value, gradient, tolerance, turn, change, ahead
 ):
@@ -223,7 +223,7 @@ def _turn_chords(  # type: ignore[no-untyped-def]
     return going
 
 
-@njit()
+@njit("f2 i i1 f2 f2 f f1 f1 f2 f3")
 def _end_chords(chords, n, row, here, ahead, tolerance, turn, change, tangent, path):  # type: ignore[no-untyped-def]
     """Continue from the points `ahead` (m, 3), at which the chords n of the first m geodesics of `row` end; NaN in
     `path` (len(chords), k, 3) for those that found none. Returns how many have a next chord, see `_still_going`."""
@@ -254,7 +254,7 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
         _keep(nodes, found, chords, change, sine, tolerance, net.points, tried)
 
 
-@njit()
+@njit("f3 b2 f1 f1 i i i")
 def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
     """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
 
@@ -303,7 +303,7 @@ def _compass(
     return p, change, sine
 
 
-@njit()
+@njit("i2 f2 f2 f1 f1 f f3 b2")
 def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type: ignore[no-untyped-def]
     """Put the points that were `found` (n, 3) in their places; not those that did not converge, nor where the net
     folds: (P - B) x (P - A) no longer points along the normal."""
@@ -315,7 +315,7 @@ def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type
             points[i, j, k] = found[n, k] if good else np.nan
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 f2 f2 ff f1 f2 f3 f f1 f1")
 def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, change, sine):  # type: ignore[no-untyped-def]
     """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
     of the crossing angle before it. Returns whether another step is needed.

@@ -39,7 +39,7 @@ def inside_nodes(target: Target, net: Net) -> Bools:
     return reached
 
 
-@njit()
+@njit("b2 i2 i i b1 b2")
 def _connect(region, runs, i0, j0, found, reached):  # type: ignore[no-untyped-def]
     """The nodes `reached` (nu, nv) of the `region` (nu, nv) that are connected with node (i0, j0), or with the first
     along the axes. A run of nodes, see `_runs`, is found from any of them, or from a run next to it."""
@@ -78,7 +78,7 @@ def _region(target: Target, net: Net) -> Bools:
     return np.asarray(inside)
 
 
-@njit()
+@njit("f3 f1 f1")
 def _squares(points, u, v):  # type: ignore[no-untyped-def]
     """The middle of each square of nodes that are all known: its indices (n, 2) and point (n, 3); and path lengths (n,)
     to the square's corners."""
@@ -100,7 +100,7 @@ def _squares(points, u, v):  # type: ignore[no-untyped-def]
     return middles[:count], at[:count], way[:count]
 
 
-@njit()
+@njit("f3 i2 f1 f1")
 def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
     """Indices (m, 2) and points (m, 3) of the known nodes that are in no square whose end is further than its corners;
     and which of the other nodes (nu, nv) are inside."""
@@ -123,7 +123,7 @@ def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
     return asked[:count], at[:count], inside
 
 
-@njit()
+@njit("i2 f1 b2")
 def _set_inside(asked, margin, inside):  # type: ignore[no-untyped-def]
     for n in range(len(asked)):
         inside[asked[n, 0], asked[n, 1]] = margin[n] > 0.0
@@ -166,7 +166,7 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
     ]
 
 
-@njit()
+@njit("b2")
 def _runs(inside):  # type: ignore[no-untyped-def]
     """(k, 3) the line, the first and the last node of each run of nodes of `inside` (m, n)."""
     lines, nodes = inside.shape
@@ -198,7 +198,7 @@ def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float)
     return kept
 
 
-@njit()
+@njit("f1 f3 i2 f2 f3 f1 f1")
 def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[no-untyped-def]
     """Four nodes around both ends of each of the `runs` (k, 3): their places `knots` (2k, 4) and points `around`
     (2k, 4, 3); and the places of the nodes between which the end is, `outer` and `inner` (2k,)."""
@@ -237,7 +237,7 @@ def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: 
     return found
 
 
-@njit(error_model="numpy")
+@njit("f1 f2 f3 f1 i1 f2 f2 b")
 def _narrow(value, knots, points, found, index, bracket, there, first):  # type: ignore[no-untyped-def]
     """One step of `_roots`: the brackets of the roots that are left are narrowed by the `value` (n,) at their last
     guess, except the `first` time. Returns how many roots are left: these are moved to the front.
@@ -289,7 +289,7 @@ def extrapolated(coarse: Cuts, fine: Cuts, lines: int, step: float) -> tuple[Cut
     return Cuts(fine.line, ends), errors
 
 
-@njit()
+@njit("i1 f2 i1 f2 f f2 f1")
 def _extrapolate(coarse_line, coarse, line, fine, step, ends, errors):  # type: ignore[no-untyped-def]
     begin, matching = 0, 0
     while begin < len(line):

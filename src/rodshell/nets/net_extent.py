@@ -106,7 +106,7 @@ def _want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats,
     return added
 
 
-@njit()
+@njit("b2 f1 f1 i f1 f1 f f b2")
 def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # type: ignore[no-untyped-def]
     """Add to the `wanted` nodes, see `wanted_nodes`; return whether any was not wanted before. In each quadrant they
     are below a staircase that only descends, away from the axis."""

@@ -82,7 +82,7 @@ def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
     return Net(near.u, near.v, points)
 
 
-@njit()
+@njit("f3 f3 f")
 def _add_change(near, coarser, share):  # type: ignore[no-untyped-def]
     """Put into `coarser` (nu, nv, 3) the points `near` (nu, nv, 3) with a share of their change from there, if both are
     known."""
@@ -132,7 +132,7 @@ def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> boo
     return True
 
 
-@njit()
+@njit("f3 f1 f1 i i")
 def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
     """The nodes (n, 3) of the axes but the anchor, one arm after the other, outwards as `Axes.tangents`; the
     steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
@@ -152,7 +152,7 @@ def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
     return x, steps, stops
 
 
-@njit()
+@njit("f2 i1 i i f3")
 def _put_arms(x, stops, i0, j0, points):  # type: ignore[no-untyped-def]
     for arm in range(4):
         for n in range(stops[arm], stops[arm + 1]):
@@ -164,7 +164,7 @@ def _put_arms(x, stops, i0, j0, points):  # type: ignore[no-untyped-def]
                     points[i0, j0 + k, d] = x[n, d]
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 f1 i1 f2 f1 f2 f3")
 def _straighten(starts, directions, steps, stops, points, value, gradient, hessian):  # type: ignore[no-untyped-def]
     """Move the `points` (n, 3) of the arms to the geodesics that begin at `starts` (4, 3) in `directions` (4, 3), see
     `compass.geodesics`, on second order models at the points; return by how much, or NaN."""
@@ -244,7 +244,7 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
     return False
 
 
-@njit()
+@njit("f3 b2 i i i2")
 def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
     """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes, the others become NaN;
     and whether there is one of each. `row` (nu, nv) is the index of each in the result, -1 for the others."""
@@ -264,7 +264,7 @@ def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
     return chosen[:count], whole
 
 
-@njit()
+@njit("f3 i2 f2 f b2 f2")
 def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-untyped-def]
     """The rows (n,) of nodes that have `moved` by more than the `limit`, whose `models` are put where they are now and
     which alone are `new`."""
@@ -284,7 +284,7 @@ def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-u
     return rows
 
 
-@njit(error_model="numpy")
+@njit("f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2 f")
 def _sweep(  # type: ignore[no-untyped-def]
     points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved, tolerance
 ):

@@ -241,7 +241,7 @@ def _shares_edge(stencils, b):  # type: ignore[no-untyped-def]
     return here[1] == before[3] and here[0] == before[2] and here[2] == before[4]
 
 
-@njit(error_model="numpy", fastmath={"contract"})
+@njit("f2 i2 f3 f3 f1 f3 f3 f1", fastmath={"contract"})
 def _transported(x, stencils, sources, source_directors, source_twist, tangents, directors, twist):  # type: ignore[no-untyped-def]
     """Frames and reference twists transported from the sources to the state x; fills the last three arguments."""
     for b in range(stencils.shape[0]):
@@ -284,7 +284,7 @@ def _transported(x, stencils, sources, source_directors, source_twist, tangents,
         twist[b] = angle + 2.0 * np.pi * np.floor((source_twist[b] - angle) / (2.0 * np.pi) + 0.5)
 
 
-@njit(error_model="numpy", nogil=True, fastmath={"contract"})
+@njit("f2 i2 f2 f1 f2 f1 f3 f3 f1 f2 f3", nogil=True, fastmath={"contract"})
 def _bend_twist(  # type: ignore[no-untyped-def]
     x, stencils, bend, twist, natural, natural_twist, tangents, directors, source_twist, gradient, hessians
 ):

@@ -7,17 +7,16 @@ becomes taut, the force does not.
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints, State
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)
-class CableStretch:
+class CableStretch(WithoutFrames):
     """Tension-only members.
 
     Args:
@@ -59,10 +58,6 @@ class CableStretch:
         local = change[:, None, None] * (np.eye(3) - axis[:, :, None] * axis[:, None, :])
         hessians[:, :3, :3] = hessians[:, 3:, 3:] = local
         hessians[:, :3, 3:] = hessians[:, 3:, :3] = -local
-
-    def refreshed(self, state: State) -> Self:
-        """The same: there are no source frames."""
-        return self
 
     def forces(self, state: State) -> Floats:
         """(m,) tension [N] at `state` (N, 3); 0 where slack."""

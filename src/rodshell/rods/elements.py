@@ -52,6 +52,14 @@ class Elements(Protocol):
         ...
 
 
+class WithoutFrames:
+    """An energy without source frames."""
+
+    def refreshed(self, state: State) -> Self:
+        """The same at every state."""
+        return self
+
+
 class BendElements(Elements, Protocol):
     """Bending between consecutive edges of rods, and twist where they have it.
 
@@ -143,11 +151,7 @@ def with_frames(element: Elements, like: Elements, rows: Bools | None = None, at
 
 
 def turned(element: Elements, turn: Floats) -> Elements:
-    """An energy with its source frames turned about z.
-
-    Args:
-        turn: (2, 2), of rows x, y; or (m, 2, 2), of each element.
-    """
+    """An energy with its source frames turned about z: by (2, 2), of rows x, y, or (m, 2, 2), of each element."""
     assert is_dataclass(element)
     sources: dict[str, Any] = {}
     for name in ("source_tangents", "source_directors"):
@@ -175,11 +179,7 @@ def each_gradient(elements: Elements, state: State) -> Floats:
 
 
 def each_curvature(elements: Elements, state: State, motion: Floats) -> Floats:
-    """(m,) v'Hv of each element alone for displacements `motion` (N, 3) [J], H being its Hessian.
-
-    Args:
-        motion: (N, 3) displacements v [m, rad].
-    """
+    """(m,) v'Hv of each element alone for displacements `motion` (N, 3) [J], H being its Hessian."""
     m, k = elements.blocks.shape
     hessians = np.zeros((m, 3 * k, 3 * k))
     elements.evaluate(state, np.zeros_like(state), hessians)
@@ -194,12 +194,8 @@ def _exploded(elements: Elements, state: State) -> tuple[Elements, Floats]:
 
 
 def in_parts(elements: Elements, most: int) -> list[Elements]:
-    """Elements cut into parts of at most `most`; their arrays with a row for each are those as long as `blocks`.
-
-    Args:
-        elements: to be cut; those that cannot be are one part.
-        most: number of elements of a part.
-    """
+    """Elements cut into parts of at most `most`, or one part if they cannot be; their arrays with a row for each are
+    those as long as `blocks`."""
     count = len(elements.blocks)
     if count <= most or not is_dataclass(elements):
         return [elements]
@@ -241,7 +237,7 @@ def evaluate_all(sets: Sequence[Elements], state: State, gradient: Floats, hessi
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class Stretch(WithoutFrames):
     """Elastic edges [HQK Eq 1a].
 
     Args:
@@ -263,22 +259,11 @@ class Stretch:
 
     @staticmethod
     def elastic(blocks: Ints, rest_lengths: Floats, stiffness: Floats) -> "Stretch":
-        """The paper's elastic edges: no multipliers. Parameters as of the class.
-
-        Args:
-            blocks: (e, 2) nodes of each edge.
-            rest_lengths: (e,) [m].
-            stiffness: (e,) EA [N].
-        """
+        """The paper's elastic edges: no multipliers. Parameters as of the class."""
         return Stretch(blocks, rest_lengths, stiffness, np.zeros(len(blocks)))
 
     def with_forces(self, forces: Floats | None, *, multipliers: Floats | None = None) -> "Stretch":
-        """The same edges with other axial `forces` (e,) [N] and, if given, other `multipliers` (e,) [N].
-
-        Args:
-            forces: (e,) axial forces of the geometric stiffness [N]; None: those of the strains.
-            multipliers: (e,) N0 [N]; None: unchanged.
-        """
+        """The same edges with other axial forces and, if given, other multipliers; parameters as of the class."""
         multipliers = self.multipliers if multipliers is None else multipliers
         return Stretch(self.blocks, self.rest_lengths, self.stiffness, multipliers, forces)
 
@@ -287,11 +272,7 @@ class Stretch:
         return np.asarray(_strains(state, self.blocks, self.rest_lengths))
 
     def elongation(self, state: State, motion: Floats) -> Floats:
-        """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`.
-
-        Args:
-            motion: (N, 3) displacements [m].
-        """
+        """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`."""
         return np.asarray(_elongation(state, motion, self.blocks, self.rest_lengths))
 
     def pulls(self, state: State) -> Floats:
@@ -305,12 +286,7 @@ class Stretch:
         return np.asarray(-self.stiffness * (1.0 + self.strains(state)) / self.rest_lengths)
 
     def add_axial(self, state: State, forces: Floats, gradient: Floats) -> None:
-        """Add to `gradient` (N, 3) that of edges with the axial `forces` (e,) [N].
-
-        Args:
-            forces: (e,) axial forces [N].
-            gradient: (N, 3), to which theirs is added [N].
-        """
+        """Add to `gradient` (N, 3) [N] that of edges with the axial `forces` (e,) [N]."""
         _add_axial(state, self.blocks, forces, gradient)
 
     def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
@@ -336,21 +312,12 @@ class Stretch:
         self.axial_stiffness(state, self.stiffness * self.elongation(state, motion), hessians)
 
     def axial_stiffness(self, state: State, forces: Floats, hessians: Floats) -> None:
-        """Geometric stiffness of axial forces alone.
-
-        Args:
-            forces: (e,) axial forces [N].
-            hessians: (e, 6, 6), which are filled [N/m].
-        """
+        """Fill `hessians` (e, 6, 6) [N/m] with the geometric stiffness of axial `forces` (e,) [N] alone."""
         limp = replace(self, stiffness=np.zeros_like(self.stiffness), forces=forces)
         limp.evaluate(state, np.zeros_like(state), hessians)
 
-    def refreshed(self, state: State) -> Self:
-        """The same: there are no source frames."""
-        return self
 
-
-@njit(error_model="numpy", nogil=True)
+@njit("f2 i2 f1 f1 f1 f1 b f2 f3", nogil=True)
 def _stretch(x, edges, rest, stiffness, multipliers, forces, exact, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_a, x_b) [m]; energies [J], from HQK Eq 1a."""
     wanted = hessians.shape[0] > 0
@@ -385,7 +352,7 @@ def _stretch(x, edges, rest, stiffness, multipliers, forces, exact, gradient, he
     return energy
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 f1")
 def _strains(x, edges, rest):  # type: ignore[no-untyped-def]
     result = np.empty(len(edges))
     for e in range(len(edges)):
@@ -396,7 +363,7 @@ def _strains(x, edges, rest):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i2 f1")
 def _elongation(x, motion, edges, rest):  # type: ignore[no-untyped-def]
     result = np.empty(len(edges))
     for e in range(len(edges)):
@@ -410,7 +377,7 @@ def _elongation(x, motion, edges, rest):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 f1 f2")
 def _add_axial(x, edges, forces, gradient):  # type: ignore[no-untyped-def]
     for e in range(len(edges)):
         a, b = edges[e, 0], edges[e, 1]

@@ -22,15 +22,15 @@ import numpy as np
 from rodshell.arrays import Floats, Ints, State
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
-from rodshell.rods.bend_twist import BendTwist, spread, strain_rates
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.bend_twist import BendTwist, spread
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import brief
 
 AT_ONCE = 64  # bends, whose numbers all stay in the processor's first cache
 
 
 @dataclass(frozen=True, eq=False)
-class IsotropicBend:
+class IsotropicBend(WithoutFrames):
     """Bends between consecutive edges of rods without twist angles [HQK Eq 1b].
 
     Args:
@@ -79,14 +79,13 @@ class IsotropicBend:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(_isotropic_bend(state, self.blocks, self.stiffness, gradient, hessians))
 
-    def refreshed(self, state: State) -> Self:
-        """The same: there are no source frames."""
-        return self
-
 
 @dataclass(frozen=True, eq=False)
 class IsotropicBendTwist(BendTwist):
-    """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature."""
+    """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature.
+
+    In buckling, bending keeps its stiffness: it knows no frames, and no strains that could stay while moments change.
+    """
 
     moduli: ClassVar[tuple[int, ...]] = (0, 2)
     __repr__ = brief
@@ -94,17 +93,6 @@ class IsotropicBendTwist(BendTwist):
     def relaxed(self, state: State) -> Self:
         """The same elements with the twist of `state` as their natural twist: these rods are naturally straight."""
         return replace(self, natural_twist=self.strains(state)[:, 2].copy())
-
-    def stress_stiffness(self, state: State, motion: Floats, hessians: Floats) -> None:
-        """Of the change of the torsional moments: see `Stressed.stress_stiffness`.
-
-        Bending knows no frames, and no strains that could stay while its moments change: it keeps its stiffness.
-        """
-        twist = strain_rates(self, state, motion)[:, 2]
-        scrap, before = np.zeros_like(state), np.zeros_like(hessians)
-        self.evaluate(state, scrap, before)
-        replace(self, natural_twist=self.natural_twist - twist).evaluate(state, scrap, hessians)
-        hessians -= before
 
     @property
     def parts(self) -> tuple[Self, ...]:
@@ -129,7 +117,7 @@ class IsotropicBendTwist(BendTwist):
         )
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("f2 i2 f1 f2 f3", nogil=True)
 def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, x_1, x_2) [m]; energies [J]. e = x_1 - x_0, f = x_2 - x_1; s, t their unit vectors.
 
@@ -204,7 +192,7 @@ def _bend_hessians(s, t, ge, gf, c, first, second, per_e, per_f, start, size, he
                 hessian[i + 6, j], hessian[i + 6, j + 3], hessian[i + 6, j + 6] = -fe, fe - ff, ff
 
 
-@njit(error_model="numpy", nogil=True, fastmath={"contract"})
+@njit("f2 i2 f2 f1 f1 f3 f1 f2 f3", nogil=True, fastmath={"contract"})
 def _isotropic_bend_twist(x, stencils, bend, twist, natural_twist, sources, source_twist, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, theta_e, x_1, theta_f, x_2) [m, rad]; energies [J].
 

@@ -166,14 +166,7 @@ class Linker(Joint):
 
 
 def require_joint(joint: object) -> None:
-    """Refuse a value that is neither a joint, nor a sequence of joints, nor None.
-
-    Args:
-        joint: what a caller has passed.
-
-    Raises:
-        InputError: it is something else, such as the name of a kind, or the class itself.
-    """
+    """Refuse a value that is neither a joint, nor a sequence of joints, nor None, such as a kind's name or class."""
     several = isinstance(joint, Sequence) and not isinstance(joint, str)  # and no array or generator
     for value in joint if several else (joint,):  # type: ignore[attr-defined]
         if value is not None and (isinstance(value, type) or not hasattr(value, "turns_frames")):

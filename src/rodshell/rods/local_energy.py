@@ -6,14 +6,14 @@ these, to about 1e-8: Newton's method takes an iteration more now and then, and 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import array, function_of
 
 TINY = 1e-200  # complex step: no difference is taken, so nothing is lost
@@ -21,7 +21,7 @@ STEP = 1e-6  # of the extent of the nodes: step of the differences
 
 
 @dataclass(frozen=True, eq=False)
-class LocalEnergy:
+class LocalEnergy(WithoutFrames):
     """A sum of energies of a few nodes each, see `rodshell.settle`.
 
     Args:
@@ -58,9 +58,6 @@ class LocalEnergy:
                 hessians[:, :, 3 * k + x] = change.reshape(len(at), -1) / (2 * step)
             hessians[:] = 0.5 * (hessians + hessians.swapaxes(1, 2))
         return float(self._energies(at).sum())
-
-    def refreshed(self, state: State) -> Self:
-        return self
 
     def _gradient(self, at: Floats) -> Floats:
         gradient = np.empty_like(at)

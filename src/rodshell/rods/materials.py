@@ -208,25 +208,14 @@ class Material:
 
 
 def _preset_named(name: str) -> Preset:
-    """The preset of this `name`.
-
-    Raises:
-        InputError: there is no such preset.
-    """
+    """The preset of this `name`; an InputError where there is none."""
     if not isinstance(name, str) or name not in get_args(PresetName):
         raise InputError(f"there is no material {shown(name)}: use {', '.join(get_args(PresetName))}")
     return PRESETS[name]  # type: ignore[index]
 
 
 def _preset_values(name: str, changed: dict[str, Any]) -> dict[str, Any]:
-    """Keyword arguments of `Material` for the preset `name` with some values `changed`.
-
-    Args:
-        changed: values that replace the preset's, by their names.
-
-    Raises:
-        InputError: there is no such preset.
-    """
+    """Keyword arguments of `Material` for the preset `name` with some values `changed`."""
     known = _preset_named(name)
     values: dict[str, Any] = {key: getattr(known, key) for key in ("youngs_modulus", "shear", "density")}
     if "poisson_ratio" in changed or known.shear is None:

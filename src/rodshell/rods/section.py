@@ -58,19 +58,30 @@ class _Shape:
 
 
 class _Round(_Shape):
-    """A section whose second moment of area is the same about every diameter."""
+    """A circle, solid or with a hole, whose second moment of area is the same about every diameter."""
 
     round = True
+    radius: float
 
     @property
     def outer_radius(self) -> float:
         """[m]"""
-        raise NotImplementedError
+        return self.radius
+
+    @property
+    def inner_radius(self) -> float:
+        """[m]"""
+        return 0.0
+
+    @property
+    def area(self) -> float:
+        """[m2]"""
+        return pi * (self.radius**2 - self.inner_radius**2)
 
     @property
     def second_moment(self) -> float:
         """Second moment of area about any diameter [m4]."""
-        raise NotImplementedError
+        return pi * (self.radius**4 - self.inner_radius**4) / 4
 
     @property
     def second_moments(self) -> tuple[float, float]:
@@ -97,21 +108,6 @@ class Circle(_Round):
     def __post_init__(self) -> None:
         checked(self, "section {}")
 
-    @property
-    def outer_radius(self) -> float:
-        """[m]"""
-        return self.radius
-
-    @property
-    def area(self) -> float:
-        """[m2]"""
-        return pi * self.radius**2
-
-    @property
-    def second_moment(self) -> float:
-        """Second moment of area about any diameter [m4]."""
-        return pi * self.radius**4 / 4
-
 
 @dataclass(frozen=True)
 class Tube(_Round):
@@ -128,24 +124,9 @@ class Tube(_Round):
             raise InputError(f"tube thickness {self.thickness} m is larger than its radius {self.radius} m")
 
     @property
-    def outer_radius(self) -> float:
-        """[m]"""
-        return self.radius
-
-    @property
     def inner_radius(self) -> float:
         """[m]"""
         return self.radius - self.thickness
-
-    @property
-    def area(self) -> float:
-        """[m2]"""
-        return pi * (self.radius**2 - self.inner_radius**2)
-
-    @property
-    def second_moment(self) -> float:
-        """Second moment of area about any diameter [m4]."""
-        return pi * (self.radius**4 - self.inner_radius**4) / 4
 
     def hole(self, diameter: float) -> tuple[float, float]:
         """As of every section, through both walls."""
@@ -357,11 +338,7 @@ class Rod:
 
 
 def scaled(section: Section, factor: float) -> Section:
-    """The same shape of section with all its lengths times `factor` [-].
-
-    Args:
-        factor: of all its lengths [-].
-    """
+    """The same shape of section with all its lengths times `factor` [-]."""
     return type(section)(**{key: factor * value for key, value in vars(section).items()})
 
 

@@ -100,11 +100,7 @@ def supports_of(given: Any) -> tuple[Support, ...]:
 
 
 def support_of(given: Any) -> Support:
-    """The support of a name; a support is its own.
-
-    Raises:
-        InputError: the name is not known.
-    """
+    """The support of a name; a support is its own. An InputError where the name is not known."""
     return given if isinstance(given, Support) else SUPPORTS[choice("ends", given, tuple(SUPPORTS))]
 
 

@@ -85,14 +85,7 @@ def varied(rod: Rod, varies: str, factors: Floats) -> Varied:
 
 
 def _require_varies(rod: Rod, varies: str) -> None:
-    """Refuse a length that a rod's section does not have.
-
-    Args:
-        varies: what is changed, see the module.
-
-    Raises:
-        InputError: the section has no such length.
-    """
+    """Refuse a length that a rod's section does not have."""
     known = _lengths(rod)
     if varies not in known:
         raise InputError(
@@ -103,12 +96,7 @@ def _require_varies(rod: Rod, varies: str) -> None:
 def sizes(rod: Rod, varies: str, factors: Floats) -> Floats | None:
     """(n,) the length of the section that is changed, as it is cut: of a round rod its diameter [m].
 
-    None for a given section, which has no lengths, and for laths.
-
-    Args:
-        rod: the unchanged section and material.
-        varies: what is changed, see the module.
-        factors: (n,) on EI1 [-].
+    None for a given section, which has no lengths, and for laths. Parameters as of `varied`.
     """
     section = rod.section
     if isinstance(section, GivenSection) or varies == "laths":

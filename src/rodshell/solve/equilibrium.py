@@ -92,11 +92,7 @@ class SolveReport:
         return self.converged and self.negative_modes == 0
 
     def after(self, *earlier: "SolveReport") -> "SolveReport":
-        """This report with the work of earlier solves added.
-
-        Args:
-            earlier: reports of the solves that led to this one.
-        """
+        """This report with the work of earlier solves added."""
         return replace(
             self,
             iterations=self.iterations + sum(report.iterations for report in earlier),
@@ -154,7 +150,7 @@ class Equilibrium:
         Raises:
             SingularError: some motion has no stiffness.
         """
-        return TangentAssembly(self.problem, self.state).tangent(self.elements, self.state, self.forces)
+        return TangentAssembly(self.problem, self.state).tangent(self.problem, self.state, self.forces)
 
 
 def find_equilibrium(
@@ -217,7 +213,7 @@ def find_equilibrium(
         here = here.refreshed()
     matrix, state, forces = newton.matrix, here.state, here.forces
     mode = newton.lowest_mode() if status is Status.CONVERGED and matrix.negative_modes else None
-    gradient = newton.assembly.gradient(here.elements, state, forces)
+    gradient = here.problem.gradient(state, forces)
     residual = problem.constraint.freedom(state).reduce(gradient)
     report = SolveReport(
         status=status,
@@ -230,7 +226,7 @@ def find_equilibrium(
         negative_modes=matrix.negative_modes,
         reason=reason if status is Status.OUT_OF_TIME else "",
     )
-    solved = replace(problem, elements=here.refreshed().elements, pattern=newton.assembly.pattern)
+    solved = replace(here.refreshed().problem, pattern=newton.assembly.pattern)
     return Equilibrium(solved, state, forces, gradient, report, mode)
 
 

@@ -16,10 +16,9 @@ from rodshell.solve.problem import Problem
 def together(
     shell: Shell, problem: Problem, parts: Sequence[tuple[Shell, Equilibrium]], *earlier: SolveReport
 ) -> Equilibrium:
-    """The state of all grids, each in its own equilibrium.
+    """The state of all grids, whose shell and problem these are, each in its own equilibrium.
 
     Args:
-        shell, problem: of all grids.
         parts: of each grid its own shell and equilibrium.
         earlier: of solves of all that were given up before; their work is added.
     """
@@ -40,7 +39,6 @@ def side_by_side(shell: Shell, parts: Sequence[tuple[Shell, Floats]]) -> tuple[S
     """The shell of all grids, with the source frames and in the states of each.
 
     Args:
-        shell: of all, in any state.
         parts: of each grid its shell and its state, whose twist angles belong to that shell's source frames.
     """
     state, elements = np.zeros((len(shell.grid_of), 3)), list(shell.elements)
@@ -52,11 +50,9 @@ def side_by_side(shell: Shell, parts: Sequence[tuple[Shell, Floats]]) -> tuple[S
 
 
 def alone(whole: Shell, found: Equilibrium, k: int, shell: Shell, points: Floats) -> tuple[Shell, Equilibrium]:
-    """The shell of one grid, in the equilibrium that was found for all.
+    """The shell of the k-th grid, in the equilibrium that was found for the whole.
 
     Args:
-        whole, found: of all grids.
-        k: which of them.
         shell: of this grid, in its flat state.
         points: (2m, 3) the ends of its rods [m].
     """

@@ -25,19 +25,21 @@ can hold slip, with the force of friction held over the rest of the step.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Protocol, Self, TypeVar
+from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.contact.modified_mass import ModifiedMass, Touching
 from rodshell.errors import InputError
 from rodshell.kernels import njit
-from rodshell.model import Freedom, Potential
+from rodshell.model import Freedom, Potential, Shell
+from rodshell.model.elastic_rod import ElasticRod
 from rodshell.rods.elements import NO_HESSIANS, Elements, in_parts
 from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
 from rodshell.solve.problem import NO_CURVATURE, Constraint, Damping, Force, ImplicitForce, PointLoads, Supports
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.validation import array, described, function_of, listed
+from rodshell.validation import array, described, function_of, instance, listed
 
 MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
 
@@ -48,20 +50,6 @@ MOST_ITERATIONS = 20
 _LEAST_SHARE = 1 / 64
 _MOST_PASSES = 30  # of predictor and corrector, with contact
 PART = 1024  # elements evaluated at a time: their Hessians (2 MB) stay in the cache, and memory stays small
-
-
-class MovingBody(Protocol):
-    """What a motion needs of a rod or a shell."""
-
-    @property
-    def elements(self) -> tuple[Elements, ...]: ...
-    @property
-    def explicit(self) -> tuple[Elements, ...]: ...
-    @property
-    def stretch(self) -> Elements: ...
-    @property
-    def mass(self) -> Floats: ...
-    def freedom(self) -> Freedom: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +90,7 @@ class Motion:
     @classmethod
     def of(
         cls,
-        body: MovingBody,
+        body: ElasticRod | Shell,
         *,
         constraint: Freedom | Constraint | Callable[[float], Constraint] | None = None,
         forces: tuple[Force, ...] = (),
@@ -113,8 +101,7 @@ class Motion:
             body: its source frames being at the state to start from.
             constraint: as of `Motion`; one that never moves may be given as a `Freedom`.
         """
-        if not all(hasattr(body, name) for name in ("elements", "explicit", "stretch", "mass", "freedom")):
-            raise InputError(f"body must be a rodshell ElasticRod or Shell, not {described(body)}")
+        instance("body", body, ElasticRod | Shell)
         given = body.freedom() if constraint is None else constraint
         supports = Supports(given) if isinstance(given, Freedom) else given
         implicit = [element for element in body.elements if all(element is not other for other in body.explicit)]
@@ -219,57 +206,6 @@ class ImplicitEuler:
         self.buffers = {width: np.zeros((count, width, width)) for width, count in widths.items()}
 
 
-class Planes(Constraint, Protocol):
-    """The supports and the planes of nodes in contact."""
-
-    @property
-    def nodes(self) -> Ints: ...
-
-
-P = TypeVar("P", bound=Planes)
-
-
-class ContactLaw(Protocol[P]):
-    """What `contact.modified_mass.ModifiedMass` offers."""
-
-    def touching(self, supports: Constraint, state: Floats) -> P:
-        """The constraint that a step from `state` (N, 3) begins with.
-
-        Args:
-            supports: what holds the structure without the contact.
-            state: (N, 3) at the start of the step [m, at twist angles rad].
-        """
-        ...
-
-    def below(self, state: Floats, touching: P) -> P | None:
-        """With the nodes that `state` (N, 3) has below the target, too; None where there are no new ones.
-
-        Args:
-            state: (N, 3) at the end of the step [m, at twist angles rad].
-            touching: the constraint of the step.
-        """
-        ...
-
-    def released(self, touching: P, reactions: Floats) -> tuple[P, Floats] | None:
-        """With the nodes free to slip that stick by more than friction can hold, by the `reactions` (N, 3) [N], and
-        the friction (N, 3) on them [N]; None where there are none.
-
-        Args:
-            touching: the constraint of the step.
-            reactions: (N, 3) at its end [N].
-        """
-        ...
-
-    def landed(self, velocity: Floats, touching: P) -> Floats:
-        """(N, 3) `velocity` at the end of a step, without what the contact takes of it [m/s].
-
-        Args:
-            velocity: (N, 3) at the end of the step [m/s].
-            touching: the constraint of the step.
-        """
-        ...
-
-
 class ContactEuler:
     """Takes single steps, as `ImplicitEuler` does.
 
@@ -281,14 +217,14 @@ class ContactEuler:
         matrix: makes the matrix of the Newton iterations.
     """
 
-    def __init__(self, law: ContactLaw[P], matrix: MakeMatrix = narrow_or_sparse) -> None:
+    def __init__(self, law: ModifiedMass, matrix: MakeMatrix = narrow_or_sparse) -> None:
         self._law, self._euler = law, ImplicitEuler(matrix)
-        self.last: P | None = None
+        self.last: Touching | None = None
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
         """One step; parameters as of `ImplicitEuler.take`."""
         law = self._law
-        touching = law.touching(motion.constraint_at(time + step), state)
+        touching = Touching.none(motion.constraint_at(time + step), state)
         rubbing = np.zeros_like(state)
         forces = motion.forces
         iterations = factorizations = 0
@@ -332,8 +268,7 @@ class _Newton:
 
     def solve(self) -> Step | Refused:
         free = self.constraint.freedom(self.start)
-        moved = np.zeros_like(self.start)
-        _add_free(self.step, self.velocity, free.directions, free.count, moved)
+        moved = free.expand(self.step * free.reduce(self.velocity))
         going = self.constraint.remaining(self.start)
         if going is not None:
             moved += going
@@ -410,18 +345,7 @@ class _Newton:
         return float(_mass_norm(self.motion.mass.ravel(), motion.ravel()))
 
 
-@njit(error_model="numpy")
-def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyped-def]
-    """Add a share of the part of `field` in the free directions."""
-    for i in range(len(motion)):
-        for c in range(count[i]):
-            d = directions[i, c]
-            part = share * (d[0] * field[i, 0] + d[1] * field[i, 1] + d[2] * field[i, 2])
-            for k in range(3):
-                motion[i, k] += part * d[k]
-
-
-@njit(error_model="numpy", fastmath={"reassoc", "contract"})
+@njit("f1 f1", fastmath={"reassoc", "contract"})
 def _mass_norm(mass, motion):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(len(motion)):

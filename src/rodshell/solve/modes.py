@@ -18,7 +18,7 @@ from math import pi
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import csc_matrix, diags
+from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
@@ -86,10 +86,9 @@ def linear_buckling(
     """
     state, applied = permanent.state, Load.of(load)
     loaded = LoadedAssembly(permanent.problem, applied, state)
-    elements = applied.elements(permanent.elements, state, 0.0)
-    tangent, rate = loaded.tangent(elements, state, permanent.forces, 0.0)
-    stress = tangent.pattern.upper(-loaded.stress_values(elements, state, rate))
-    values, shapes = _largest(tangent, stress, count, 1.0 / most)
+    tangent, rate = loaded.tangent(loaded.problem, state, permanent.forces)
+    stress = loaded.stress_values(loaded.problem, state, rate)
+    values, shapes = _largest(tangent, -stress, count, 1.0 / most)
     return LinearBuckling(1.0 / values, _unit_shapes(tangent, permanent, shapes), rate)
 
 
@@ -139,7 +138,7 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
         freedom = tangent.freedom
     except SingularError:
         assembly = TangentAssembly(equilibrium.problem, equilibrium.state)
-        freedom, values = assembly.values(equilibrium.elements, equilibrium.state, equilibrium.forces)
+        freedom, values = assembly.values(equilibrium.problem, equilibrium.state, equilibrium.forces)
         stiffness_alone = np.abs(_diagonal(assembly.pattern, values))
         scale = np.sqrt(stiffness_alone + (stiffness_alone == 0) * stiffness_alone.mean())
         shifted = values.copy()
@@ -156,8 +155,8 @@ def _diagonal(pattern: Pattern, values: Floats) -> Floats:
     return np.asarray(values[pattern.assembly.diagonal])
 
 
-def _inertia(equilibrium: Equilibrium, tangent: Tangent, weight: Floats, edge_mass: Floats | None) -> csc_matrix:
-    """Upper triangle of the mass in the pattern of K: lumped, less a sixth of what is spread along edges times the
+def _inertia(equilibrium: Equilibrium, tangent: Tangent, weight: Floats, edge_mass: Floats | None) -> Floats:
+    """(nnz,) values of the mass in the pattern of K: lumped, less a sixth of what is spread along edges times the
     squared difference of their nodes' motions."""
     pattern, blocks = tangent.pattern, equilibrium.problem.stretch.blocks
     values = np.zeros(len(tangent.values))
@@ -170,7 +169,7 @@ def _inertia(equilibrium: Equilibrium, tangent: Tangent, weight: Floats, edge_ma
         edges = -edge_mass[:, None, None] / 6.0 * apart
         pattern.assembly.add(len(pattern.blocks) - 2, edges, blocks, tangent.freedom, values)
     values[pattern.assembly.diagonal] += weight
-    return pattern.upper(values)
+    return values
 
 
 def _unit_shapes(tangent: Tangent, equilibrium: Equilibrium, rows: Floats) -> Floats:
@@ -180,10 +179,10 @@ def _unit_shapes(tangent: Tangent, equilibrium: Equilibrium, rows: Floats) -> Fl
     return np.array([shape / np.abs(shape[nodes]).max() for shape in shapes]).reshape(-1, *equilibrium.state.shape)
 
 
-def _largest(tangent: Tangent, upper: csc_matrix, count: int, least: float) -> tuple[Floats, Floats]:
+def _largest(tangent: Tangent, other: Floats, count: int, least: float) -> tuple[Floats, Floats]:
     """The largest eigenvalues mu > `least` of A x = mu K x, descending, and their vectors (k, dofs), certified.
 
-    upper : upper triangle of A in the pattern of K.
+    other : (nnz,) values of A in the pattern of K.
     """
     if tangent.negative_modes:
         raise StabilityError(
@@ -191,11 +190,11 @@ def _largest(tangent: Tangent, upper: csc_matrix, count: int, least: float) -> t
             "and no natural frequencies"
         )
     size = tangent.freedom.size
-    if not np.abs(upper.data).max(initial=0.0) > 0:  # such as a load across a plane grid, which draws no rod
+    if not np.abs(other).max(initial=0.0) > 0:  # such as a load across a plane grid, which draws no rod
         return np.empty(0), np.empty((0, size))
-    matrix = _whole(upper)
-    stiffness = _whole(tangent.pattern.upper(tangent.values))
-    available = _above(tangent, upper, least) if least > 0 else size  # Lanczos' method is slow to find what is smaller
+    assembly = tangent.pattern.assembly
+    matrix, stiffness = assembly.matrix(other), assembly.matrix(tangent.values)
+    available = _above(tangent, other, least) if least > 0 else size  # Lanczos' method is slow to find what is smaller
     if available == 0:
         return np.empty(0), np.empty((0, size))
     count = min(count, available)
@@ -203,41 +202,39 @@ def _largest(tangent: Tangent, upper: csc_matrix, count: int, least: float) -> t
     for number in range(TRIES):
         if size <= DENSE or wanted >= size - 1:
             values, vectors = eigh(matrix.toarray(), stiffness.toarray())
-            order = np.argsort(values)[::-1]
         else:
             values, vectors = _lanczos(tangent, matrix, stiffness, wanted, start=number)
-            order = np.argsort(values)[::-1]
+        order = np.argsort(values)[::-1]
         values, vectors = values[order], vectors.T[order]
         positive = values > max(least, 1e-14 * float(np.abs(values).max(initial=0.0)))
         values, vectors = values[positive], vectors[positive]
         if not len(values) and least == 0.0:
             return values, vectors
         at, found = _between(values, count, least, complete=len(values) < wanted or wanted >= available)
-        if _above(tangent, upper, at) == found:
+        if _above(tangent, other, at) == found:
             kept = min(count, found)
             return values[:kept], vectors[:kept]
         wanted = 2 * wanted + SPARE
     raise ConvergenceError(
-        f"{found} modes were found where the inertia of the stiffness counts {_above(tangent, upper, at)}: "
+        f"{found} modes were found where the inertia of the stiffness counts {_above(tangent, other, at)}: "
         "ask for more or fewer modes"
     )
 
 
 def _between(values: Floats, count: int, least: float, *, complete: bool) -> tuple[float, int]:
     """A number in a gap below the `count`-th of the descending values, and how many are above it."""
-    rest = values[: len(values)]
-    gaps = 1.0 - rest[count:] / rest[count - 1 : -1]
+    gaps = 1.0 - values[count:] / values[count - 1 : -1]
     if complete and not (gaps > GAP).any():  # the gap is below the last of all
-        last = float(rest[-1]) if len(rest) else np.inf
-        return (least if least > 0 else 0.5 * last), len(rest)
+        last = float(values[-1]) if len(values) else np.inf
+        return (least if least > 0 else 0.5 * last), len(values)
     first = int(np.argmax(gaps > GAP)) if (gaps > GAP).any() else len(gaps) - 1
     number = count + first
-    return 0.5 * float(rest[number - 1] + rest[number]), number
+    return 0.5 * float(values[number - 1] + values[number]), number
 
 
-def _above(tangent: Tangent, upper: csc_matrix, value: float) -> int:
+def _above(tangent: Tangent, other: Floats, value: float) -> int:
     """How many eigenvalues of A x = mu K x are above a value: negative ones of K - A / value."""
-    return tangent.pattern.solver.factor(tangent.values - upper.data / value).negative
+    return tangent.pattern.solver.factor(tangent.values - other / value).negative
 
 
 def _lanczos(
@@ -253,8 +250,3 @@ def _lanczos(
     except ArpackError as error:
         raise ConvergenceError(f"the modes were not found: {error}; ask for fewer") from None
     return values, vectors
-
-
-def _whole(upper: csc_matrix) -> csc_matrix:
-    """Both triangles of a symmetric matrix."""
-    return csc_matrix(upper + upper.T - diags(upper.diagonal()))

@@ -14,7 +14,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import dot
-from rodshell.rods.elements import Elements, twist_angles
+from rodshell.rods.elements import twist_angles
 from rodshell.solve.problem import Problem
 from rodshell.solve.shifted_matrix import ShiftedMatrix
 from rodshell.solve.tangent import TangentAssembly, generic
@@ -46,7 +46,7 @@ class Step:
 
     state: Floats
     forces: Floats
-    elements: tuple[Elements, ...]
+    problem: Problem
     negative_modes: int
     motion: Floats
     change: Floats
@@ -60,7 +60,7 @@ class Iterate:
 
     Args:
         state, forces: (n, 3) [m, rad], and axial forces (e,) [N].
-        elements: with their source frames at, or near, the state.
+        problem: with its source frames at, or near, the state.
         strains: (e,) of the edges [-]; mismatch : how far the forces are from matching them [-].
         step, length: the last step, and how long it is; moved, changed : the last whole step and its change of the
             forces, both relative.
@@ -72,7 +72,7 @@ class Iterate:
 
     state: Floats
     forces: Floats
-    elements: tuple[Elements, ...]
+    problem: Problem
     strains: Floats
     mismatch: float = np.inf
     step: Step | None = None
@@ -98,7 +98,7 @@ class Iterate:
 
     def refreshed(self) -> "Iterate":
         """The same with the source frames of the elements at the state."""
-        return replace(self, elements=tuple(element.refreshed(self.state) for element in self.elements))
+        return replace(self, problem=self.problem.refreshed(self.state))
 
 
 class TooManyModesError(Exception):
@@ -132,13 +132,9 @@ class NewtonStep:
         self._factored, self._free = (state, self._no_forces), free  # where the matrix is from
 
     def start(self, state: Floats, forces: Floats) -> Iterate:
-        """Where the iteration begins.
-
-        Args:
-            state, forces: (n, 3) [m, rad], and axial forces (e,) [N].
-        """
+        """Where the iteration begins: in a state (n, 3) with axial forces (e,) [N]."""
         strains = self._problem.stretch.strains(state)
-        return Iterate(state=state, forces=forces, elements=self._problem.elements, strains=strains)
+        return Iterate(state=state, forces=forces, problem=self._problem, strains=strains)
 
     def take(self, here: Iterate) -> Iterate:
         """The next iterate.
@@ -147,16 +143,16 @@ class NewtonStep:
             SingularError: a pivot vanishes, and not by a mode without stiffness.
             TooManyModesError: the start has more negative modes than are allowed.
         """
-        problem, stretch, state, forces = self._problem, self._problem.stretch, here.state, here.forces
+        problem, stretch, state, forces = here.problem, here.problem.stretch, here.state, here.forces
         base = forces if problem.inextensible else self._no_forces
         if here.chord:  # what the edges lack acts along those of the matrix, else strains do not settle
-            gradient = self.assembly.gradient(here.elements, state, forces)
+            gradient = problem.gradient(state, forces)
             if self.assembly.curved:  # less the constraint's forces, which act across the free directions of this state
                 gradient = problem.constraint.freedom(state).within(gradient)
             stretch.add_axial(self._factored[0], base + stretch.stiffness * here.strains - forces, gradient)
         else:
             self._factored, self._free = (state, forces), problem.constraint.freedom(state)
-            gradient = self.assembly.linearise(here.elements, state, forces, multipliers=base)
+            gradient = self.assembly.linearise(problem, state, forces, multipliers=base)
         prescribed = problem.constraint.remaining(state)
         if prescribed is not None:
             gradient += self.assembly.product(prescribed)
@@ -172,7 +168,7 @@ class NewtonStep:
             return self.take(replace(here, chord=False))
         share = min(1.0, here.longest / reach) if reach > 0 else 1.0
         change = base + stretch.stiffness * (here.strains + stretch.elongation(self._factored[0], motion)) - forces
-        step = Step(state, forces, here.elements, self.matrix.negative_modes, motion, change, reach, share)
+        step = Step(state, forces, problem, self.matrix.negative_modes, motion, change, reach, share)
         return self._judged(here, step)
 
     def lowest_mode(self) -> Floats:
@@ -234,7 +230,7 @@ class NewtonStep:
         step = replace(here.step, share=PART * here.step.share)
         (state, forces), length = self._after(step), step.share * step.reach
         return replace(
-            here, state=state, forces=forces, elements=step.elements, strains=self._problem.stretch.strains(state),
+            here, state=state, forces=forces, problem=step.problem, strains=self._problem.stretch.strains(state),
             mismatch=np.inf, step=step, length=length, longest=length,
         )  # fmt: skip
 

@@ -28,7 +28,7 @@ from rodshell.solve.continuation import Continuation
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.newton_matrix import SparseSum
-from rodshell.solve.problem import Problem, Supports
+from rodshell.solve.problem import PointLoads, Problem, Supports
 
 EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25
@@ -51,45 +51,6 @@ def follow(
     *,
     first_step: float,
     snap: bool = False,
-    most_factorizations: int | None = None,
-    most_modes: int | None = None,
-    progress: Callable[[float, int, float], None] | None = None,
-) -> Equilibrium:
-    """Move from t = 0 to t = 1 by steps that shrink on failure and grow back.
-
-    Args:
-        problem_at: the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
-            same at all t, and their source frames are carried along the path. The first
-            iteration of each step carries them there with the tangent stiffness: it is the tangent predictor.
-        state, forces: equilibrium, or a guess of it, at t = 0.
-        snap: where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
-            structure itself would; its constraint must be `Supports`.
-        most_factorizations: no step is begun after so many, and no descent takes many more; None: as many as it takes.
-        most_modes: the path ends at an equilibrium with more negative modes; None: at none.
-
-    Returns:
-        The equilibrium at t = 1, or at the last t reached, with the status STALLED. Iterations,
-        factorizations and seconds of the report are those of the whole path, failed steps included.
-    """
-    path = followed(
-        problem_at, state, forces, first_step=first_step, snap=snap, most_factorizations=most_factorizations,
-        most_modes=most_modes, progress=progress,
-    )  # fmt: skip
-    last = path.reports[-1]
-    report = path.found.report.after(*(report for report in path.reports if report is not path.found.report))
-    if path.t < 1.0:
-        status = Status.OUT_OF_TIME if last.status is Status.OUT_OF_TIME else Status.STALLED
-        report = replace(report, status=status, reason=last.reason)
-    return replace(path.found, report=report)
-
-
-def followed(
-    problem_at: Callable[[float], Problem],
-    state: Floats,
-    forces: Floats,
-    *,
-    first_step: float,
-    snap: bool = False,
     neutral: float = 0.0,
     slide: bool = True,
     easy: int = EASY,
@@ -99,12 +60,20 @@ def followed(
     most_modes: int | None = None,
     progress: Callable[[float, int, float], None] | None = None,
 ) -> "Trace":
-    """As `follow`, as far as it went.
+    """Move from t = 0 to t = 1 by steps that shrink on failure and grow back; see `Trace.whole`.
 
     Args:
+        problem_at: the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
+            same at all t, and their source frames are carried along the path. The first iteration of each step carries
+            them there with the tangent stiffness: it is the tangent predictor.
+        state, forces: equilibrium, or a guess of it, at t = 0.
+        snap: where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
+            structure itself would; its constraint must be `Supports`.
         neutral, slide: as of `find_stable`.
         easy: iterations of a step that may be followed by a longer one.
         most, most_of_all: iterations of a step, and of the path; None: as many as it takes.
+        most_factorizations: no step is begun after so many, and no descent takes many more; None: as many as it takes.
+        most_modes: the path ends at an equilibrium with more negative modes; None: at none.
     """
     path, reports = Continuation(0.0, 1.0, first_step, SMALLEST_STEP), list[SolveReport]()
     last: Equilibrium | None = None
@@ -178,6 +147,17 @@ class Trace:
         """Of all solves, those of steps that were too long too."""
         return _made(self.reports)
 
+    @property
+    def whole(self) -> Equilibrium:
+        """The equilibrium at t = 1, or at the last t reached, with the status STALLED or OUT_OF_TIME. Its report counts
+        the work of the whole path, failed steps included."""
+        report = self.found.report.after(*(report for report in self.reports if report is not self.found.report))
+        if self.t < 1.0:
+            late = self.reports[-1].status is Status.OUT_OF_TIME
+            status = Status.OUT_OF_TIME if late else Status.STALLED
+            report = replace(report, status=status, reason=self.reports[-1].reason)
+        return replace(self.found, report=report)
+
 
 def trace(
     problem_at: Callable[[float], Problem], here: Equilibrium, start: float, stop: float, *,
@@ -196,9 +176,6 @@ def trace(
         snap: whether to go down the energy there and on from where that leads; else the path ends there.
         most_factorizations: the path ends when they are used up.
         progress: called with t and the equilibrium there before each step; it may raise an error to end the path.
-
-    Returns:
-        The path; its t is `stop` where it arrived.
     """
     path, snaps, reports = Continuation(start, stop, abs(stop - start), shortest), list[Snap](), list[SolveReport]()
     while not path.arrived:
@@ -234,28 +211,20 @@ def trace(
 
 
 def going_on(problem: Problem, last: Equilibrium) -> Problem:
-    """The problem with the source frames and the pattern of an equilibrium of the same structure.
-
-    Args:
-        problem: the next one on a path.
-        last: the equilibrium that the next solve starts from.
-    """
+    """The next problem on a path, with the source frames and the pattern of the equilibrium that it starts from."""
     elements = tuple(map(with_frames, problem.elements, last.elements))
     return replace(problem, elements=elements, pattern=last.problem.pattern)
 
 
 def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule; parameters as of `_surplus`."""
+    by the trapezoidal rule: see `_surplus`."""
     return abs(_surplus(here, there)) > UNACCOUNTED
 
 
 def _surplus(here: Equilibrium, there: Equilibrium) -> float:
-    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell.
-
-    Args:
-        here, there: equilibria of one structure under one load, the second with prescribed `Supports`.
-    """
+    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell. Of
+    equilibria of one structure under one load, the second with prescribed `Supports`."""
     supports = there.problem.constraint
     assert isinstance(supports, Supports)
     moved, before, after = supports.moved, here.energy, there.energy
@@ -317,9 +286,8 @@ def relax(
     """
     begin = time.perf_counter()
     edges = problem.stretch.with_forces(None)
-    motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, ())
-    if problem.load is not None:
-        motion = replace(motion, forces=(_Dead(problem.load),))
+    dead = () if problem.load is None else (PointLoads(np.arange(len(state)), problem.load),)
+    motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, dead)
     stepper = ImplicitEuler(lambda blocks, free: SparseSum(blocks, free, problem.flat_coordinates))
     still, unit, length, factorizations, number = np.zeros_like(state), problem.unit(len(state)), FIRST, 0, 0
     for number in range(1, MOST_STEPS + 1):
@@ -347,16 +315,6 @@ def relax(
     found = find_stable(replace(problem, elements=motion.elements[:-1]), state, forces, progress=progress)
     work = replace(found.report, iterations=number, factorizations=factorizations, seconds=time.perf_counter() - begin)
     return replace(found, report=found.report.after(replace(work, seconds=work.seconds - found.report.seconds)))
-
-
-class _Dead:
-    """A load that does not change."""
-
-    def __init__(self, load: Floats) -> None:
-        self._load = load
-
-    def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        return self._load
 
 
 def _pace(problem: Problem, state: Floats) -> Floats:

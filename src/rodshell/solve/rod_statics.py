@@ -12,16 +12,15 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
-from rodshell.model import Freedom, Potential
+from rodshell.model import Freedom
+from rodshell.model.assembly import ANGLE
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.rod_line import End
-from rodshell.rods.elements import Elements, is_bends
+from rodshell.rods.elements import is_bends
 from rodshell.solve.equilibrium import SolveReport, Status
-from rodshell.solve.path import followed
+from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem, Supports
 from rodshell.validation import array, direction, finite, flag, instance, mapping, number, short, texts, vector, whole
-
-SPIN = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -135,12 +134,7 @@ class SupportPath:
 
     @staticmethod
     def of(rod: ElasticRod, state: Floats, wanted: RodSupports) -> "SupportPath":
-        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted.
-
-        Args:
-            state: (N, 3) node positions [m] and twist angles [rad] at the start.
-            wanted: the supports at the end.
-        """
+        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted."""
         wanted.require(rod)
         goals = dict[int, Floats]()
         for k, node in enumerate(rod.clamped_nodes):
@@ -162,7 +156,7 @@ class SupportPath:
             block = index_of(node, rod.node_count, "node")
             free = free.with_directions(np.array([block]), *_orthonormal(node, directions))
         spins = [int(rod.ghost_angles[rod.clamps.index(end)]) for end in wanted.spinning]
-        free = free.with_directions(np.array(spins, dtype=np.intp), SPIN).with_directions(moved)
+        free = free.with_directions(np.array(spins, dtype=np.intp), ANGLE).with_directions(moved)
         last = np.array([goals[block] for block in goals]).reshape(-1, 3)
         return SupportPath(free, moved, state[moved], last, clamps, holds_spin)
 
@@ -230,13 +224,8 @@ def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) ->
 
 
 def index_of(given: int, count: int, what: str) -> int:
-    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`.
-
-    Args:
-        given: the index; a negative one counts from the end.
-        count: number of all that there are.
-        what: is counted, for messages: "node" or "edge".
-    """
+    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`, a
+    "node" or an "edge"."""
     if not isinstance(given, int | np.integer):
         raise InputError(f"a {what} is a whole number, not {short(given)}")
     if not -count <= given < count:
@@ -352,14 +341,15 @@ def solve_rod(
     else:
         axial = rod.stretch.stiffness * rod.stretch.strains(state)
         held = tuple(element.relaxed(state) for element in rod.elements)
-    before = _gradient(held, rod, state, axial)  # this load makes the start an equilibrium
+    # this load makes the start an equilibrium
+    before = Problem(held, rod.stretch, path.at(0.0), rod.length).gradient(state, axial)
 
     def problem_at(t: float) -> Problem:
         pulls = (1 - t) * before + t * load
         elements = tuple(last.between(first, t) for first, last in zip(held, rod.elements, strict=True))
         return Problem(elements, rod.stretch, path.at(t), rod.length, load=pulls)
 
-    way = followed(
+    way = follow(
         problem_at, state, axial, first_step=1.0 / steps, slide=stable, neutral=NEUTRAL * rod.bend_energy, easy=EASY,
         most=MOST, most_of_all=None,
     )  # fmt: skip
@@ -377,14 +367,10 @@ def solve_rod(
             "to the side that it is to take; or pass stable=False to have it as it is",
             report,
         )
-    return _shape(
-        replace(rod, elements=tuple(filter(is_bends, way.found.elements))),
-        way.found.state,
-        way.found.forces,
-        load,
-        path.free,
-        report,
-    )
+    found, solved = way.found, replace(rod, elements=tuple(filter(is_bends, way.found.elements)))
+    reactions = found.gradient - path.free.within(found.gradient)
+    residual = float(np.abs(found.gradient[rod.nodes] - reactions[rod.nodes]).max())
+    return RodShape(solved, found.state, found.forces, load, reactions, replace(report, force_residual=residual))
 
 
 def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
@@ -397,17 +383,3 @@ def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
     if state.shape != (rod.block_count, 3):
         raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
     return finite("the state to start from", state, *state.shape).copy()
-
-
-def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Freedom, report: SolveReport) -> RodShape:
-    gradient = _gradient(rod.elements, rod, state, axial) - load
-    reactions = gradient - free.expand(free.reduce(gradient))
-    residual = float(np.abs(gradient[rod.nodes] - reactions[rod.nodes]).max())
-    return RodShape(rod, state, axial, load, reactions, replace(report, force_residual=residual))
-
-
-def _gradient(elements: tuple[Elements, ...], rod: ElasticRod, state: Floats, axial: Floats) -> Floats:
-    """(N, 3) of the energy, the edges carrying the axial forces (edges,) [N]."""
-    gradient = Potential(elements).gradient(state)
-    rod.stretch.add_axial(state, axial, gradient)
-    return gradient

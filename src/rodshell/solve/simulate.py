@@ -161,18 +161,10 @@ def _written(times: Floats) -> int:
 
 
 class Stepper(Protocol):
-    """Takes single steps."""
+    """Takes single steps, as `ImplicitEuler` does."""
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
-        """One step, or why it was refused.
-
-        Args:
-            motion: its source frames being at the state.
-            state: (N, 3) at the start [m, at twist angles rad].
-            velocity: (N, 3) at the start [m/s, rad/s].
-            time: of the start [s].
-            step: its length [s].
-        """
+        """One step, or why it was refused; parameters as of `ImplicitEuler.take`."""
         ...
 
 

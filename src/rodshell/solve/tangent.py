@@ -6,7 +6,7 @@ axial stiffness EA and the geometric stiffness of the axial forces at hand; a su
 curvature times its contact forces. Where edges are inextensible, their stiffness is a penalty, and so it is in K.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from rodshell.arrays import Floats, State
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.model.potential import product, room_for
-from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch, evaluate_all, is_stressed
+from rodshell.rods.elements import evaluate_all, is_stressed
 from rodshell.solve.problem import NO_CURVATURE, Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
@@ -70,13 +70,10 @@ class Tangent:
         return self.factors.negative
 
     def solve(self, loads: Floats) -> Floats:
-        """Displacements K^-1 f in the free directions; zero across them.
+        """Displacements K^-1 f [m, rad] in the free directions; zero across them.
 
         Args:
             loads: (N, 3) forces [N, at twist angles N m], or (k, N, 3) of k cases.
-
-        Returns:
-            Displacements of the same shape [m, rad].
         """
         return self._of_fields("loads", loads, self.factors.solve)
 
@@ -87,7 +84,9 @@ class Tangent:
             motions: (N, 3) displacements [m, rad], or (k, N, 3) of k cases; their part in the free directions counts.
         """
         return self._of_fields(
-            "displacements", motions, lambda rows: np.array([self.pattern.product(self.values, row) for row in rows])
+            "displacements",
+            motions,
+            lambda rows: np.array([self.pattern.solver.product(self.values, row) for row in rows]),
         )
 
     def lowest_modes(
@@ -184,14 +183,14 @@ class Tangent:
 
 
 class TangentAssembly:
-    """The energies of a problem and their tangent stiffness, at one state after another.
+    """The tangent stiffness of a structure, at one state after another.
 
     Its buffers serve for all states; what it returns is not touched again. Where supports are on their way (`Supports`
-    with nodes still to move), what their motion takes is `product`.
+    with nodes still to move), what their motion takes is `product`. Methods take what acts at a state: a problem on the
+    same blocks, its source frames at, or near, the state; and the axial forces (e,) of the edges there [N].
 
     Args:
-        problem: the structure; its elements may be replaced at each state, on the same blocks.
-        state: (N, 3) any state, for the pattern.
+        problem: the structure at any state (N, 3), for the pattern.
 
     Attributes:
         blocks: (m, k) of each set of energies, of the edges, and of the constraint's curvature.
@@ -199,7 +198,6 @@ class TangentAssembly:
     """
 
     def __init__(self, problem: Problem, state: Floats) -> None:
-        self._problem = problem
         self.blocks = problem.blocks(len(state))
         self.pattern = problem.pattern_at(state)
         self.hessians = [*room_for(self.blocks[:-1]), NO_CURVATURE]
@@ -209,34 +207,23 @@ class TangentAssembly:
         """Whether the constraint turns its free directions."""
         return len(self.hessians[-1]) > 0
 
-    def gradient(self, elements: Sequence[Elements], state: State, forces: Floats) -> Floats:
-        """(N, 3) gradient [N] of energy and load, the edges carrying the axial forces (e,) [N].
-
-        Args:
-            elements: with their source frames at, or near, the state.
-            forces: (e,) axial forces of the edges [N].
-        """
-        return self._gradient(elements, state, forces, [NO_HESSIANS] * len(elements))[1]
-
     def linearise(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, *,
-        multipliers: Floats | None = None, stretch: Stretch | None = None,
-    ) -> Floats:  # fmt: skip
+        self, problem: Problem, state: Floats, forces: Floats, *, multipliers: Floats | None = None
+    ) -> Floats:
         """Evaluate all Hessians at a state.
 
         Args:
-            elements: with their source frames at, or near, the state.
-            state, forces: (N, 3) [m, rad], and axial forces (e,) [N].
             multipliers: (e,) N0 [N]; None: those of the edges.
-            stretch: the edges with other lengths at rest; None: those of the problem.
 
         Returns:
             (N, 3) gradient of energy and load [N], the edges carrying N0 + EA eps.
         """
-        stretch = self._problem.stretch if stretch is None else stretch
-        gradient, by_force = self._gradient(elements, state, forces, self.hessians[:-2], stretch)
-        self.hessians[-1] = self._problem.constraint.curvature(state, by_force)
-        evaluate_all((stretch.with_forces(forces, multipliers=multipliers),), state, gradient, self.hessians[-2:-1])
+        gradient = problem.without_edges(state, self.hessians[:-2])
+        by_force = gradient.copy()
+        problem.stretch.add_axial(state, forces, by_force)
+        self.hessians[-1] = problem.constraint.curvature(state, by_force)
+        stretch = problem.stretch.with_forces(forces, multipliers=multipliers)
+        evaluate_all((stretch,), state, gradient, self.hessians[-2:-1])
         return gradient
 
     def assembled(self, free: Freedom) -> Floats:
@@ -244,53 +231,36 @@ class TangentAssembly:
         return self.pattern.assembly.assemble(self.hessians, self.blocks, free)
 
     def product(self, motion: Floats) -> Floats:
-        """(N, 3) product of the Hessian at the last state with displacements (N, 3) across the free directions too."""
+        """(N, 3) product of the Hessian at the last state with displacements, across the free directions too."""
         return product(self.hessians[:-1], self.blocks[:-1], motion)
 
-    def values(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
-    ) -> tuple[Freedom, Floats]:
-        """The free directions, and the values (nnz,) of K in the order of the pattern; parameters as of `linearise`."""
-        self.linearise(elements, state, forces, stretch=stretch)
-        free = self._problem.constraint.freedom(state)
+    def values(self, problem: Problem, state: Floats, forces: Floats) -> tuple[Freedom, Floats]:
+        """The free directions, and the values (nnz,) of K in the order of the pattern."""
+        self.linearise(problem, state, forces)
+        free = problem.constraint.freedom(state)
         return free, self.assembled(free)
 
-    def _gradient(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, hessians: Sequence[Floats],
-        stretch: Stretch | None = None,
-    ) -> tuple[Floats, Floats]:  # fmt: skip
-        """(N, 3) of the elements and the load, without and with the axial forces."""
-        load, stretch = self._problem.load, self._problem.stretch if stretch is None else stretch
-        gradient = np.zeros_like(state) if load is None else -load
-        evaluate_all(elements, state, gradient, hessians)
-        whole = gradient.copy()
-        stretch.add_axial(state, forces, whole)
-        return gradient, whole
-
-    def stress_values(self, elements: Sequence[Elements], state: State, change: Floats, motion: Floats) -> Floats:
+    def stress_values(self, problem: Problem, state: State, change: Floats, motion: Floats) -> Floats:
         """(nnz,) values of the change of K with the internal forces alone, the geometry being frozen.
 
         Args:
-            elements: with their source frames at, or near, the state.
             change: (e,) of the axial forces [N].
             motion: (N, 3) along which moments change, of the elements that are `Stressed` [m, rad].
         """
         hessians = room_for(self.blocks)
-        for element, values in zip(elements, hessians, strict=False):
+        for element, values in zip(problem.elements, hessians, strict=False):
             if is_stressed(element):
                 element.stress_stiffness(state, motion, values)
-        self._problem.stretch.axial_stiffness(state, change, hessians[-2])
-        return self.pattern.assembly.assemble(hessians, self.blocks, self._problem.constraint.freedom(state))
+        problem.stretch.axial_stiffness(state, change, hessians[-2])
+        return self.pattern.assembly.assemble(hessians, self.blocks, problem.constraint.freedom(state))
 
-    def tangent(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
-    ) -> Tangent:
-        """The tangent at a state; parameters as of `linearise`.
+    def tangent(self, problem: Problem, state: Floats, forces: Floats) -> Tangent:
+        """The tangent at a state.
 
         Raises:
             SingularError: a pivot vanishes.
         """
-        free, values = self.values(elements, state, forces, stretch)
+        free, values = self.values(problem, state, forces)
         factors = self.pattern.solver.factor(values)
         return Tangent(_fixed(state.copy()), _fixed(forces.copy()), free, _fixed(values), self.pattern, factors)
 

@@ -141,7 +141,7 @@ def _frames(normals: Floats) -> Floats:
     return np.stack([first, cross(normals, first), normals], axis=1)
 
 
-@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp"})
+@njit("f2 f3 f i1 i1 f2 f2 f1 f2", fastmath={"contract", "reassoc", "arcp"})
 def _fit(centres, frames, spacing, start, near, points, normals, areas, coefficients):  # type: ignore[no-untyped-def]
     """Weighted least squares of cubics over the tangent planes, (m, 10) in units of the spacing."""
     system, right, row = np.empty((TERMS, TERMS)), np.empty(TERMS), np.empty(TERMS)
@@ -257,7 +257,7 @@ def _local(site, centre, e, spacing):  # type: ignore[no-untyped-def]
     return _along(e[0], d) / spacing, _along(e[1], d) / spacing, _along(e[2], d)
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i2 f2 f3 f2 f f2 f2")
 def _means(sites, distance, index, centres, frames, coefficients, spacing, mean, normals):  # type: ignore[no-untyped-def]
     """Weighted means (n, 3) of the points above `sites` (n, 3) on the cubics nearby, and of their normals."""
     for n in range(len(sites)):
@@ -277,7 +277,7 @@ def _means(sites, distance, index, centres, frames, coefficients, spacing, mean,
                 normals[n, i] += weight[k] * (e[2, i] - (slope_a * e[0, i] + slope_b * e[1, i]) / spacing) / steep
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i2 f2 f3 f2 f f3 f2")
 def _curvatures(  # type: ignore[no-untyped-def]
     sites, distance, index, centres, frames, coefficients, spacing, turned, quadrics
 ):

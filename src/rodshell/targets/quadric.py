@@ -57,7 +57,7 @@ class _Quadric(WalledTarget):
         return np.sqrt(np.where(rest >= 0.0, rest, np.nan) / w[2])
 
 
-@njit()
+@njit("f2 f1 f f")
 def _level(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     value, gradient = np.empty(len(x)), np.empty((len(x), 3))
     for n in range(len(x)):
@@ -70,7 +70,7 @@ def _level(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     return value, gradient
 
 
-@njit()
+@njit("f2 f1 f f")
 def _implicit(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     value, gradient = _level(x, weights, slope, scale)
     hessian = np.zeros((len(x), 3, 3))

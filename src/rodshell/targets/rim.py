@@ -168,7 +168,7 @@ class Rectangle:
         return d, n * np.where(xy < 0, -1.0, 1.0), hessian * along[:, :, None] * along[:, None, :]
 
 
-@njit(error_model="numpy")
+@njit("f2 f1 f f1")
 def _find_roots(ap, shift, least, t):  # type: ignore[no-untyped-def]
     """Newton's method on  sum_k (a_k p_k / (t + shift_k))^2 = 1  for each row of ap, in place from below the root."""
     for n in range(len(t)):
@@ -291,7 +291,7 @@ class Rim:
         return np.asarray(first + share[:, None] * (self.points[self.after[edge]] - first))
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i1 i1 i1 f2 f1 i1 f1")
 def _feet(x, points, after, before, start, centres, radii, edges, shares):  # type: ignore[no-untyped-def]
     edge = 0
     for n in range(len(x)):

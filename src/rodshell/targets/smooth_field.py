@@ -85,7 +85,7 @@ class CellList:
         return np.flatnonzero(free)
 
 
-@njit()
+@njit("f2 f")
 def _lattice_over(points, cell):  # type: ignore[no-untyped-def]
     """Corner, number of cells each way, and their width, for a lattice that holds all points."""
     low, high = points[0].copy(), points[0].copy()
@@ -99,7 +99,7 @@ def _lattice_over(points, cell):  # type: ignore[no-untyped-def]
         cell *= 1.3
 
 
-@njit()
+@njit("f2 f1 i1 f")
 def _sorted(points, low, shape, cell):  # type: ignore[no-untyped-def]
     """Sort points into their cells, by counting."""
     cells = np.zeros(len(points), dtype=np.intp)
@@ -145,7 +145,7 @@ def _keep(distance, index, first, last, d, c):  # type: ignore[no-untyped-def]
     distance[k], index[k] = d, c
 
 
-@njit()
+@njit("f2 f2 f1 i1 f i1 i1 i f f1 i1")
 def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, index):  # type: ignore[no-untyped-def]
     """Squares of distances. A neighbour is final once it is nearer than the cells that were not searched."""
     for n in range(len(x)):
@@ -173,7 +173,7 @@ def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, 
                     _keep(distance, index, first, last, d, c)
 
 
-@njit()
+@njit("f2 f2 f1 i1 f i1 i1 f")
 def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ignore[no-untyped-def]
     """An upper bound of the entries of all lists together."""
     count, reach = 0, int(np.ceil(radius / cell))
@@ -186,7 +186,7 @@ def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ig
     return count
 
 
-@njit()
+@njit("f2 f2 f1 i1 f i1 i1 f b i1 i1 f1")
 def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, near, away):  # type: ignore[no-untyped-def]
     """List the neighbours one after the other; each list begins at `begin` (n + 1,)."""
     reach = int(np.ceil(radius / cell))
@@ -204,7 +204,7 @@ def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, n
         begin[n + 1] = last
 
 
-@njit()
+@njit("f2 f1 i1 f i1 i1 f b1")
 def _thin(points, low, shape, cell, start, order, distance, free):  # type: ignore[no-untyped-def]
     """Each point that is still free removes the later ones that are too close to it."""
     reach = int(np.ceil(distance / cell))
@@ -284,7 +284,7 @@ _DXX, _DXY, _DXZ, _DYY, _DYZ, _DZZ, _HXX, _HXY, _HXZ, _HYY, _HYZ, _HZZ = range(1
 _ALL = 25 * LANES
 
 
-@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit("f2 f1 i1 f i1 i1 f1 f2 f b f1 f2 f3", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _blend(  # type: ignore[no-untyped-def]
     x, distance, nearest, radius, start, near, away, packed, width2, second, value, gradient, hessian
 ):

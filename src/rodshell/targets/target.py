@@ -259,7 +259,7 @@ class Target(ABC):
 Target._check_points()
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+@njit("f3 f1")  # type: ignore[untyped-decorator, unused-ignore]
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
     """Hessians (n, 3, 3) [1/m] of the distance at points away from a surface, S (I + d S)^-1, from the shape operators
     S (n, 3, 3) at the closest points [1/m] and the signed distances d (n,) [m]."""
@@ -282,7 +282,7 @@ def offset_shape(shape: Floats, distance: Floats) -> Floats:
     return result
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i1 f1 f2 f3 f1 f f2 f1")
 def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, slope, length):  # type: ignore[no-untyped-def]
     """One step of Newton towards the closest points: y + t F'(y) = x, F(y) = 0.
 
@@ -333,7 +333,7 @@ def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, sl
         y[row, 2] += shortened * (out * nz + along_p * pz + along_q * qz)
 
 
-@njit(error_model="numpy")
+@njit("f2 f1 f2")
 def along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
     """One step of Newton from points x (n, 3) [m] to F = 0 along the gradient, and the largest |F| before it."""
     result, furthest = np.empty((len(x), 3)), 0.0
@@ -354,7 +354,7 @@ def _times(h, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(error_model="numpy")
+@njit("f2 f3 f2 f2 f3")
 def shape_operators(gradient, hessian, forces, normal, shape):  # type: ignore[no-untyped-def]
     """Unit normals n, and shape operators P F'' P / |F'| with P = 1 - n n.
 
