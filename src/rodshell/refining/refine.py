@@ -21,7 +21,6 @@ from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
-from rodshell.refining.load_limits import Deflection, LoadFactor
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress, residuals
 from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
@@ -67,7 +66,6 @@ class Refinement:
         converged: whether no further step would gain much.
         stopped: when and where the search was out of time, or "".
         loaded: gaps before and after under the loads, where it was refined under loads; else None.
-        as_found: whether its stiffnesses are built as they were found, see `built`.
     """
 
     vary: tuple[str, ...]
@@ -81,7 +79,6 @@ class Refinement:
     variables: Design
     stopped: str = ""
     loaded: tuple[Agreement, Agreement] | None = None
-    as_found: bool = False
 
     def __repr__(self) -> str:
         gap = f"{percent_text(self.gap_before.rms_relative)} -> {percent_text(self.gap_after.rms_relative)} rms"
@@ -165,8 +162,7 @@ def refine(
         spent += more
         nearer = chosen is not None and chosen.rms < here.rms
         accepted = (here, chosen) if chosen is not None and nearer else (here,)
-    as_found = any(isinstance(goal, (Deflection, LoadFactor)) for goal in goals)
-    designs = tuple(Candidate(point, built(variables, point, as_found=as_found)) for point in accepted)
+    designs = tuple(Candidate(point, built(variables, point)) for point in accepted)
     after, made = popped_up(stages, designs[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
@@ -175,7 +171,7 @@ def refine(
     names = tuple(family.name for family in families)
     return Refinement(
         names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
-        found.steps, variables, found.stopped, loaded, as_found,
+        found.steps, variables, found.stopped, loaded,
     )  # fmt: skip
 
 
@@ -214,23 +210,20 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
     point, made = here.tried(values, variables.change(values))
     if point is None:
         return None, made + 1
-    return Candidate(point, built(variables, point, as_found=refinement.as_found)), made + 1
+    return Candidate(point, built(variables, point)), made + 1
 
 
-def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
+def built(variables: Design, point: Point) -> Grid:
     """The grid of a design.
 
     A common factor on all stiffnesses changes no unloaded shape, unless joints are springs. It is chosen such that the
     thickest place has the section itself, or more where the lowest eigenvalue would else be lower than before.
-
-    Args:
-        as_found: leave that factor as it is, since limits under loads decide on it.
     """
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
     joint = structure.joint
     springs = any(0.0 < stiffness < inf for stiffness in (joint.shear, joint.out_of_plane, joint.twist))
-    if point.equilibrium.problem.load is None and not springs and not as_found:
+    if point.equilibrium.problem.load is None and not springs:
         profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
         thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)
         least = STIFFER * structure.lowest / float(point.modes.values[0])
