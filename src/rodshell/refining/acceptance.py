@@ -19,7 +19,8 @@ from rodshell.formfinding.pipeline import Agreement, Stages, meshed_again
 from rodshell.progress import Progress, silent
 from rodshell.refining.gates import GATES, LARGEST_ERROR, SPAN_ERROR, Gates, gates, span_lengths, worst_with_errors
 from rodshell.refining.gauss_newton import Step
-from rodshell.refining.refine import LEAST_EIGENVALUE, Candidate, Refinement, between, loaded_gap, popped_up, refine
+from rodshell.refining.refine import LEAST_EIGENVALUE, Refinement, alone, between, loaded_gap, popped_up, refine
+from rodshell.refining.structure import Point
 from rodshell.refining.variables import Family
 from rodshell.units import length_text, percent_text
 
@@ -129,7 +130,7 @@ def refined(
             progress(stage, f"patch {name}, {detail}", residual)
 
         parts[name] = _of_piece(patch, vary, end, asked, None, of_patch)
-        patches[name] = parts[name].after if parts[name].changed else _alone(patch, end)
+        patches[name] = parts[name].after if parts[name].changed else alone(patch, end)
     every = list(parts.values())
     changed = any(part.changed for part in every)
     loaded = tuple(Agreement.of_all(gaps) for gaps in zip(*(part.loaded for part in every), strict=True))
@@ -152,7 +153,7 @@ def _of_piece(
     _check_error(stages, asked.span_error)
     progress("refine", ", ".join(names), 0.0)
     if ends in stages.popped and not stages.popped[ends].report.stable:
-        judged = gates(_alone(stages, ends), span_error=asked.span_error, progress=progress)
+        judged = gates(alone(stages, ends), span_error=asked.span_error, progress=progress)
         return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
     first = best = last = _searched(stages, vary, ends, asked, start, LEAST_EIGENVALUE, progress)
     firmer, again = list(FIRMER), stages
@@ -170,7 +171,7 @@ def _of_piece(
         nearer = last.changed and (not best.changed or last.gap_after.rms < best.gap_after.rms)
         best = replace(last if nearer else best, factorizations=made[0], gate_factorizations=made[1])
     if not best.changed:
-        refused, more = _explained(first.refused, _alone(stages, ends), asked)
+        refused, more = _explained(first.refused, alone(stages, ends), asked)
         more += best.gate_factorizations
         return replace(
             best, before=stages, after=stages, refused=refused, gate_factorizations=more, stopped=last.stopped
@@ -223,7 +224,7 @@ def _searched(
         late = _Late(silent if found.stopped else progress, found.stopped)
         form, design, judged, refused, made = _accepted(found, asked.span_error, late)
     except ConvergenceError as lost:
-        judged = gates(_alone(stages, ends), span_error=asked.span_error, progress=progress)
+        judged = gates(alone(stages, ends), span_error=asked.span_error, progress=progress)
         names = tuple(family.name for family in vary)
         return Refined(names, ends, stages, stages, judged.passed, f"stable: {lost}", 0, judged.factorizations)
     except KeyboardInterrupt as stopped:
@@ -232,7 +233,7 @@ def _searched(
     if found.loaded is not None:
         before = found.loaded[0]
         loaded = (before, before if form is None or design is None else loaded_gap(form, design, ends))
-    values = () if design is None else tuple(design.point.values.tolist())
+    values = () if design is None else tuple(design.values.tolist())
     return Refined(
         found.vary, ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
         late.said, values, loaded,
@@ -249,7 +250,7 @@ def _where(best: list[Step]) -> str:
 
 def _accepted(
     found: Refinement, span_error: float | None, progress: Progress
-) -> tuple[Stages | None, Candidate | None, Gates, str, int]:
+) -> tuple[Stages | None, Point | None, Gates, str, int]:
     """The best design that passes all gates, and its form, or None; its gates, or those of the best one found; why that
     one was refused; and the factorisations that all took.
 
@@ -258,7 +259,7 @@ def _accepted(
     """
     before = found.gap_before if found.loaded is None else found.loaded[0]
     least = NEARER * before.rms_relative
-    nearer = [design for design in found.designs if design.point.rms < least]
+    nearer = [design for design in found.designs if design.rms < least]
     if not nearer:
         judged = gates(found.before, span_error=span_error, progress=progress)
         return None, None, judged, "no nearer design was found", judged.factorizations
@@ -270,7 +271,7 @@ def _accepted(
         form, judged, more = _judged(found, design, span_error, False, progress)
         made += more
         if judged.open:
-            accepted, low, least = (form, design, judged), design, design.point.rms
+            accepted, low, least = (form, design, judged), design, design.rms
             break
         refused = design
     for _ in range(HALVINGS):
@@ -284,8 +285,8 @@ def _accepted(
             refused = middle
             continue
         low = middle
-        if middle.point.rms < least:
-            accepted, least = (form, middle, judged), middle.point.rms
+        if middle.rms < least:
+            accepted, least = (form, middle, judged), middle.rms
     if accepted is None:
         return None, None, best, best.reason, made
     return *accepted, best.reason, made
@@ -305,22 +306,16 @@ class _Late:
                 self.said = str(late)
 
 
-def _some(designs: Sequence[Candidate]) -> list[Candidate]:
+def _some(designs: Sequence[Point]) -> list[Point]:
     """At most `EARLIER` of a row of designs: the first, the last, and those evenly between them."""
     picked = np.unique(np.linspace(0, len(designs) - 1, min(EARLIER, len(designs))).round().astype(int))
     return [designs[k] for k in picked]
 
 
 def _judged(
-    found: Refinement, design: Candidate, span_error: float | None, all_of_them: bool, progress: Progress
+    found: Refinement, design: Point, span_error: float | None, all_of_them: bool, progress: Progress
 ) -> tuple[Stages, Gates, int]:
     """A design popped up, its gates, and the factorisations of both; tried at all gates, or until one refuses it."""
-    form, spent = popped_up(found.before, design, found.ends)
+    form, spent = popped_up(found.before, found.variables, design, found.ends)
     judged = gates(form, all_of_them=all_of_them, span_error=span_error, progress=progress)
     return form, judged, spent + judged.factorizations
-
-
-def _alone(stages: Stages, ends: Ends) -> Stages:
-    """The same with one end condition."""
-    kept = {end: gap for end, gap in stages.agreement.items() if end == ends}
-    return replace(stages, ends=(ends,), popped={ends: stages.popped[ends]}, agreement=kept)

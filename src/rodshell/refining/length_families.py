@@ -28,8 +28,7 @@ class Stations:
 
     Args:
         shifts: (k, n) displacement of every rod node along its rod by each variable [-].
-        box: of the variables [m].
-        image: where an operation maps the variables.
+        box: (n,) [m].
         across: (m, n) growth of the rods' offsets by each variable [-].
     """
 
@@ -43,11 +42,6 @@ class Stations:
     common = False
 
     def change(self, values: Floats) -> Change:
-        """What a design does.
-
-        Args:
-            values: (n,) the design [m].
-        """
         mesh, held = self.structure.mesh, len(self.structure.held)
         before, after = _edge_entries(mesh)
         slopes = csc_array(self.shifts[after] - self.shifts[before])
@@ -55,11 +49,6 @@ class Stations:
         return replace(none, lengths=slopes @ values, length_slopes=slopes)
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid with these points moved.
-
-        Args:
-            values: (n,) the design [m].
-        """
         return replace(grid, mesh=_restationed(grid.mesh, self.shifts @ values, self.across @ values))
 
 
@@ -105,8 +94,7 @@ class Offsets:
         rows, columns = crossing[:, ::-1].ravel(), pairs.ravel()  # a rod moves the joints on those that it crosses
         moved = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(mesh.stations), count))
         moved.data = np.minimum(moved.data, 1.0)
-        span, zero = usual_span(mesh), np.zeros(count)
-        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        box = Box.about_zero(count, MOST * usual_span(mesh), FIRST * usual_span(mesh))
         across = np.array([(0.0, 1.0) if rod.family == "u" else (1.0, 0.0) for rod in rods])
 
         def image(by: Operation) -> Image:
@@ -130,8 +118,7 @@ class Holes:
         points = np.unique(np.append(holes, np.column_stack([mesh.rod_start, mesh.rod_stop - 1])))
         columns = np.arange(len(holes))
         moved = csr_array((np.ones(len(holes)), (holes, columns)), shape=(len(mesh.stations), len(holes)))
-        span, zero = usual_span(mesh), np.zeros(len(holes))
-        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        box = Box.about_zero(len(holes), MOST * usual_span(mesh), FIRST * usual_span(mesh))
         key = rod[holes] * mesh.node_count + mesh.rod_nodes[holes]
         order = np.argsort(key)
 

@@ -19,19 +19,11 @@ class Objective(Protocol):
     """A part of the sum of squares."""
 
     def residuals(self, here: Point) -> Floats:
-        """(q,) residuals [-].
-
-        Args:
-            here: a design and its equilibrium.
-        """
+        """(q,) residuals [-] at a design and its equilibrium."""
         ...
 
     def slopes(self, here: Point) -> Floats:
-        """(q, n) slopes of the residuals by the variables.
-
-        Args:
-            here: a design and its equilibrium.
-        """
+        """(q, n) slopes of the residuals by the variables."""
         ...
 
 
@@ -120,19 +112,10 @@ class LowestEigenvalue:
 
 
 def residuals(objectives: Sequence[Objective], here: Point) -> Floats:
-    """(q,) residuals of all objectives.
-
-    Args:
-        objectives: what is to be made small.
-        here: a design and its equilibrium.
-    """
+    """(q,) residuals of all objectives, one after the other."""
     return np.concatenate([objective.residuals(here) for objective in objectives])
 
 
 def slopes(objectives: Sequence[Objective], here: Point) -> Floats:
-    """(q, n) derivatives of the residuals of all objectives; parameters as of `residuals`.
-
-    Args:
-        objectives, here: as of `residuals`.
-    """
+    """(q, n) slopes of the residuals of all objectives."""
     return np.concatenate([objective.slopes(here) for objective in objectives])

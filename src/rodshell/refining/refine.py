@@ -45,24 +45,13 @@ Progress = Callable[[Step], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """One design on the way.
-
-    Args:
-        point: its equilibrium on the mesh of the search.
-    """
-
-    point: Point
-    grid: Grid
-
-
-@dataclass(frozen=True, eq=False)
 class Refinement:
     """A shell before and after.
 
     Args:
         before, after: the stages, with the popped-up shell of these ends alone.
-        designs: those that were accepted on the way, the last best; the first is the shell before.
+        designs: those that were accepted on the way, on the mesh of the search, the last best; the first is the shell
+            before.
         converged: whether no further step would gain much.
         stopped: when and where the search was out of time, or "".
         loaded: gaps before and after under the loads, where it was refined under loads; else None.
@@ -72,7 +61,7 @@ class Refinement:
     ends: Ends
     before: Stages
     after: Stages
-    designs: tuple[Candidate, ...]
+    designs: tuple[Point, ...]
     converged: bool
     factorizations: int
     steps: tuple[Step, ...]
@@ -136,15 +125,12 @@ def refine(
     before = structure.lowest if here.equilibrium.problem.load is None else float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
-    goals = [Gap(), *stressed] if objectives is None else list(objectives)
+    goals: list[Objective] = [*([Gap(), *stressed] if objectives is None else objectives), floor]
     stiff = any(family.name in STIFFNESSES for family in families)
     most = (60 if stiff else 30) if most_evaluations is None else most_evaluations
 
     def searched(first: Point) -> Found:
-        return gauss_newton(
-            variables, first, [*goals, floor],
-            allows=floor.allows, lowest_before=before, most=most, progress=progress,
-        )  # fmt: skip
+        return gauss_newton(variables, first, goals, floor, most=most, progress=progress)
 
     found = searched(here)
     accepted = found.accepted
@@ -154,23 +140,21 @@ def refine(
         if opposite is not None:
             other = searched(opposite)
             steps, made = (*found.steps, *other.steps), found.factorizations + other.factorizations
-            nearer = _cost([*goals, floor], other.accepted[-1]) < _cost([*goals, floor], accepted[-1])
+            nearer = _cost(goals, other.accepted[-1]) < _cost(goals, accepted[-1])
             accepted = (here, *other.accepted) if nearer else accepted
             found = replace(other if nearer else found, factorizations=made, steps=steps, stopped=other.stopped)
     if any(sizes is not None for sizes in variables.stock):
-        chosen, more = rounded(variables, accepted[-1], [*goals, floor], floor.allows)
+        chosen, more = rounded(variables, accepted[-1], goals, floor.allows)
         spent += more
         nearer = chosen is not None and chosen.rms < here.rms
         accepted = (here, chosen) if chosen is not None and nearer else (here,)
-    designs = tuple(Candidate(point, built(variables, point)) for point in accepted)
-    after, made = popped_up(stages, designs[-1], ends)
+    after, made = popped_up(stages, variables, accepted[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
-        loaded = loaded_gap(stages, designs[0], ends), loaded_gap(after, designs[-1], ends)
-    held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
+        loaded = loaded_gap(stages, here, ends), loaded_gap(after, accepted[-1], ends)
     names = tuple(family.name for family in families)
     return Refinement(
-        names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
+        names, ends, alone(stages, ends), after, accepted, found.converged, spent + found.factorizations + made,
         found.steps, variables, found.stopped, loaded,
     )  # fmt: skip
 
@@ -193,7 +177,13 @@ def _cost(goals: Sequence[Objective], here: Point) -> float:
     return float(np.sum(residuals(goals, here) ** 2))
 
 
-def between(refinement: Refinement, low: Candidate, high: Candidate, share: float) -> tuple[Candidate | None, int]:
+def alone(stages: Stages, ends: Ends) -> Stages:
+    """The same with one end condition."""
+    kept = {end: gap for end, gap in stages.agreement.items() if end == ends}
+    return replace(stages, ends=(ends,), popped={ends: stages.popped[ends]}, agreement=kept)
+
+
+def between(refinement: Refinement, low: Point, high: Point, share: float) -> tuple[Point | None, int]:
     """A design on the way from one to another.
 
     Args:
@@ -203,14 +193,12 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
         The design, or None where it has no stable equilibrium near the first, or is of sizes in stock; and the
         factorisations that it took.
     """
-    variables, here = refinement.variables, low.point
+    variables = refinement.variables
     if any(sizes is not None for sizes in variables.stock):
         return None, 0
-    values = here.values + share * (high.point.values - here.values)
-    point, made = here.tried(values, variables.change(values))
-    if point is None:
-        return None, made + 1
-    return Candidate(point, built(variables, point)), made + 1
+    values = low.values + share * (high.values - low.values)
+    point, made = low.tried(values, variables.change(values))
+    return point, made + 1
 
 
 def built(variables: Design, point: Point) -> Grid:
@@ -308,16 +296,13 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
     return Point(structure, values, change, edges.at(here.elements), here), made
 
 
-def popped_up(stages: Stages, design: Candidate, ends: Ends) -> tuple[Stages, int]:
+def popped_up(stages: Stages, variables: Design, design: Point, ends: Ends) -> tuple[Stages, int]:
     """The stages of a grid built to a design, and the factorisations that its pop-up took.
-
-    Args:
-        design: what is built, and the equilibrium that was found for it.
 
     Raises:
         InputError: it has no stable equilibrium there after all.
     """
-    grid, here = design.grid, design.point.equilibrium
+    grid, here = built(variables, design), design.equilibrium
     support = stages.popped[ends].support
     shell = Shell.of(grid.mesh, stages.rod, clamped=support.holds_directions, joint=stages.joint)
     shell = shell.with_frames_of(here.elements)
@@ -338,13 +323,13 @@ def popped_up(stages: Stages, design: Candidate, ends: Ends) -> tuple[Stages, in
     return result, found.report.factorizations + made
 
 
-def loaded_gap(stages: Stages, design: Candidate, ends: Ends) -> Agreement:
+def loaded_gap(stages: Stages, design: Point, ends: Ends) -> Agreement:
     """Distance to the target of a shell under the loads that it was refined for.
 
     Args:
         design: of which it is built, with its loaded equilibrium.
     """
-    popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
+    popped, here, structure = stages.popped[ends], design.equilibrium, design.structure
     load = np.zeros_like(popped.state)
     nodes = slice(0, popped.shell.first_angle)
     if structure.weight:

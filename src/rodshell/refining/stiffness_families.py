@@ -34,8 +34,6 @@ class Profiles:
 
     Args:
         variable_of: (m, r) variable that is number r of each rod's profile.
-        stock: the only values that can be built, ascending; None: all within the box.
-        common: whether adding the same to all of them multiplies every stiffness alike.
     """
 
     structure: Structure
@@ -46,33 +44,14 @@ class Profiles:
     common: bool = False
 
     def image(self, by: Operation) -> Image:
-        """Where an operation maps the variables."""
         index = np.empty(len(self.box.start), dtype=np.intp)
         index[self.variable_of] = self.variable_of[by.rods]
         return Image(index, np.ones(len(index)))
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid whose rods have these profiles.
-
-        Args:
-            values: (n,) the design.
-        """
-        return replace(grid, mesh=grid.mesh.with_profiles(self.of_rods(values)))
-
-    def of_rods(self, values: Floats) -> tuple[Profile, ...]:
-        """The profile of each rod.
-
-        Args:
-            values: (n,) the design.
-        """
-        return self._profiles(values[self.variable_of])
+        return replace(grid, mesh=grid.mesh.with_profiles(self._profiles(values[self.variable_of])))
 
     def change(self, values: Floats) -> Change:
-        """What a design does.
-
-        Args:
-            values: (n,) the design.
-        """
         structure, numbers = self.structure, values[self.variable_of]
         none = Change.none(len(structure.mesh.edges), len(structure.held), len(values))
         rods, rows, columns, entries = structure.mesh.edge_rods, list[Ints](), list[Ints](), list[Floats]()
@@ -139,9 +118,7 @@ class Taper:
         else:
             group = np.arange(len(rods))
         variable_of = self.stations * group[:, None] + np.arange(self.stations)
-        count, half = int(variable_of.max()) + 1, 0.5 * np.log(self.ratio)
-        zero = np.zeros(count)
-        box = Box(zero, zero - half, zero + half, zero + 1.0)
+        box = Box.about_zero(int(variable_of.max()) + 1, 0.5 * np.log(self.ratio), 1.0)
         return Profiles(
             structure,
             variable_of,

@@ -131,13 +131,17 @@ class Structure:
 
     @cached_property
     def span_edges(self) -> Ints:
-        """(e,) number of the span between joints that each edge belongs to."""
-        mesh = self.mesh
-        joint = np.zeros(mesh.node_count, dtype=bool)
-        joint[mesh.joint_pairs.ravel()] = True
-        rods, edges = mesh.edge_rods, mesh.edges
-        begins = np.append(True, (rods[1:] != rods[:-1]) | joint[edges[1:, 0]])
-        return np.cumsum(begins) - 1
+        """(e,) as `spans`."""
+        return spans(self.mesh)
+
+
+def spans(mesh: GridMesh) -> Ints:
+    """(e,) number of the span, between two joints or from a joint to an end, that each edge belongs to."""
+    joint = np.zeros(mesh.node_count, dtype=bool)
+    joint[mesh.joint_pairs.ravel()] = True
+    rods = mesh.edge_rods
+    begins = np.append(True, (rods[1:] != rods[:-1]) | joint[mesh.edges[1:, 0]])
+    return np.cumsum(begins) - 1
 
 
 @dataclass(frozen=True, eq=False)
