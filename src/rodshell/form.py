@@ -23,10 +23,7 @@ from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import Layout
 from rodshell.layout.cells import Pattern
-from rodshell.loads.check import (
-    check_shells,  # most forms have no loads
-    unchecked,  # most forms have no loads
-)
+from rodshell.loads.check import LoadChecks, check_shells, unchecked
 from rodshell.loads.combinations import Loads
 from rodshell.loads.strength import net_factors
 from rodshell.output.files import save, wanted_kinds
@@ -34,6 +31,7 @@ from rodshell.output.options import OutputOptions
 from rodshell.output.pictures import picture_svg
 from rodshell.output.viewer import frame_html, scene_of, widget_of
 from rodshell.progress import Progress, require_progress, silent
+from rodshell.refining.acceptance import Refined
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import (
     checked_results,
@@ -52,10 +50,6 @@ from rodshell.validation import instance
 
 if TYPE_CHECKING:
     from anywidget import AnyWidget
-
-    from rodshell.loads.check import LoadChecks
-    from rodshell.loads.combinations import Loads
-    from rodshell.refining.acceptance import Refined
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,11 +73,11 @@ class Form:
     options: OutputOptions
     inputs: Mapping[str, bytes]
     search: Search | None = None
-    refined: "Refined | None" = None
+    refined: Refined | None = None
     reused: tuple[str, ...] = ()
     _known_checks: Checks | None = field(default=None)
     _known_fabrication: Fabricated | None = field(default=None)
-    _known_loaded: "LoadChecks | None" = field(default=None)
+    _known_loaded: LoadChecks | None = field(default=None)
 
     # What was asked for
 
@@ -231,7 +225,7 @@ class Form:
         )
 
     @cached_property
-    def loaded(self) -> "LoadChecks | None":
+    def loaded(self) -> LoadChecks | None:
         """The checks under the loads of the case, None where it has none; made as `checks` are."""
         if self._known_loaded is not None:
             return self._known_loaded
@@ -239,7 +233,7 @@ class Form:
         return None if loads is None else check_loads(self, loads)
 
     @property
-    def known_loaded(self) -> "LoadChecks | None":
+    def known_loaded(self) -> LoadChecks | None:
         """The checks under loads, if they were made."""
         found: LoadChecks | None = self.__dict__.get("loaded", self._known_loaded)
         return found
@@ -412,7 +406,7 @@ class Form:
         return Archive(results, states, self.case.text(), self.inputs)
 
 
-def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "LoadChecks":
+def check_loads(form: Form, loads: Loads, *, progress: Progress = silent) -> LoadChecks:
     """Check a form under loads: deflections, reactions, stability and utilisation under each of their combinations.
 
     Args:

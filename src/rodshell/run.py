@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rodshell.case import Case
 from rodshell.case.case import Built
@@ -18,7 +18,8 @@ from rodshell.formfinding.patches import best_heading, find_patched_stages
 from rodshell.formfinding.search import Search, search
 from rodshell.loads.fixed import fixed_forces
 from rodshell.progress import Progress
-from rodshell.refining.acceptance import refined
+from rodshell.refining.acceptance import Refined, refined
+from rodshell.refining.variables import Family
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
 from rodshell.results.summary import chosen, rod_text
@@ -27,11 +28,6 @@ from rodshell.rods.supports import PINNED
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
 from rodshell.units import length_text
-
-if TYPE_CHECKING:
-    from rodshell.checks.sizing import Fit
-    from rodshell.refining.acceptance import Refined
-    from rodshell.refining.variables import Family
 
 Announce = Callable[[str], None]
 
@@ -129,7 +125,7 @@ class Run:
         left_open = table.held is None and "section" in table.left_open
         return left_open and material is not None and self.asked.permanent_strength(material) is not None
 
-    def _sized(self, rod: Rod, estimate: "Fit", stages_of: Callable[[Rod], Stages]) -> "tuple[Rod, Fit, Stages]":
+    def _sized(self, rod: Rod, estimate: Fit, stages_of: Callable[[Rod], Stages]) -> tuple[Rod, Fit, Stages]:
         """The rod whose section is chosen by the bends of shells popped up with it; what it fits; those shells.
 
         Args:
@@ -209,7 +205,7 @@ class Run:
             found.target, found.layout, rod, method=method, anchor=found.anchor, same_drape=same, **options
         )
 
-    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> "Refined | None":
+    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> Refined | None:
         """The refinement of these stages, where the case asks for one."""
         vary: tuple[Family, ...] = built(case.refine)
         if not vary or stages.status != "converged" or not stages.ends:
@@ -256,7 +252,7 @@ class Run:
         )  # fmt: skip
 
     def _made(
-        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: "Refined | None" = None
+        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: Refined | None = None
     ) -> Form:
         """The form, with what it takes over from the earlier one."""
         built = stages if better is None else better.after
@@ -312,7 +308,7 @@ class Run:
             doubt = "" if lengths["spacing"] is None else doubt_of_unit(width, self.asked.rod.given_section, unit)
             self.announce(f"{name}, {length_text(width)} wide{doubt}; {said}")
 
-    def _announce_rod(self, rod: Rod, fit: "Fit | None") -> None:
+    def _announce_rod(self, rod: Rod, fit: Fit | None) -> None:
         """A rod of which the case left something open, and what decided its size."""
         left_open = self.asked.rod.left_open
         if not left_open or fit is None or self.announce is None:

@@ -21,10 +21,14 @@ from rodshell.case.stage_tables import (
 from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
 from rodshell.fabrication.settings import Fabrication
+from rodshell.loads.combinations import Loads
 from rodshell.loads.settings import LockedJoints, Stability, Strength
 from rodshell.output.settings import CheckOptions, DrawingStyle
 from rodshell.progress import Progress, silent
+from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.joints import Ball, JointKind
+from rodshell.rods.materials import Material
+from rodshell.rods.section import Rod
 from rodshell.rods.supports import Support, supports_of
 from rodshell.schema import read, undescribed, written
 from rodshell.units import length_text, shown
@@ -34,10 +38,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.methods import Method
     from rodshell.joints import Joint
     from rodshell.layout import Layout
-    from rodshell.loads.combinations import Loads
     from rodshell.output.options import OutputOptions
-    from rodshell.rods.materials import Material
-    from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
 HEADER = "# The full input of a rodshell job, in SI units. To run it again: rodshell form case.toml\n"
@@ -55,7 +56,7 @@ class Built(NamedTuple):
 
     target: "Target"
     layout: "Layout"
-    rod: "Rod"
+    rod: Rod
     joint: "Joint"
     method: "Method"
     anchor: tuple[float, float] | None
@@ -146,7 +147,7 @@ class Case:
         *,
         anchor: tuple[float, float] | None = None,
         progress: Progress = silent,
-    ) -> "Rod":
+    ) -> Rod:
         """The rod; material and section that were left to the target are chosen by the bends of its net."""
         if self.rod.held is not None:
             rod: Rod = self.rod.held.value
@@ -154,10 +155,8 @@ class Case:
         fit = partial(self.fit_on, target, layout, anchor=anchor, progress=progress)
         return self.rod.build(fit, strength=self.permanent_strength)
 
-    def permanent_strength(self, material: "Material") -> float | None:
+    def permanent_strength(self, material: Material) -> float | None:
         """What rods of a material withstand permanently [Pa]: as given, or by the building code of a preset."""
-        from rodshell.rods.design_strength import permanent_strength
-
         given = self.strength.permanent or self.checks.strength
         return given or permanent_strength(material, self.strength.service_class)
 
@@ -174,7 +173,7 @@ class Case:
 
         return Fit.on(target, layout, anchor=anchor, joint=self.joint, progress=progress)
 
-    def with_rod(self, rod: "Rod") -> "Case":
+    def with_rod(self, rod: Rod) -> "Case":
         """The same case with this rod spelled out."""
         if self.rod.held is not None or not self.rod.left_open:
             return self
@@ -257,7 +256,7 @@ class Case:
         self.require_strength(rod, joint)
         return Built(target, layout, rod, joint, method, anchor, self.supports)
 
-    def require_strength(self, rod: "Rod", joint: "Joint") -> None:
+    def require_strength(self, rod: Rod, joint: "Joint") -> None:
         """InputError where what is said of the strength does not suit the rod, such as bolts as wide as it."""
         options = self.output_options()
         options.require_known_stress(rod, joint)
@@ -310,7 +309,7 @@ class Case:
         """Names of the combinations of loads."""
         return tuple(row.name for row in self.combinations)
 
-    def built_loads(self) -> "Loads | None":
+    def built_loads(self) -> Loads | None:
         """What the shell is to be checked under; None where the case has no loads.
 
         Raises:
@@ -318,8 +317,6 @@ class Case:
         """
         if not self.loads and not self.combinations:
             return None
-        from rodshell.loads.combinations import Loads
-
         for tables, rows in (("loads", self.loads), ("combinations", self.combinations)):
             names = [row.name for row in rows]
             for name in names:

@@ -6,12 +6,13 @@ An update while somebody drags costs little more than net and drape.
 from collections.abc import Mapping
 from functools import partial
 from math import degrees
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
+from rodshell.form import Form
 from rodshell.layout import GridMesh
 from rodshell.output.colour_scale import Colour, gap_scale
 from rodshell.output.grid import CAPTIONS, Shape, supported
@@ -21,9 +22,6 @@ from rodshell.results import wording
 from rodshell.results.from_form import rod_type
 from rodshell.targets import Target
 from rodshell.targets.surface_mesh import BEYOND, surface_mesh
-
-if TYPE_CHECKING:
-    from rodshell.form import Form
 
 Figures = list[tuple[str, str]]
 Surface = tuple[NDArray[np.float32], Ints]  # points [m] and triangles
@@ -40,7 +38,7 @@ class Preview:
             np.zeros((0, 3), dtype=np.intp),
         )
 
-    def of(self, form: "Form") -> tuple[dict[str, Any], bytes]:
+    def of(self, form: Form) -> tuple[dict[str, Any], bytes]:
         """Facts and scene of a form.
 
         Args:
@@ -56,7 +54,7 @@ class Preview:
         }
         return facts, self._scene(form)
 
-    def _scene(self, form: "Form") -> bytes:
+    def _scene(self, form: Form) -> bytes:
         mesh, draped, target = form.footprint.mesh, form.boundary.draped, form.target
         if draped is None:
             return b""
@@ -100,7 +98,7 @@ class Preview:
         return self._surface
 
 
-def figures(form: "Form") -> Figures:
+def figures(form: Form) -> Figures:
     """Figures of a form in words, by their names."""
     rods, rounding = form.footprint.rods, rounding_of(form)
     stages = form.stages
@@ -123,13 +121,13 @@ def gap(ends: str, largest: float | None, relative: float | None, rounding: word
     return f"largest gap, {ends}", f"{shown} ({wording.percent(relative)} of the size)"
 
 
-def rounding_of(form: "Form") -> wording.Rounding:
+def rounding_of(form: Form) -> wording.Rounding:
     """How finely lengths of a form are shown."""
     longest = max((rod.length for rod in form.footprint.rods), default=0.0)
     return wording.rounding_to(form.options.drawings.tolerance, longest)
 
 
-def plan(form: "Form") -> list[dict[str, Any]]:
+def plan(form: Form) -> list[dict[str, Any]]:
     """The flat grid: rods by name with both ends (x, y) and the cut length [m]; empty if the rods do not lie flat."""
     if (flat := form.flat_state) is not None and not flat.lies_flat:
         return []
@@ -141,7 +139,7 @@ def plan(form: "Form") -> list[dict[str, Any]]:
     ]
 
 
-def handles(form: "Form") -> Mapping[str, Any] | None:
+def handles(form: Form) -> Mapping[str, Any] | None:
     """Where the handles of anchor, heading and base plane stand; None for a form in patches."""
     if form.seams:
         return None
