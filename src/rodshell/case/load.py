@@ -67,7 +67,7 @@ _CASE_FILE = ".toml"
 FILES = f"a case ({_CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
 FILE_KEYS = file_keys()
 
-_TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
+TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
 """What a case about a table of rods has, in place of a target with its layout and drape."""
 
 RENAMED: dict[str, str] = {}
@@ -163,10 +163,10 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
 def require_keys_of_rods(changes: Mapping[str, object]) -> None:
     """InputError for a key that a table of rods does not use; unknown keys are left to the case."""
     for path, value in changes.items():
-        if path in case_keys() and path.partition(".")[0] not in _TABLES_OF_RODS:
+        if path in case_keys() and path.partition(".")[0] not in TABLES_OF_RODS:
             raise InputError(
                 f"{path} = {shown(value)}: a table of rods does not use this key: leave it out, or change one of "
-                f"{', '.join(f'[{name}]' for name in _TABLES_OF_RODS)}"
+                f"{', '.join(f'[{name}]' for name in TABLES_OF_RODS)}"
             )
 
 

@@ -1,7 +1,7 @@
 """Options of the commands: keys of the case file, and those that several commands have."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
@@ -10,8 +10,10 @@ from typing import Any
 import click
 
 from rodshell.case import CaseKey, case_keys, load_case
-from rodshell.case.keys import BY_KIND
+from rodshell.case.keys import BY_KIND, keys_of_kinds
 from rodshell.errors import InputError
+from rodshell.schema import written
+from rodshell.units import parse_quantity
 
 ALIASES = {
     "target.radius": "--radius",
@@ -81,28 +83,19 @@ def _exists(option: click.Option, arguments: tuple[str, ...]) -> bool:
     """Whether the case that a command line names has the key of an option, so that it may be proposed."""
     if not isinstance(option, CaseOption) or not option.key.kinds:
         return True
-    kinds = _kinds_of(arguments)
-    return kinds is None or kinds[option.key.table] in option.key.kinds
+    known = _keys_with(arguments)
+    return known is None or option.key.path in known
 
 
 @cache
-def _kinds_of(arguments: tuple[str, ...]) -> dict[str, str] | None:
-    """The kinds of the tables that have several, in the case that a command line names; None where there is none."""
+def _keys_with(arguments: tuple[str, ...]) -> Mapping[str, CaseKey] | None:
+    """The keys that the case has which a command line names; None where there is none."""
     given = dict(pairwise(arguments))
     overrides = {f"{table}.kind": kind for table in BY_KIND if (kind := given.get(f"--{table}.kind"))}
     try:
-        case = load_case(arguments[0], overrides)
+        return keys_of_kinds(written(load_case(arguments[0], overrides)))
     except InputError:
         return None
-    section = getattr(case.bracing, "section", None)
-    return {
-        "target": case.target.kind,
-        "layout": case.layout.kind,
-        "rod.section": case.rod.section.kind,
-        "joint": case.joint.kind,
-        "bracing": case.bracing.kind,
-        "bracing.section": BY_KIND["bracing.section"] if section is None else section.kind,
-    }
 
 
 def case_options(*tables: str) -> list[click.Parameter]:
@@ -130,10 +123,6 @@ class RunOptions:
     force: bool
     as_json: bool
     quiet: bool
-
-    def into(self, folder: str) -> "RunOptions":
-        """The same with another folder for the results."""
-        return replace(self, out=folder)
 
 
 FORCE = click.option(
@@ -206,8 +195,6 @@ def seconds_of(given: str | None) -> float | None:
     Raises:
         InputError: it is not a time, or not a positive one.
     """
-    from rodshell.units import parse_quantity
-
     seconds = None if given is None else parse_quantity(given, "time", "--time-limit")
     if seconds is not None and seconds <= 0:
         raise InputError(f'--time-limit = "{given}": must be larger than zero')
