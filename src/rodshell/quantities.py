@@ -333,4 +333,5 @@ InertiaPerLength = Annotated[float, quantity("inertia per length", not_negative)
 Density = Annotated[float, quantity("density", positive)]
 Acceleration = Annotated[float, quantity("acceleration", positive)]
 Duration = Annotated[float, quantity("time", positive)]
+Memory = Annotated[float, quantity("memory", positive)]
 KelvinChange = Annotated[float, quantity("temperature")]

@@ -163,7 +163,7 @@ def read_span(key: str, given: Mapping[str, Any], base: Job, known: Sequence[str
 
 def _evenly(span: Span, count: object) -> list[Any]:
     """So many values from one end to the other."""
-    count = _count(f"axes {shown(span.key)}: count", count, 2)
+    count = count_of(f"axes {shown(span.key)}: count", count, 2)
     values = [span.at(k / (count - 1)) for k in range(count)]
     if len(set(values)) < count:
         raise InputError(f"axes {shown(span.key)}: count = {count}: there are fewer whole numbers from from to to")
@@ -178,8 +178,8 @@ def _sampled(spans: Sequence[Span], sample: Mapping[str, Any]) -> Axis:
     if "count" not in sample:
         raise InputError("sample.count is missing: give the number of designs to be drawn")
     method = choice("sample.method", sample.get("method", METHODS[0]), METHODS)
-    count = _count("sample.count", sample["count"], 2)
-    shares = drawn_shares(method, len(spans), count, _count("sample.seed", sample.get("seed", 0), 0))
+    count = count_of("sample.count", sample["count"], 2)
+    shares = drawn_shares(method, len(spans), count, count_of("sample.seed", sample.get("seed", 0), 0))
     return Axis(
         tuple(span.key for span in spans),
         tuple(tuple(span.drawn(float(u)) for span, u in zip(spans, row, strict=True)) for row in shares),
@@ -291,7 +291,8 @@ def _numbers(value: object) -> tuple[float, ...]:
     return tuple(items) if real else ()
 
 
-def _count(name: str, value: object, least: int) -> int:
+def count_of(name: str, value: object, least: int) -> int:
+    """A count from a table; InputError for anything but a whole number of at least so many."""
     if type(value) is not int or value < least:
         raise InputError(f"{name} = {shown(value)}: give a whole number of at least {least}")
     if value > MOST:

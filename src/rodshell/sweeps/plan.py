@@ -2,57 +2,53 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from importlib.util import find_spec
 from itertools import product
 from math import prod
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from rodshell.case import BUILT_IN
 from rodshell.case.load import flattened, toml_of
 from rodshell.errors import InputError
 from rodshell.figures.findings import CODES
 from rodshell.job import Job
+from rodshell.quantities import Duration, Memory, Value
+from rodshell.schema import Place, read
 from rodshell.sweeps.axes import BASE, Axis, read_axes
 from rodshell.sweeps.columns import NUMBERS, Column, read_columns
-from rodshell.units import parse_quantity, shown
+from rodshell.units import shown
 from rodshell.untrusted import read_text
 from rodshell.validation import choice, choices_of, file_path
 
-_EngineName = Literal["processes", "dask"]
-_Keep = Literal["none", "best", "all"]
-_Until = Literal["pop-up", "fabrication"]
 Source = str | PathLike[str] | Mapping[str, Any]
 GENERATION = "generation"
 TABLES = ("base", "columns", "axes", "sample", "run")
-RUN = ("engine", "workers", "keep", "best", "without", "until", "time_limit", "memory_limit")
+
+
+def _workers(given: object) -> int:
+    if type(given) is not int or not 1 <= given <= 1024:
+        raise ValueError("give a number of processes from 1 to 1024")
+    return given
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How jobs are run.
+    """How jobs are run: the table [run]."""
 
-    Args:
-        engine: "processes" on this machine, or "dask".
-        workers: number of jobs at the same time, on this machine.
-        keep: which forms are kept as result folders.
-        best: the column whose smallest value is the best form's.
-        without: codes of findings; a form whose verdict has any of them is not the best.
-        until: the last stage of a job, see `Job.run`; with "pop-up" there is no verdict.
-        time_limit: longest time of one job [s]; memory_limit : largest memory of one job [B]; None: no limit.
-    """
-
-    engine: _EngineName = "processes"
-    workers: int = 1
-    keep: _Keep = "none"
-    best: str = "rms_pinned"
-    without: tuple[str, ...] = ()
-    until: _Until = "fabrication"
-    time_limit: float | None = None
-    memory_limit: float | None = None
+    engine: Annotated[Literal["processes", "dask"], "processes of this machine, or a dask cluster"] = "processes"
+    workers: Annotated[int, Value(_workers), "number of jobs at the same time, on this machine"] = 1
+    keep: Annotated[Literal["none", "best", "all"], "forms that are kept as result folders"] = "none"
+    best: Annotated[str, "column whose smallest value is the best form's"] = "rms_pinned"
+    without: Annotated[tuple[str, ...], Value(tuple), "codes of findings that the best form has none of"] = ()
+    until: Annotated[
+        Literal["pop-up", "fabrication"], "last stage of a job, as of `Job.run`; a pop-up has no verdict"
+    ] = "fabrication"
+    time_limit: Annotated[Duration | None, "longest time of one job"] = None
+    memory_limit: Annotated[Memory | None, "largest memory of one job"] = None
 
 
 @dataclass(frozen=True)
@@ -233,7 +229,7 @@ def read_settings(given: Mapping[str, Any], columns: Sequence[str]) -> Settings:
     """The table [run].
 
     Args:
-        given: the table; columns : names of columns in addition to those of every sweep.
+        columns: names of columns in addition to those of every sweep.
 
     Raises:
         InputError: an unknown key, or a value that cannot be used.
@@ -243,37 +239,15 @@ def read_settings(given: Mapping[str, Any], columns: Sequence[str]) -> Settings:
             f"run.address = {shown(given['address'])}: a scheduler can run any program here, so that no file names it: "
             "leave it out, and type --address ADDRESS where you trust what answers there"
         )
-    known("run", given, RUN)
-    engine: _EngineName = choice("run.engine", given.get("engine", "processes"), get_args(_EngineName))
-    workers = given.get("workers", 1)
-    if type(workers) is not int or not 1 <= workers <= 1024:
-        raise InputError(f"run.workers = {shown(workers)}: give a number of processes from 1 to 1024")
-    until = choice("run.until", given.get("until", "fabrication"), get_args(_Until))
+    known("run", given, [each.name for each in fields(Settings)])
     without = choices_of("run.without", given.get("without", ()), tuple(CODES))
-    if without and until == "pop-up":
+    settings = read(Settings, {**given, "without": without}, Place("run"))
+    choice("run.best", settings.best, (*NUMBERS, *columns))
+    if settings.without and settings.until == "pop-up":
         raise InputError('run.without needs the verdict, which run.until = "pop-up" leaves out: leave one out')
-    return Settings(
-        engine=engine,
-        workers=workers,
-        keep=choice("run.keep", given.get("keep", "none"), get_args(_Keep)),
-        best=choice("run.best", given.get("best", "rms_pinned"), (*NUMBERS, *columns)),
-        without=without,
-        until=until,
-        time_limit=_limit(given, "time_limit", "time"),
-        memory_limit=_limit(given, "memory_limit", "memory"),
-    )
-
-
-def _limit(given: Mapping[str, Any], name: str, kind: Literal["time", "memory"]) -> float | None:
-    value = given.get(name)
-    if value is None:
-        return None
-    limit = parse_quantity(value, kind, f"run.{name}")
-    if limit <= 0:
-        raise InputError(f"run.{name} = {shown(value)}: must be larger than zero")
-    if kind == "memory" and find_spec("psutil") is None:
-        raise InputError(f'run.{name} needs the package psutil: pip install "rodshell[sweep]"')
-    return limit
+    if settings.memory_limit is not None and find_spec("psutil") is None:
+        raise InputError('run.memory_limit needs the package psutil: pip install "rodshell[sweep]"')
+    return settings
 
 
 def table(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:

@@ -15,7 +15,7 @@ from rodshell.sweeps.identity import job_identity
 from rodshell.sweeps.plan import Settings, Source, SweepPlan, read_plan
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.store import FOUND, STORE, Store
-from rodshell.sweeps.table import header_notes, header_of, names_of, table_rows
+from rodshell.sweeps.table import Sheet, header_notes
 from rodshell.validation import file_path
 
 _BEST = "best"
@@ -164,12 +164,10 @@ def _keep_best(plan: SweepPlan, computation: Computation) -> None:
 
 def best_jobs(store: Store, settings: Settings) -> list[str]:
     """The jobs that converged, can be built, and are without the findings that are not wanted, the best first."""
-    keys, columns = header_of(store)
-    place = names_of(keys, columns).index(settings.best)
     found = dict[str, float]()
-    for design, row in zip(store.finished(), table_rows(store, columns), strict=True):
-        if is_usable(design.row, settings.without) and isinstance(row[place], int | float):
-            found[design.job] = float(row[place])
+    for design, cells in Sheet(store).rows():
+        if is_usable(design.row, settings.without) and isinstance(value := cells[settings.best], int | float):
+            found[design.job] = float(value)
     return sorted(found, key=lambda job: found[job])
 
 

@@ -29,7 +29,6 @@ from rodshell.validation import file_path
 
 FRONT = "front.csv"
 _MOST_SHOWN = 10  # designs of the front in text
-DIFFERENCE, CROSSED = 0.6, 0.9
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ def optimise(
         computation.compute(computation.archived(kept), "best designs", len(kept))
         names = list(dict.fromkeys([*plan.keys[1:], *objectives, "verdict", *(c.name for c in plan.columns), JOB]))
         rows = tuple(dict(zip(names, _cells(plan, design, names), strict=True)) for design in front)
-        write_csv(folder / FRONT, names, (list(row.values()) for row in rows))
+        write_csv(folder / FRONT, names, rows)
         found = Optimised(folder, store.count(), computed, feasible, rows)
         if report:
             page = Page(
@@ -134,15 +133,9 @@ def optimise(
 def _algorithm(plan: SearchPlan) -> AskTell:
     dimensions, violations = len(plan.variables), 1 + len(plan.constraints)
     first = drawn_shares("latin-hypercube", dimensions, plan.population, plan.seed)
-    lower, upper = np.zeros(dimensions), np.ones(dimensions)
+    cube = np.zeros(dimensions), np.ones(dimensions)
     try:
-        if len(plan.objectives) == 1:
-            return AskTell.differential_evolution(
-                lower, upper, first, constraints=violations, seed=plan.seed, difference=DIFFERENCE, crossed=CROSSED
-            )
-        return AskTell.nsga2(
-            lower, upper, first, objectives=len(plan.objectives), constraints=violations, seed=plan.seed
-        )
+        return AskTell(*cube, first, objectives=len(plan.objectives), constraints=violations, seed=plan.seed)
     except ImportError:
         raise InputError('optimise needs the package pymoo: pip install "rodshell[optimise]"') from None
 

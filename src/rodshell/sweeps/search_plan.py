@@ -11,13 +11,14 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.figures.findings import CODES
 from rodshell.job import Job
-from rodshell.sweeps.axes import Axis, Span, flat_keys, read_listed, read_span
+from rodshell.sweeps.axes import Axis, Span, count_of, flat_keys, read_listed, read_span
 from rodshell.sweeps.columns import FINDINGS, NUMBERS, STANDARD, number_of, read_column, read_columns
 from rodshell.sweeps.plan import GENERATION, Plan, Source, known, read_origin, read_settings, table
 from rodshell.units import shown
 from rodshell.validation import choices_of
 
 TABLES = ("base", "columns", "variables", "objectives", "constraints", "search", "run")
+COUNTS = {"population": (24, 4), "generations": (20, 1), "seed": (0, 0)}  # of a search, and the least of each
 _BELOW_ONE = 1 - 1e-12
 FAR = 1e3  # violation of a design without a form: larger than that of any constraint
 
@@ -117,11 +118,11 @@ def read_search(source: Source) -> SearchPlan:
         raise InputError("run.best: a search has objectives, which say what is best: leave it out")
     if "without" in run:
         raise InputError("run.without: a search has constraints: give findings = { without = [...] } there")
-    known("search", search, ("population", "generations", "seed"))
+    known("search", search, tuple(COUNTS))
     plan = SearchPlan(
         origin, keys, columns, read_settings(run, [column.name for column in columns]),
         variables, objectives, constraints,
-        _whole(search, "population", 24, 4), _whole(search, "generations", 20, 1), _whole(search, "seed", 0, 0),
+        *(count_of(f"search.{name}", search.get(name, default), least) for name, (default, least) in COUNTS.items()),
     )  # fmt: skip
     for corner in (0.0, 0.5, 1.0):
         plan.job(plan.values(1, np.full(len(variables), corner)))
@@ -181,10 +182,3 @@ def _constraint(column: str, given: Any) -> Constraint:
         if not isinstance(bound, int | float) or isinstance(bound, bool):
             raise InputError(f"constraints {shown(column)}: {name} = {shown(bound)}: give a number in SI")
     return Constraint(column, low=given.get("min"), high=given.get("max"))
-
-
-def _whole(given: Mapping[str, Any], name: str, default: int, least: int) -> int:
-    value = given.get(name, default)
-    if type(value) is not int or value < least:
-        raise InputError(f"search.{name} = {shown(value)}: give a whole number of at least {least}")
-    return value
