@@ -257,7 +257,7 @@ class Run:
         """The form, with what it takes over from the earlier one."""
         built = stages if better is None else better.after
         form = Form(case, self.asked, built, self.options, self.inputs, searched, better)
-        earlier = self.earlier
+        earlier, known = self.earlier, dict[str, Any]()
         if earlier is None:
             return form
         reused = ["target"] if "target" in same else []
@@ -275,8 +275,8 @@ class Run:
                 loaded = earlier.known_loaded if "loads" in same else None
                 loaded = None if loaded is None or loaded.stopped else loaded
                 reused += ["loads"] if "loads" in same and (loaded is not None or not case.loads) else []
-                form = replace(form, _known_checks=checks, _known_fabrication=made, _known_loaded=loaded)
-        return replace(form, reused=tuple(reused))
+                known = {"checks": checks, "fabrication": made, "loaded": loaded}
+        return replace(form, reused=tuple(reused)).knowing(**known)
 
     def _unchanged(self, case: Case) -> list[str]:
         """The stages up to the first one whose part of the decided case has changed."""

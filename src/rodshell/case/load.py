@@ -450,11 +450,14 @@ def _wanted_in(folder: Path) -> str:
 def _from_its_folder(path: Path, raw: _Raw) -> _Raw:
     """Files that a case names lie in its own folder, unless they are given from the root; of a shell's pipe, here."""
     folder = Path() if path.parent.parts[:2] in (("/", "dev"), ("/", "proc")) else path.parent
+    for table, key in named_files(raw):
+        table[key] = str(folder / table[key])
+    return raw
+
+
+def named_files(raw: _Raw) -> Iterator[tuple[_Raw, str]]:
+    """Where the tables of a case name files to be read: the table and its key."""
     for name, keys in FILE_KEYS.items():
         table = raw.get(name)
-        if not isinstance(table, dict):
-            continue
-        for key in keys:
-            if isinstance(table.get(key), str):
-                table[key] = str(folder / table[key])
-    return raw
+        if isinstance(table, dict):
+            yield from ((table, key) for key in keys if isinstance(table.get(key), str))

@@ -44,15 +44,7 @@ class Preview:
         Args:
             form: of a target; with or without popped-up shells.
         """
-        facts = {
-            "name": form.case.drawings.name or form.target.name,
-            "status": form.status,
-            "warnings": list(form.warnings),
-            "figures": figures(form),
-            "plan": plan(form),
-            "handles": handles(form),
-        }
-        return facts, self._scene(form)
+        return facts(form), self._scene(form)
 
     def _scene(self, form: Form) -> bytes:
         mesh, draped, target = form.footprint.mesh, form.boundary.draped, form.target
@@ -96,6 +88,18 @@ class Preview:
             points, faces = surface_mesh(target, draped)
             self._target, self._around, self._surface = target, box, (points.astype(np.float32), faces)
         return self._surface
+
+
+def facts(form: Form) -> dict[str, Any]:
+    """What the page says of a form, checked or not."""
+    return {
+        "name": form.case.drawings.name or form.target.name,
+        "status": form.status,
+        "warnings": list(form.warnings),
+        "figures": figures(form),
+        "plan": plan(form),
+        "handles": handles(form),
+    }
 
 
 def figures(form: Form) -> Figures:

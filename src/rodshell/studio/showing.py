@@ -10,26 +10,22 @@ from rodshell.results import Archive, wording
 from rodshell.results.verdict import facts as facts_of
 from rodshell.results.wording import rounding_of
 from rodshell.schema import written
-from rodshell.studio.preview import Figures, figures, handles, plan
+from rodshell.studio.preview import Figures, facts
 
 
 def checked(form: Form, job: Job) -> tuple[dict[str, Any], bytes]:
     """Facts and scene of a form with its checks and verdict."""
     archive = form.archive()
     scene, verdict = scene_of(archive), archive.verdict
-    facts = {
-        "name": archive.name,
-        "status": form.status,
-        "warnings": list(form.warnings),
-        "figures": figures(form) + _checked(archive),
-        "plan": plan(form),
-        "handles": handles(form),
+    found = facts(form)
+    found |= {
+        "figures": found["figures"] + _checked(archive),
         "verdict": {"level": verdict.level, "headline": verdict.headline, "reasons": list(verdict.reasons)},
         "facts": facts_of(archive.results),
         "case": job.to_toml(),
         "resolved": _resolved(form),
     }
-    return facts, b"" if scene is None else scene.content()
+    return found, b"" if scene is None else scene.content()
 
 
 def _resolved(form: Form) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -10,7 +10,7 @@ from pathlib import Path
 from rodshell.figures.records import printable
 from rodshell.progress import Progress, silent
 from rodshell.sweeps.columns import CONVERGED, is_usable
-from rodshell.sweeps.computing import Computation, Wanted, opened_computation
+from rodshell.sweeps.computing import Computation, opened_computation
 from rodshell.sweeps.identity import job_identity
 from rodshell.sweeps.plan import Settings, Source, SweepPlan, read_plan
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
@@ -94,12 +94,14 @@ def sweep(
     folder = file_path("out", out)
     if report:
         require_plotly()
-    _check_designs(plan)
+    for _ in plan.designs():  # each case is made, so that none is refused when others were computed
+        pass
     with opened_computation(plan, folder, progress, retry=retry, address=address) as computation:
         store, until = computation.store, plan.settings.until
         designs = ((values, job_identity(job, until)) for values, job in plan.designs())
         store.plan(designs, notes=header_notes(plan.keys, plan.columns))
-        computation.compute(_wanted(plan, computation), "sweep", plan.count)
+        kept = plan.settings.keep == "all"
+        computation.compute((computation.wanted(job, kept=kept) for _, job in plan.designs()), "sweep", plan.count)
         found = swept(store, computation.computed)
         if plan.settings.keep == "best":
             _keep_best(plan, computation)
@@ -108,16 +110,6 @@ def sweep(
             computation.compute(computation.archived(shapes), "shapes of the report", len(shapes))
             write_report(store, _page(plan, found, shapes))
     return found
-
-
-def _check_designs(plan: SweepPlan) -> None:
-    """Make the case of each design, one by one.
-
-    Raises:
-        InputError: a case cannot have its values.
-    """
-    for _ in plan.designs():
-        pass
 
 
 def planned(plan: SweepPlan, out: str | PathLike[str]) -> tuple[int, int]:
@@ -145,10 +137,6 @@ def swept(store: Store, computed: int) -> Swept:
             verdicts[_NO_FORM] += 1
             failures[design.row["status"]] += 1
     return Swept(store.folder, store.count(), computed, dict(verdicts), lost, tuple(failures.most_common()))
-
-
-def _wanted(plan: SweepPlan, computation: Computation) -> Iterator[Wanted]:
-    return (computation.wanted(job, kept=plan.settings.keep == "all") for _, job in plan.designs())
 
 
 def _keep_best(plan: SweepPlan, computation: Computation) -> None:
