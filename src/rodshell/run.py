@@ -1,7 +1,7 @@
 """One run of a case: what is left open is decided, and each stage runs or is taken over from an earlier form."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -53,33 +53,29 @@ SIZED_BY = (*DECIDED_BY, "pop_up", "strength")
 MOST_SIZES = 6  # that are popped up: of like sections the second is right; with elastic joints up to four were needed
 
 
+@dataclass
 class Run:
-    """One run of a case; parameters as of `Job.run`, with the target where it was built before, and what its files held
-    then.
+    """One run of a case; parameters as of `Job.run`.
 
     Args:
+        target: where it was built before.
+        inputs: what the files of the case hold, by their path in it.
+        earlier: from which it starts; one of another kind is left.
         pops_up: False ends it with the drape, trimmed and mapped back.
     """
 
-    def __init__(
-        self,
-        case: Case,
-        target: Target | None,
-        inputs: Mapping[str, bytes] | None,
-        warm_start: Form | None,
-        progress: Progress,
-        announce: Announce | None,
-        frames_in: Path,
-        *,
-        pops_up: bool = True,
-    ) -> None:
-        self.pops_up = pops_up
-        self.asked, self.target, self.progress = case, target, progress
-        self.announce, self.frames_in = announce, frames_in
-        self.inputs = inputs_of(case) if inputs is None else dict(inputs)
-        self.options = case.output_options()
-        self.earlier = warm_start
-        if warm_start is not None and warm_start.from_table != case.of_table:
+    asked: Case
+    target: Target | None
+    inputs: Mapping[str, bytes]
+    earlier: Form | None
+    progress: Progress
+    announce: Announce | None
+    frames_in: Path
+    pops_up: bool
+
+    def __post_init__(self) -> None:
+        self.options = self.asked.output_options()
+        if self.earlier is not None and self.earlier.from_table != self.asked.of_table:
             self.earlier = None
 
     def form(self) -> Form:
@@ -291,7 +287,7 @@ class Run:
         """Whether these tables are as they were, and so are their files; without a decided `case`, as asked for."""
         before, now = (earlier.asked, self.asked) if case is None else (earlier.case, case)
         before, now = before.absolute(), now.absolute()
-        if "target" in tables and (dict(earlier.inputs) != self.inputs or not now.files <= self.inputs.keys()):
+        if "target" in tables and (dict(earlier.inputs) != dict(self.inputs) or not now.files <= self.inputs.keys()):
             return False  # a file too large to be kept may have changed
         return all(getattr(before, name) == getattr(now, name) for name in tables)
 

@@ -26,7 +26,7 @@ from rodshell.case.keys import (
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
 from rodshell.quantities import Polylines, Unit
-from rodshell.schema import read, read_value, written
+from rodshell.schema import read, value_of, written
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import file_path, instance
@@ -263,21 +263,14 @@ def _read_seams(table: _Raw, files: Callable[[object], str] | None) -> None:
         return
     from rodshell.targets.curve_files import read_lines  # here, as most cases have no such file
 
-    unit = _value_of(Unit, "seams.unit", table.pop("unit", 1.0))
-    given = _value_of(Polylines, "seams.lines", table.get("lines", ()))
+    unit = value_of(Unit, "seams.unit", table.pop("unit", 1.0))
+    given = value_of(Polylines, "seams.lines", table.get("lines", ()))
     try:
         drawn = read_lines(file_path("the file", name if files is None else files(name)), unit)
     except InputError as reason:
         raise InputError(f"seams.file = {shown(name)}: {reason}") from None
     del table["file"]
     table["lines"] = [*given, *(line[:, :2].tolist() for line in drawn)]
-
-
-def _value_of(hint: Any, key: str, given: object) -> Any:
-    try:
-        return read_value(hint, given)
-    except ValueError as reason:
-        raise InputError(f"{key} = {shown(given)}: {reason}") from None
 
 
 def _found_table(raw: _Raw, path: str) -> _Raw:

@@ -12,8 +12,8 @@ import click
 from rodshell.case import CaseKey, case_keys, load_case
 from rodshell.case.keys import BY_KIND, keys_of_kinds
 from rodshell.errors import InputError
-from rodshell.schema import written
-from rodshell.units import parse_quantity
+from rodshell.quantities import Duration
+from rodshell.schema import value_of, written
 
 ALIASES = {
     "target.radius": "--radius",
@@ -142,10 +142,7 @@ _LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kin
 
 
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The options of `RunOptions`; read them with `read_output_options`.
-
-    out : help of --out.
-    """
+    """The options of `RunOptions`, with the help of --out; read them with `read_output_options`."""
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         options = (
@@ -177,11 +174,7 @@ def read_output_options(values: dict[str, Any]) -> RunOptions:
 
 
 def wanted_kinds(only: str | None) -> list[str] | None:
-    """The kinds of files that --only names.
-
-    Raises:
-        InputError: there is no such kind.
-    """
+    """The kinds of files that --only names; InputError where there is no such kind."""
     if only is None:
         return None
     from rodshell.output.files import read_kinds
@@ -190,12 +183,5 @@ def wanted_kinds(only: str | None) -> list[str] | None:
 
 
 def seconds_of(given: str | None) -> float | None:
-    """What --time-limit gives [s].
-
-    Raises:
-        InputError: it is not a time, or not a positive one.
-    """
-    seconds = None if given is None else parse_quantity(given, "time", "--time-limit")
-    if seconds is not None and seconds <= 0:
-        raise InputError(f'--time-limit = "{given}": must be larger than zero')
-    return seconds
+    """What --time-limit gives [s]; InputError unless it is a positive time."""
+    return None if given is None else float(value_of(Duration, "--time-limit", given))

@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import sys
 import threading
 from collections.abc import Iterable
 from contextlib import AbstractContextManager
@@ -13,7 +12,6 @@ from itertools import count
 from pathlib import Path
 from shlex import quote
 from time import monotonic
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import click
@@ -24,9 +22,9 @@ from rodshell.cli.options import RunOptions
 from rodshell.errors import InputError
 from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
-from rodshell.printed import Printed, say
+from rodshell.printed import say
+from rodshell.progress import Bar, limited, where
 from rodshell.progress import Progress as ProgressFunction
-from rodshell.progress import limited
 
 if TYPE_CHECKING:
     from rodshell.form import Form
@@ -41,7 +39,7 @@ SEARCH = "search.svg"
 FOUND, BAD_INPUT, NOT_CONVERGED, UNBUILDABLE = 0, 2, 3, 4
 
 
-class Progress:
+class Progress(Bar):
     """Says where a job is: stage, iteration, share, residual, elapsed time.
 
     On a terminal that is one live line; else one short line for each stage, and a long one after each `SILENCE`.
@@ -52,50 +50,44 @@ class Progress:
     """
 
     def __init__(self, *, quiet: bool = False) -> None:
+        super().__init__()
         self._quiet = quiet
         self._begun = self._spoken = monotonic()
-        self._stage = self._where = "preparing"
-        self._live: Printed | None = None
+        self._said = self._where = "preparing"
         self._over = threading.Event()
         self._voice: threading.Thread | None = None
 
     def __enter__(self) -> Self:
         if self._quiet:
             return self
-        stream = Printed.of(sys.stderr)
-        self._live = stream if stream.isatty() else None
+        super().__enter__()
         self._over.clear()
         self._voice = threading.Thread(target=self._speak, args=(TICK if self._live else SILENCE / 10,), daemon=True)
         self._voice.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._over.set()
         if self._voice is not None:
             self._voice.join()
             self._voice = None
-        if self._live is not None:
-            self._live.live("")
-            self._live = None
+        super().__exit__(*error)
 
     def __call__(self, stage: str, detail: str, residual: float) -> None:
         Interruption.check()
-        reached = f", residual {residual:.1e}" if residual else ""
-        self._where = f"{stage}: {detail}{reached}"
-        if stage != self._stage and not self._quiet and self._live is None:
+        self._where = where(stage, detail, residual)
+        if stage != self._said and not self._quiet and self._live is None:
             self._say(stage)
-        self._stage = stage
+        self._said = stage
 
     def _speak(self, every: float) -> None:
         """Say where the job is, however long it has not called."""
         while not self._over.wait(every):
-            where = f"{self._where}, {monotonic() - self._begun:.0f} s"
+            line = f"{self._where}, {monotonic() - self._begun:.0f} s"
             if self._live is not None:
-                self._live.live(where)
+                self._live.live(line)
             elif monotonic() - self._spoken >= SILENCE:
-                self._say(where)
+                self._say(line)
 
     def _say(self, words: str) -> None:
         self._spoken = monotonic()

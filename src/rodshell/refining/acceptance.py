@@ -149,12 +149,10 @@ def _of_piece(
     progress: Progress,
 ) -> Refined:  # fmt: skip
     """Of a form in one piece: where the best design is refused, what refused it is respected in another search."""
-    names = tuple(family.name for family in vary)
     _check_error(stages, asked.span_error)
-    progress("refine", ", ".join(names), 0.0)
+    progress("refine", ", ".join(family.name for family in vary), 0.0)
     if ends in stages.popped and not stages.popped[ends].report.stable:
-        judged = gates(alone(stages, ends), span_error=asked.span_error, progress=progress)
-        return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
+        return _unsearched(stages, vary, ends, asked, progress)
     first = best = last = _searched(stages, vary, ends, asked, start, LEAST_EIGENVALUE, progress)
     firmer, again = list(FIRMER), stages
     while last.refused and not last.stopped:
@@ -224,9 +222,7 @@ def _searched(
         late = _Late(silent if found.stopped else progress, found.stopped)
         form, design, judged, refused, made = _accepted(found, asked.span_error, late)
     except ConvergenceError as lost:
-        judged = gates(alone(stages, ends), span_error=asked.span_error, progress=progress)
-        names = tuple(family.name for family in vary)
-        return Refined(names, ends, stages, stages, judged.passed, f"stable: {lost}", 0, judged.factorizations)
+        return replace(_unsearched(stages, vary, ends, asked, progress), refused=f"stable: {lost}")
     except KeyboardInterrupt as stopped:
         raise KeyboardInterrupt(_where(best) or str(stopped)) from stopped
     loaded: tuple[Agreement, ...] = ()
@@ -238,6 +234,13 @@ def _searched(
         found.vary, ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
         late.said, values, loaded,
     )  # fmt: skip
+
+
+def _unsearched(stages: Stages, vary: Sequence[Family], ends: Ends, asked: _Asked, progress: Progress) -> Refined:
+    """A form in which there is nothing to search, refused as the gates say."""
+    judged = gates(alone(stages, ends), span_error=asked.span_error, progress=progress)
+    names = tuple(family.name for family in vary)
+    return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
 
 
 def _where(best: list[Step]) -> str:

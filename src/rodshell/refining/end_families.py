@@ -16,6 +16,7 @@ from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
 from rodshell.rods.supports import CLAMPED
+from rodshell.targets import Target
 from rodshell.units import shown
 
 MOST_TURN, FIRST_TURN = radians(15.0), radians(1.0)
@@ -143,13 +144,18 @@ class Slides:
     def _placed(self, values: Floats) -> Floats:
         target, points = self.structure.target, self.structure.popped.boundary.points
         height, margin = target.distance(points), target.margin(points)
-        x, step = points + values[:, None] * self.along, PROBE * target.size
+        x = points + values[:, None] * self.along
         for _ in range(CORRECTIONS):
             gap = target.gap(x)
             x = x - (gap.distance - height)[:, None] * gap.normal
-            steep = (target.margin(x + step * self.inwards) - target.margin(x - step * self.inwards)) / (2.0 * step)
-            x = x + ((margin - target.margin(x)) / steep)[:, None] * self.inwards
+            x = x + ((margin - target.margin(x)) / _steepness(target, x, self.inwards))[:, None] * self.inwards
         return x
+
+
+def _steepness(target: Target, points: Floats, axes: Floats) -> Floats:
+    """(k,) growth of the distance from the target's end along unit vectors [-]."""
+    step = PROBE * target.size
+    return np.asarray((target.margin(points + step * axes) - target.margin(points - step * axes)) / (2.0 * step))
 
 
 @dataclass(frozen=True)
@@ -161,14 +167,8 @@ class Supports:
     def on(self, structure: Structure) -> Slides:
         """How far each rod end is moved."""
         target, points = structure.target, structure.popped.boundary.points
-        normals, step = target.gap(points).normal, PROBE * target.size
-        steep = np.stack(
-            [
-                (target.margin(points + step * axis) - target.margin(points - step * axis)) / (2 * step)
-                for axis in np.eye(3)
-            ],
-            axis=1,
-        )
+        normals = target.gap(points).normal
+        steep = np.stack([_steepness(target, points, axis) for axis in np.eye(3)], axis=1)
         inwards = unit(steep - np.einsum("ex,ex->e", steep, normals)[:, None] * normals)
         span = usual_span(structure.mesh)
         box = Box.about_zero(len(points), MOST * span, FIRST * span)

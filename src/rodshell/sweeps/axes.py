@@ -136,8 +136,9 @@ def read_span(key: str, given: Mapping[str, Any], base: Job, known: Sequence[str
     """The interval of a key.
 
     Args:
-        given: { from, to, scale }; known : the names that it may have.
+        given: { from, to, scale }.
         base: a job by whose case quantities are read.
+        known: the names that `given` may have.
 
     Raises:
         InputError: an end is missing or not a number, both are the same, or zero with a logarithmic scale.
@@ -187,10 +188,7 @@ def _sampled(spans: Sequence[Span], sample: Mapping[str, Any]) -> Axis:
 
 
 def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
-    """(count, dimensions) points in the unit cube [0, 1).
-
-    Args:
-        method: one of `METHODS`; dimensions : of the cube; count : of points; seed : of the random numbers.
+    """(count, dimensions) points in the unit cube [0, 1), by one of `METHODS`.
 
     Raises:
         InputError: Sobol points, whose count is not a power of two.
@@ -207,11 +205,10 @@ def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
 
 
 def read_listed(name: str, values: object, base: Job, folder: Path) -> Axis:
-    """An axis of listed values.
+    """An axis of listed values; `base` and `folder` as of `read_axes`.
 
     Args:
         name: of its key; of several keys, "a, b", whose values are rows.
-        values: the list; base, folder : as of `read_axes`.
 
     Raises:
         InputError: it is not such a list.

@@ -22,11 +22,7 @@ DIGITS = 32
 
 
 def job_identity(job: Job, until: str) -> str:
-    """32 hexadecimal digits of SHA-256.
-
-    Args:
-        job: of a case that a file can describe.
-        until: the last stage that is run.
+    """`DIGITS` hexadecimal digits of SHA-256, of a job whose case a file can describe and the last stage that is run.
 
     Raises:
         InputError: a file of the case cannot be read.

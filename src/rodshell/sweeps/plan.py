@@ -110,10 +110,7 @@ class Plan:
         return self.origin.bases[base].changed(changes) if changes else self.origin.bases[base]
 
     def command(self, values: Sequence[Any]) -> str | None:
-        """The command that forms a design alone; None for a base that no command can name.
-
-        values : of its keys.
-        """
+        """The command that forms a design alone, by the values of its keys; None for a base that none can name."""
         base, changes = self._changes(values)
         if (source := self.origin.source(base)) is None:
             return None
@@ -182,7 +179,7 @@ def read_origin(source: Source, tables: Sequence[str]) -> Origin:
     """What a plan is read from.
 
     Args:
-        source: as of `read_plan`; tables : that the file may have.
+        tables: that the file may have.
 
     Raises:
         InputError: it cannot be read, has an unknown key, or its base cannot be used.
@@ -259,11 +256,7 @@ def table(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 
 def known(name: str, given: Mapping[str, Any], names: Sequence[str]) -> None:
-    """InputError for a key that a table does not have.
-
-    Args:
-        name: of the table, "" for the whole file; given : the table; names : of the keys that it has.
-    """
+    """InputError for a key that a table does not have; its name is "" for the whole file."""
     for key in given:
         if key not in names:
             near = get_close_matches(str(key), names, n=1)

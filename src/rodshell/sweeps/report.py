@@ -28,12 +28,13 @@ class Page:
     """What a report says.
 
     Args:
-        kind: of the plan, in its heading; plan : whose designs are shown; summary : lines in its heading.
+        kind, summary: in its heading.
         first: the two columns that are shown first, across and up.
         measures: columns that say how good a design is; of two the front is shown.
         larger: those of them that are to be large, and not small.
         counts: whether a design may be on the front.
-        shapes: jobs whose shapes are shown, kept in archives/; caption : what they are, in a sentence.
+        shapes: jobs whose shapes are shown, kept in archives/.
+        caption: what they are, in a sentence.
     """
 
     kind: str
@@ -56,10 +57,7 @@ def require_plotly() -> None:
 
 
 def write_report(store: Store, page: Page) -> Path:
-    """Write report.html; returns its path.
-
-    Args:
-        store: of the sweep, whose designs it shows; page : what it says.
+    """Write report.html; its path.
 
     Raises:
         OutputError: it cannot be written.

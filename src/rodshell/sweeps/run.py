@@ -27,7 +27,7 @@ class Swept:
 
     Args:
         folder: of the sweep; None: nothing was written.
-        designs: their number; computed : jobs that were computed now.
+        computed: number of jobs that were computed now.
         verdicts: number of designs by verdict, "not checked" and "no form" among them.
         not_converged: number of forms that did not converge.
         failures: sentences of designs without a form, with their number, the most frequent first.
@@ -113,11 +113,7 @@ def sweep(
 
 
 def planned(plan: SweepPlan, out: str | PathLike[str]) -> tuple[int, int]:
-    """Number of different jobs of a sweep, and of those that are finished in a folder already; nothing is written.
-
-    Args:
-        plan: of the sweep; out : its folder, which may be missing.
-    """
+    """Number of different jobs of a sweep, and of those that are finished in its folder, if any; nothing is written."""
     jobs = {job_identity(job, plan.settings.until) for _, job in plan.designs()}
     folder = file_path("out", out)
     if not os.path.lexists(folder / STORE):

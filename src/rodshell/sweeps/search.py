@@ -36,7 +36,7 @@ class Optimised:
     """What a search has come to.
 
     Args:
-        designs: their number; computed : jobs that were computed now.
+        computed: number of jobs that were computed now.
         feasible: number of designs that converged and keep all constraints.
         front: of those, the ones that no other is better than in all objectives, the smallest first objective first: by
             name the values of the variables' keys, objectives, verdict, further columns, and the job.
@@ -82,10 +82,8 @@ def optimise(
     Args:
         source: path of a search file, or its content as a mapping, see docs/sweeps.md.
         out: folder of the search. What an earlier run has finished there is not computed again.
-        retry: run jobs again that were stopped by a limit, or whose process died.
         report: also write report.html, and keep the results of up to twelve designs of the front.
-        address: as of `sweep`.
-        progress: called as progress(stage, detail, 0.0).
+        retry, address, progress: as of `sweep`.
 
     Returns:
         The best designs, also in front.csv; all are in table.csv, see `read_sweep`.
@@ -182,9 +180,6 @@ def front_of(plan: SearchPlan, store: Store) -> tuple[list[Finished], int]:
     """The designs that keep all constraints and that no other is better than, and the number that keep them.
 
     Of designs that are as good in every objective, the first is taken.
-
-    Args:
-        plan: of the search; store : with its designs.
     """
     kept = [
         (_judged(plan, design.outcome, design.row)[0], design)
