@@ -124,8 +124,7 @@ class Case:
 
     def absolute(self) -> Self:
         """The same case, whose files are named from the root."""
-        paths = {key: getattr(self.target, key, None) for key in ("file", "boundary")}
-        rooted: dict[str, Any] = {key: str(Path(path).absolute()) for key, path in paths.items() if path is not None}
+        rooted: dict[str, Any] = {key: str(Path(path).absolute()) for key, path in self._paths.items()}
         return replace(self, target=replace(self.target, **rooted)) if rooted else self
 
     @property
@@ -137,8 +136,13 @@ class Case:
     @property
     def files(self) -> set[str]:
         """The files that the target is read from."""
-        paths = (getattr(self.target, key, None) for key in ("file", "boundary"))
-        return {path for path in paths if path is not None}
+        return set(self._paths.values())
+
+    @property
+    def _paths(self) -> dict[str, str]:
+        """The same by their keys."""
+        paths = {key: getattr(self.target, key, None) for key in ("file", "boundary")}
+        return {key: path for key, path in paths.items() if path is not None}
 
     def rod_on(
         self,

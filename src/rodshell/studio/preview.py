@@ -31,12 +31,7 @@ class Preview:
     """Shows forms one after the other; the triangles of a target are kept while shells lie on the same part of it."""
 
     def __init__(self) -> None:
-        self._target: Target | None = None
-        self._around = np.zeros((2, 2))  # lowest and highest x, y of the shell for which the triangles were made
-        self._surface: tuple[NDArray[np.float32], Ints] = (
-            np.zeros((0, 3), dtype=np.float32),
-            np.zeros((0, 3), dtype=np.intp),
-        )
+        self._kept: tuple[Target, Floats, Surface] | None = None  # with the box, in plan, of the shell of the triangles
 
     def of(self, form: Form) -> tuple[dict[str, Any], bytes]:
         """Facts and scene of a form.
@@ -84,10 +79,10 @@ class Preview:
     def _surface_under(self, target: Target, draped: Floats) -> Surface:
         box = np.array([draped[:, :2].min(axis=0), draped[:, :2].max(axis=0)])
         room = 0.5 * BEYOND * float(np.ptp(box, axis=0).max())
-        if target is not self._target or np.abs(box - self._around).max() > room:
+        if self._kept is None or target is not self._kept[0] or np.abs(box - self._kept[1]).max() > room:
             points, faces = surface_mesh(target, draped)
-            self._target, self._around, self._surface = target, box, (points.astype(np.float32), faces)
-        return self._surface
+            self._kept = target, box, (points.astype(np.float32), faces)
+        return self._kept[2]
 
 
 def facts(form: Form) -> dict[str, Any]:

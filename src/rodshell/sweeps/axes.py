@@ -24,6 +24,7 @@ from rodshell.units import shown
 from rodshell.validation import choice
 
 BASE = "base"
+_BELOW_ONE = 1 - 1e-12
 MOST = 1_000_000  # designs
 METHODS = ("latin-hypercube", "sobol")
 SCALES = ("linear", "log")
@@ -42,6 +43,10 @@ class Axis:
     keys: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
 
+    def row(self, share: float) -> tuple[Any, ...]:
+        """The values at a share of the axis in [0, 1]."""
+        return self.rows[min(int(share * len(self.rows)), len(self.rows) - 1)]
+
 
 @dataclass(frozen=True)
 class Span:
@@ -59,8 +64,17 @@ class Span:
     whole: bool
     scale: str
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Its key, as `Axis.keys`."""
+        return (self.key,)
+
+    def row(self, share: float) -> tuple[Any, ...]:
+        """As `Axis.row`."""
+        return (self.drawn(min(share, _BELOW_ONE) if self.whole else share),)
+
     def at(self, share: float) -> Any:
-        """The value at a share in [0, 1) or of 1 of the interval."""
+        """The value at a share in [0, 1] of the interval."""
         if isinstance(self.low, tuple):
             parts = zip(self.low, self.high, strict=True)
             return tuple(Span(self.key, low, high, self.whole, self.scale).at(share) for low, high in parts)

@@ -19,7 +19,6 @@ from rodshell.validation import choices_of
 
 TABLES = ("base", "columns", "variables", "objectives", "constraints", "search", "run")
 COUNTS = {"population": (24, 4), "generations": (20, 1), "seed": (0, 0)}  # of a search, and the least of each
-_BELOW_ONE = 1 - 1e-12
 FAR = 1e3  # violation of a design without a form: larger than that of any constraint
 
 
@@ -61,11 +60,6 @@ class Constraint:
         return min(max(below, above, 0.0), FAR)
 
 
-def _keys_of(variable: Span | Axis) -> tuple[str, ...]:
-    """The keys of a variable, several where they change together."""
-    return variable.keys if isinstance(variable, Axis) else (variable.key,)
-
-
 @dataclass(frozen=True)
 class SearchPlan(Plan):
     """A whole search; its keys are "generation" and those of its variables.
@@ -84,13 +78,8 @@ class SearchPlan(Plan):
 
     def values(self, generation: int, point: Floats) -> tuple[Any, ...]:
         """Values of the keys at a point (n,) of the unit cube."""
-        found: list[Any] = [generation]
-        for variable, share in zip(self.variables, point.tolist(), strict=True):
-            if isinstance(variable, Axis):
-                found += variable.rows[min(int(share * len(variable.rows)), len(variable.rows) - 1)]
-            else:
-                found.append(variable.drawn(min(share, _BELOW_ONE) if variable.whole else share))
-        return tuple(found)
+        rows = (variable.row(share) for variable, share in zip(self.variables, point.tolist(), strict=True))
+        return (generation, *(value for row in rows for value in row))
 
 
 def read_search(source: Source) -> SearchPlan:
@@ -106,7 +95,7 @@ def read_search(source: Source) -> SearchPlan:
         raise InputError(
             '[variables] is missing: give at least one key, such as "layout.spacing" = { from = "25 mm", to = "35 mm" }'
         )
-    keys = (GENERATION, *(key for variable in variables for key in _keys_of(variable)))
+    keys = (GENERATION, *(key for variable in variables for key in variable.keys))
     objectives = _objectives(table(given, "objectives"))
     constraints = tuple(_constraint(key, value) for key, value in _flat_constraints(table(given, "constraints")))
     columns = read_columns(given.get("columns", ()), keys)
