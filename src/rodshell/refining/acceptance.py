@@ -32,8 +32,10 @@ NEARER = 1.0 - 1e-6  # of the gap before: more is not a gain
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What a refined shell carries when it is to meet its target, and how exactly it is built; see `refined`."""
+    """What is varied, what the shell carries when it meets its target, and how exactly it is built; see `refined`."""
 
+    vary: Sequence[Family]
+    ends: Ends
     weight: float
     dead_loads: Floats | None
     span_error: float | None
@@ -115,10 +117,10 @@ def refined(
     Raises:
         InputError: the form has no target, or no pop-up with these ends; `start` does not fit.
     """
-    asked = _Asked(under_weight, dead_loads, span_error)
     end = stages.ends[0] if ends is None else ends
+    asked = _Asked(vary, end, under_weight, dead_loads, span_error)
     if stages.seams is None:
-        return _of_piece(stages, vary, end, asked, start, progress)
+        return _of_piece(stages, asked, start, progress)
     if start is not None:
         raise InputError("refine.start: each patch of a form has a design of its own: leave it out")
     if dead_loads is not None:
@@ -129,7 +131,7 @@ def refined(
         def of_patch(stage: str, detail: str, residual: float, name: str = name) -> None:
             progress(stage, f"patch {name}, {detail}", residual)
 
-        parts[name] = _of_piece(patch, vary, end, asked, None, of_patch)
+        parts[name] = _of_piece(patch, asked, None, of_patch)
         patches[name] = parts[name].after if parts[name].changed else alone(patch, end)
     every = list(parts.values())
     changed = any(part.changed for part in every)
@@ -144,16 +146,14 @@ def refined(
     )  # fmt: skip
 
 
-def _of_piece(
-    stages: Stages, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
-    progress: Progress,
-) -> Refined:  # fmt: skip
+def _of_piece(stages: Stages, asked: _Asked, start: Sequence[float] | None, progress: Progress) -> Refined:
     """Of a form in one piece: where the best design is refused, what refused it is respected in another search."""
+    ends = asked.ends
     _check_error(stages, asked.span_error)
-    progress("refine", ", ".join(family.name for family in vary), 0.0)
+    progress("refine", ", ".join(family.name for family in asked.vary), 0.0)
     if ends in stages.popped and not stages.popped[ends].report.stable:
-        return _unsearched(stages, vary, ends, asked, progress)
-    first = best = last = _searched(stages, vary, ends, asked, start, LEAST_EIGENVALUE, progress)
+        return _unsearched(stages, asked, progress)
+    first = best = last = _searched(stages, asked, start, LEAST_EIGENVALUE, progress)
     firmer, again = list(FIRMER), stages
     while last.refused and not last.stopped:
         gate = last.refused.partition(":")[0]
@@ -164,7 +164,7 @@ def _of_piece(
         elif gate not in ("tolerance", "from_flat") or not firmer:
             break
         least = firmer.pop(0) if gate != "remeshed" else LEAST_EIGENVALUE
-        last = _searched(again, vary, ends, asked, start, least, progress)
+        last = _searched(again, asked, start, least, progress)
         made = best.factorizations + last.factorizations, best.gate_factorizations + last.gate_factorizations
         nearer = last.changed and (not best.changed or last.gap_after.rms < best.gap_after.rms)
         best = replace(last if nearer else best, factorizations=made[0], gate_factorizations=made[1])
@@ -201,9 +201,8 @@ def _explained(refused: str, stages: Stages, asked: _Asked) -> tuple[str, int]:
 
 
 def _searched(
-    stages: Stages, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
-    least_eigenvalue: float, progress: Progress,
-) -> Refined:  # fmt: skip
+    stages: Stages, asked: _Asked, start: Sequence[float] | None, least_eigenvalue: float, progress: Progress
+) -> Refined:
     """One search, and the best of its designs that passes the gates."""
     best = list[Step]()
 
@@ -216,31 +215,31 @@ def _searched(
 
     try:
         found = refine(
-            stages, vary, ends=ends, under_weight=asked.weight, dead_loads=asked.dead_loads, start=start,
+            stages, asked.vary, ends=asked.ends, under_weight=asked.weight, dead_loads=asked.dead_loads, start=start,
             least_eigenvalue=least_eigenvalue, progress=searching,
         )  # fmt: skip
         late = _Late(silent if found.stopped else progress, found.stopped)
         form, design, judged, refused, made = _accepted(found, asked.span_error, late)
     except ConvergenceError as lost:
-        return replace(_unsearched(stages, vary, ends, asked, progress), refused=f"stable: {lost}")
+        return replace(_unsearched(stages, asked, progress), refused=f"stable: {lost}")
     except KeyboardInterrupt as stopped:
         raise KeyboardInterrupt(_where(best) or str(stopped)) from stopped
     loaded: tuple[Agreement, ...] = ()
     if found.loaded is not None:
         before = found.loaded[0]
-        loaded = (before, before if form is None or design is None else loaded_gap(form, design, ends))
+        loaded = (before, before if form is None or design is None else loaded_gap(form, design, asked.ends))
     values = () if design is None else tuple(design.values.tolist())
     return Refined(
-        found.vary, ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
+        found.vary, asked.ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
         late.said, values, loaded,
     )  # fmt: skip
 
 
-def _unsearched(stages: Stages, vary: Sequence[Family], ends: Ends, asked: _Asked, progress: Progress) -> Refined:
+def _unsearched(stages: Stages, asked: _Asked, progress: Progress) -> Refined:
     """A form in which there is nothing to search, refused as the gates say."""
-    judged = gates(alone(stages, ends), span_error=asked.span_error, progress=progress)
-    names = tuple(family.name for family in vary)
-    return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
+    judged = gates(alone(stages, asked.ends), span_error=asked.span_error, progress=progress)
+    names = tuple(family.name for family in asked.vary)
+    return Refined(names, asked.ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
 
 
 def _where(best: list[Step]) -> str:

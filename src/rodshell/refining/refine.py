@@ -15,19 +15,15 @@ from rodshell.errors import ConvergenceError, InputError
 from rodshell.figures.records import Ends
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, Stages, agreement
-from rodshell.formfinding.popup import PopUp
-from rodshell.formfinding.trim import Footprint
-from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress, residuals
 from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
-from rodshell.refining.structure import Point, Structure, under_load
+from rodshell.refining.structure import Point, Structure, rebuilt, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
 from rodshell.solve.equilibrium import find_equilibrium
-from rodshell.solve.problem import Problem
 from rodshell.units import percent_text
 from rodshell.validation import choice
 
@@ -303,24 +299,17 @@ def popped_up(stages: Stages, variables: Design, design: Point, ends: Ends) -> t
         InputError: it has no stable equilibrium there after all.
     """
     grid, here = built(variables, design), design.equilibrium
-    support = stages.popped[ends].support
-    shell = Shell.of(grid.mesh, stages.rod, clamped=support.holds_directions, joint=stages.joint)
-    shell = shell.with_frames_of(here.elements)
-    problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
-    if here.problem.load is None:
-        found, made = find_equilibrium(problem, here.state, here.forces), 0
-    else:
-        found = find_equilibrium(replace(problem, load=here.problem.load), here.state, here.forces)
-        unloaded, made = under_load(found, np.zeros_like(here.state))
-        found = replace(unloaded or found, problem=replace((unloaded or found).problem, load=None))
-    shell = shell.with_elements(found.elements)
-    footprint = Footprint(grid.mesh)
-    popped = PopUp(support, "draped", footprint, grid.boundary, shell, found)
+    popped, made = rebuilt(stages.popped[ends], grid.mesh, grid.boundary, stages.rod, stages.joint, here), 0
+    if here.problem.load is not None:
+        unloaded, made = under_load(popped.equilibrium, np.zeros_like(here.state))
+        found = unloaded or popped.equilibrium
+        found = replace(found, problem=replace(found.problem, load=None))
+        popped = replace(popped, shell=popped.shell.with_elements(found.elements), equilibrium=found)
     result = replace(
-        stages, ends=(ends,), footprint=footprint, boundary=grid.boundary,
+        stages, ends=(ends,), footprint=popped.footprint, boundary=grid.boundary,
         popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
     )  # fmt: skip
-    return result, found.report.factorizations + made
+    return result, popped.report.factorizations + made
 
 
 def loaded_gap(stages: Stages, design: Point, ends: Ends) -> Agreement:
