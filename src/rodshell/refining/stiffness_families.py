@@ -143,10 +143,10 @@ class Sections:
             InputError: the section has no size.
         """
         table = np.linspace(-6.0, 6.0, 601)  # of log EI; a size is a power of EI, and so are the values in between
-        own, others = (sizes(structure.rod, "size", np.exp(logs)) for logs in (np.zeros(1), table))
-        if own is None or others is None:
+        first, others = (sizes(structure.rod, "size", np.exp(logs)) for logs in (np.zeros(1), table))
+        if first is None or others is None:
             raise InputError("sections of stock vary the size of a section: this rod has none; use taper")
-        stock = np.interp(np.log(own * RENARD), np.log(others), table)
+        stock = np.interp(np.log(first * RENARD), np.log(others), table)
         zero = np.zeros(len(structure.mesh.grid.rods))
 
         def uniform(log: Floats) -> Profile:
