@@ -90,9 +90,9 @@ class Run:
         rod, fit, stages, tried = found.rod, None, None, found._replace(method=Bound())
         if case.rod.left_open:
             fit = case.fit_on(found.target, found.layout, anchor=None if case.seams.lines else found.anchor)
-        if fit and found.joint.resists_shear and found.ends and self.pops_up and self._sizes(rod):
+        if fit and case.joint.resists_shear and case.ends and self.pops_up and self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, partial(self._stages, case, tried))
-            case.require_strength(rod, found.joint)
+            case.require_strength(rod)
         self._announce_rod(rod, fit)
         if stages is None or found.method != tried.method:
             stages = self._stages(case, found, rod)
@@ -180,8 +180,8 @@ class Run:
         same, seams = "trim" in self._unchanged(case.with_rod(rod)), [Seam.of(line) for line in case.seams.lines]
         earlier = self.earlier.unrefined if self.earlier is not None else None
         options: dict[str, Any] = {
-            "joint": found.joint,
-            "ends": found.ends if self.pops_up else (),
+            "joint": case.joint,
+            "ends": case.supports if self.pops_up else (),
             "warm_start": earlier if earlier is not None and bool(earlier.seams) == bool(seams) else None,
             "progress": self.progress,
         }
@@ -244,7 +244,7 @@ class Run:
     def _best_heading(self, case: Case, found: Built) -> float:
         return best_heading(
             found.target, [Seam.of(line) for line in case.seams.lines], found.layout, case.seams.patch_layouts(),
-            eccentricity=found.joint.eccentricity, progress=self.progress,
+            eccentricity=case.joint.eccentricity, progress=self.progress,
         )  # fmt: skip
 
     def _made(

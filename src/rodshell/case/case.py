@@ -36,7 +36,6 @@ from rodshell.units import length_text, shown
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
     from rodshell.formfinding.methods import Method
-    from rodshell.joints import Joint
     from rodshell.layout import Layout
     from rodshell.output.options import OutputOptions
     from rodshell.targets import Target
@@ -51,16 +50,13 @@ class Built(NamedTuple):
 
     Args:
         anchor: x, y where the axes cross [m]; None: the default, or one that is searched for.
-        ends: supports on which the grid is popped up.
     """
 
     target: "Target"
     layout: "Layout"
     rod: Rod
-    joint: "Joint"
     method: "Method"
     anchor: tuple[float, float] | None
-    ends: tuple[Support, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,7 +230,7 @@ class Case:
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if self.drape.anchor == "auto" else self.drape.anchor
-        joint, method = self.joint, built(self.drape)
+        method: Method = built(self.drape)
         seams = [Seam.of(line) for line in self.seams.lines]
         target = cut_at(target or built(self.target, progress), seams, progress)
         layout: Layout = built(self.layout, target)
@@ -246,7 +242,7 @@ class Case:
         self._require_allowance(target)
         loads = self.built_loads()
         if loads is not None and loads.locked_joints is not None:
-            loads.locked_joints.require_pins(joint)
+            loads.locked_joints.require_pins(self.joint)
         if self.refine.under not in ("nothing", "weight", *self.combination_names):
             known = ", ".join(("nothing", "weight", *self.combination_names))
             raise InputError(
@@ -257,13 +253,13 @@ class Case:
         if self.rod.left_open:
             progress("preparing", "net for the size of the rods", 0.0)
         rod = self.rod_on(target, layout, anchor=anchor, progress=progress)
-        self.require_strength(rod, joint)
-        return Built(target, layout, rod, joint, method, anchor, self.supports)
+        self.require_strength(rod)
+        return Built(target, layout, rod, method, anchor)
 
-    def require_strength(self, rod: Rod, joint: "Joint") -> None:
+    def require_strength(self, rod: Rod) -> None:
         """InputError where what is said of the strength does not suit the rod, such as bolts as wide as it."""
         options = self.output_options()
-        options.require_known_stress(rod, joint)
+        options.require_known_stress(rod, self.joint)
         if self.strength != Strength():
             from rodshell.loads.strength import net_section
 

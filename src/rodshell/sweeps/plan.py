@@ -205,12 +205,10 @@ def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:
     sources = given[BASE] if isinstance(given[BASE], list | tuple) else [given[BASE]]
     bases = dict[str, Job]()
     for number, source in enumerate(sources, start=1):
-        if isinstance(source, Job):
-            name, job = source.case.drawings.name or f"{source.case.target.kind} {number}", source
-        else:
-            inside = isinstance(source, str) and source not in BUILT_IN and file_path(BASE, folder / source).exists()
-            job = Job.load(folder / source if inside else source)
-            name = source if isinstance(source, str) else job.case.drawings.name or f"{job.case.target.kind} {number}"
+        inside = isinstance(source, str) and source not in BUILT_IN and file_path(BASE, folder / source).exists()
+        job = source if isinstance(source, Job) else Job.load(folder / source if inside else source)
+        called = job.case.drawings.name or f"{job.case.target.kind} {number}"
+        name = source if isinstance(source, str) else called
         if name in bases:
             raise InputError(f"base: {shown(name)} occurs twice: leave one out")
         job.to_toml()  # workers read it
