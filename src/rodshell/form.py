@@ -1,7 +1,7 @@
 """A form that was found: its stages, its checks and fabrication, and its files."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from os import PathLike
@@ -23,10 +23,7 @@ from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import Layout
 from rodshell.layout.cells import Pattern
-from rodshell.loads.check import (
-    check_shells,  # most forms have no loads
-    unchecked,  # most forms have no loads
-)
+from rodshell.loads.check import LoadChecks, check_shells, unchecked
 from rodshell.loads.combinations import Loads
 from rodshell.loads.strength import net_factors
 from rodshell.output.files import save, wanted_kinds
@@ -34,6 +31,7 @@ from rodshell.output.options import OutputOptions
 from rodshell.output.pictures import picture_svg
 from rodshell.output.viewer import frame_html, scene_of, widget_of
 from rodshell.progress import Progress, require_progress, silent
+from rodshell.refining.acceptance import Refined
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import (
     checked_results,
@@ -52,10 +50,6 @@ from rodshell.validation import instance
 
 if TYPE_CHECKING:
     from anywidget import AnyWidget
-
-    from rodshell.loads.check import LoadChecks
-    from rodshell.loads.combinations import Loads
-    from rodshell.refining.acceptance import Refined
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,11 +73,8 @@ class Form:
     options: OutputOptions
     inputs: Mapping[str, bytes]
     search: Search | None = None
-    refined: "Refined | None" = None
+    refined: Refined | None = None
     reused: tuple[str, ...] = ()
-    _known_checks: Checks | None = field(default=None)
-    _known_fabrication: Fabricated | None = field(default=None)
-    _known_loaded: "LoadChecks | None" = field(default=None)
 
     # What was asked for
 
@@ -210,13 +201,11 @@ class Form:
     @cached_property
     def checks(self) -> Checks:
         """The checks of every shell that converged; made when they are first asked for, if `Job.run` made none."""
-        return self._known_checks or self._checked(silent)
+        return self._checked(silent)
 
     @cached_property
     def fabrication(self) -> Fabricated:
         """Cut list, layers, splices, stock and bracing; made as `checks` are."""
-        if self._known_fabrication is not None:
-            return self._known_fabrication
         ends = final_ends(self.checks)
         shape = None if ends is None else self.popped[ends].positions
         return fabricate(
@@ -231,28 +220,25 @@ class Form:
         )
 
     @cached_property
-    def loaded(self) -> "LoadChecks | None":
+    def loaded(self) -> LoadChecks | None:
         """The checks under the loads of the case, None where it has none; made as `checks` are."""
-        if self._known_loaded is not None:
-            return self._known_loaded
         loads = self.case.built_loads()
         return None if loads is None else check_loads(self, loads)
 
     @property
-    def known_loaded(self) -> "LoadChecks | None":
+    def known_loaded(self) -> LoadChecks | None:
         """The checks under loads, if they were made."""
-        found: LoadChecks | None = self.__dict__.get("loaded", self._known_loaded)
-        return found
+        return vars(self).get("loaded")
 
     @property
     def known_checks(self) -> Checks | None:
         """The checks, if they were made."""
-        return self.__dict__.get("checks", self._known_checks)
+        return vars(self).get("checks")
 
     @property
     def known_fabrication(self) -> Fabricated | None:
         """The fabrication, if it was made."""
-        return self.__dict__.get("fabrication", self._known_fabrication)
+        return vars(self).get("fabrication")
 
     @property
     def verdict(self) -> Verdict:
@@ -266,9 +252,15 @@ class Form:
         known = self.known_checks if same else None
         case = replace(self.case, **options.tables)
         loaded = self.known_loaded if same and options.strength == self.options.strength else None
-        return replace(
-            self, case=case, options=options, _known_checks=known, _known_fabrication=None, _known_loaded=loaded
-        )
+        return replace(self, case=case, options=options).knowing(checks=known, loaded=loaded)
+
+    def knowing(self, **made: Checks | Fabricated | LoadChecks | None) -> "Form":
+        """The same form with what was made of it before, by the names of its properties; None: nothing new."""
+        form = replace(self)
+        for name in ("checks", "fabrication", "loaded"):
+            if (found := made.get(name) or vars(self).get(name)) is not None:
+                vars(form)[name] = found
+        return form
 
     def finished(self, progress: Progress = silent) -> "Form":
         """This form, its checks and fabrication made now; a progress may end the checks early. Under loads that do not
@@ -277,7 +269,7 @@ class Form:
         checks = self.known_checks
         if checks is None or checks.stopped:
             checks = self._checked(progress)
-        known = replace(self, _known_checks=checks)
+        known = self.knowing(checks=checks)
         loaded, loads = self.known_loaded, self.case.built_loads()
         if loads is not None and (loaded is None or loaded.stopped):
             try:  # the form is kept in any case
@@ -286,7 +278,7 @@ class Form:
                 loaded = unchecked(loads, refused=str(error))
             except ConvergenceError as error:
                 loaded = unchecked(loads, stopped=str(error))
-        return replace(known, _known_fabrication=known.fabrication, _known_loaded=loaded)
+        return known.knowing(fabrication=known.fabrication, loaded=loaded)
 
     # Files
 
@@ -412,7 +404,7 @@ class Form:
         return Archive(results, states, self.case.text(), self.inputs)
 
 
-def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "LoadChecks":
+def check_loads(form: Form, loads: Loads, *, progress: Progress = silent) -> LoadChecks:
     """Check a form under loads: deflections, reactions, stability and utilisation under each of their combinations.
 
     Args:

@@ -264,7 +264,7 @@ class Job:
         run = Run(
             self._case,
             self._target,
-            self._inputs,
+            inputs_of(self._case) if self._inputs is None else self._inputs,
             warm_start,
             limited(progress, time_limit),
             announce,

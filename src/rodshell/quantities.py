@@ -77,42 +77,35 @@ def pair(value: Value, words: str, *, one_for_both: bool = False) -> Value:
     Args:
         words: what Python has to give.
     """
-
-    def read(given: object) -> tuple[float, float]:
-        items = _parted(given)
-        if not isinstance(items, list | tuple):
-            items = [items]
-        if len(items) == 1 and one_for_both:
-            return value.read(items[0]), value.read(items[0])
-        if len(items) != 2:
-            needs = "one or two values" if one_for_both else "two values"
-            raise ValueError(f'needs {needs}, such as ["30 mm", "40 mm"] or "30 mm, 40 mm"')
-        return _named("first", value, items[0]), _named("second", value, items[1])
-
-    return Value(read, _each(value, words, 2))
+    needs = f"needs {'one or two' if one_for_both else 'two'} values, such as "
+    return _several(2, value, needs + '["30 mm", "40 mm"] or "30 mm, 40 mm"', words, one_for_all=one_for_both)
 
 
 def _triple(kind: Kind) -> Value:
     """[a, b, c] or "a, b, c"."""
-    value = quantity(kind)
-
-    def read(given: object) -> tuple[float, ...]:
-        items = _parted(given)
-        if not isinstance(items, list | tuple) or len(items) != 3:
-            raise ValueError(f"needs three values, along or about x, y and z; each is {wanted(kind)}")
-        return tuple(_named(ordinal, value, item) for ordinal, item in zip(_ORDER, items, strict=True))
-
-    return Value(read, _each(value, f"three finite numbers in {si_unit(kind)}", 3))
+    needs = f"needs three values, along or about x, y and z; each is {wanted(kind)}"
+    return _several(3, quantity(kind), needs, f"three finite numbers in {si_unit(kind)}")
 
 
 _ORDER = ("first", "second", "third")
 
 
-def _each(value: Value, words: str, count: int) -> Callable[[str, Any], tuple[float, ...]]:
-    """So many numbers from Python, each as a value."""
+def _several(count: int, value: Value, needs: str, words: str, *, one_for_all: bool = False) -> Value:
+    """So many values, each read and checked as one is; `needs` and `words` say what a file and Python have to give."""
     assert value.check is not None
     check = value.check
-    return lambda name, given: tuple(check(name, item) for item in numbers(name, given, words, count))
+
+    def read(given: object) -> tuple[float, ...]:
+        items = _parted(given)
+        if not isinstance(items, list | tuple):
+            items = [items]
+        if len(items) == 1 and one_for_all:
+            return (value.read(items[0]),) * count
+        if len(items) != count:
+            raise ValueError(needs)
+        return tuple(_named(ordinal, value, item) for ordinal, item in zip(_ORDER, items, strict=False))
+
+    return Value(read, lambda name, given: tuple(check(name, item) for item in numbers(name, given, words, count)))
 
 
 def _parted(value: object) -> object:
@@ -349,4 +342,5 @@ InertiaPerLength = Annotated[float, quantity("inertia per length", not_negative)
 Density = Annotated[float, quantity("density", positive)]
 Acceleration = Annotated[float, quantity("acceleration", positive)]
 Duration = Annotated[float, quantity("time", positive)]
+Memory = Annotated[float, quantity("memory", positive)]
 KelvinChange = Annotated[float, quantity("temperature")]

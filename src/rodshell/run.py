@@ -1,10 +1,10 @@
 """One run of a case: what is left open is decided, and each stage runs or is taken over from an earlier form."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rodshell.case import Case
 from rodshell.case.case import Built
@@ -18,7 +18,8 @@ from rodshell.formfinding.patches import best_heading, find_patched_stages
 from rodshell.formfinding.search import Search, search
 from rodshell.loads.fixed import fixed_forces
 from rodshell.progress import Progress
-from rodshell.refining.acceptance import refined
+from rodshell.refining.acceptance import Refined, refined
+from rodshell.refining.variables import Family
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
 from rodshell.results.summary import chosen, rod_text
@@ -27,11 +28,6 @@ from rodshell.rods.supports import PINNED
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
 from rodshell.units import length_text
-
-if TYPE_CHECKING:
-    from rodshell.checks.sizing import Fit
-    from rodshell.refining.acceptance import Refined
-    from rodshell.refining.variables import Family
 
 Announce = Callable[[str], None]
 
@@ -57,33 +53,29 @@ SIZED_BY = (*DECIDED_BY, "pop_up", "strength")
 MOST_SIZES = 6  # that are popped up: of like sections the second is right; with elastic joints up to four were needed
 
 
+@dataclass
 class Run:
-    """One run of a case; parameters as of `Job.run`, with the target where it was built before, and what its files held
-    then.
+    """One run of a case; parameters as of `Job.run`.
 
     Args:
+        target: where it was built before.
+        inputs: what the files of the case hold, by their path in it.
+        earlier: from which it starts; one of another kind is left.
         pops_up: False ends it with the drape, trimmed and mapped back.
     """
 
-    def __init__(
-        self,
-        case: Case,
-        target: Target | None,
-        inputs: Mapping[str, bytes] | None,
-        warm_start: Form | None,
-        progress: Progress,
-        announce: Announce | None,
-        frames_in: Path,
-        *,
-        pops_up: bool = True,
-    ) -> None:
-        self.pops_up = pops_up
-        self.asked, self.target, self.progress = case, target, progress
-        self.announce, self.frames_in = announce, frames_in
-        self.inputs = inputs_of(case) if inputs is None else dict(inputs)
-        self.options = case.output_options()
-        self.earlier = warm_start
-        if warm_start is not None and warm_start.from_table != case.of_table:
+    asked: Case
+    target: Target | None
+    inputs: Mapping[str, bytes]
+    earlier: Form | None
+    progress: Progress
+    announce: Announce | None
+    frames_in: Path
+    pops_up: bool
+
+    def __post_init__(self) -> None:
+        self.options = self.asked.output_options()
+        if self.earlier is not None and self.earlier.from_table != self.asked.of_table:
             self.earlier = None
 
     def form(self) -> Form:
@@ -98,9 +90,9 @@ class Run:
         rod, fit, stages, tried = found.rod, None, None, found._replace(method=Bound())
         if case.rod.left_open:
             fit = case.fit_on(found.target, found.layout, anchor=None if case.seams.lines else found.anchor)
-        if fit and found.joint.resists_shear and found.ends and self.pops_up and self._sizes(rod):
+        if fit and case.joint.resists_shear and case.ends and self.pops_up and self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, partial(self._stages, case, tried))
-            case.require_strength(rod, found.joint)
+            case.require_strength(rod)
         self._announce_rod(rod, fit)
         if stages is None or found.method != tried.method:
             stages = self._stages(case, found, rod)
@@ -129,7 +121,7 @@ class Run:
         left_open = table.held is None and "section" in table.left_open
         return left_open and material is not None and self.asked.permanent_strength(material) is not None
 
-    def _sized(self, rod: Rod, estimate: "Fit", stages_of: Callable[[Rod], Stages]) -> "tuple[Rod, Fit, Stages]":
+    def _sized(self, rod: Rod, estimate: Fit, stages_of: Callable[[Rod], Stages]) -> tuple[Rod, Fit, Stages]:
         """The rod whose section is chosen by the bends of shells popped up with it; what it fits; those shells.
 
         Args:
@@ -188,8 +180,8 @@ class Run:
         same, seams = "trim" in self._unchanged(case.with_rod(rod)), [Seam.of(line) for line in case.seams.lines]
         earlier = self.earlier.unrefined if self.earlier is not None else None
         options: dict[str, Any] = {
-            "joint": found.joint,
-            "ends": found.ends if self.pops_up else (),
+            "joint": case.joint,
+            "ends": case.supports if self.pops_up else (),
             "warm_start": earlier if earlier is not None and bool(earlier.seams) == bool(seams) else None,
             "progress": self.progress,
         }
@@ -209,7 +201,7 @@ class Run:
             found.target, found.layout, rod, method=method, anchor=found.anchor, same_drape=same, **options
         )
 
-    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> "Refined | None":
+    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> Refined | None:
         """The refinement of these stages, where the case asks for one."""
         vary: tuple[Family, ...] = built(case.refine)
         if not vary or stages.status != "converged" or not stages.ends:
@@ -252,16 +244,16 @@ class Run:
     def _best_heading(self, case: Case, found: Built) -> float:
         return best_heading(
             found.target, [Seam.of(line) for line in case.seams.lines], found.layout, case.seams.patch_layouts(),
-            eccentricity=found.joint.eccentricity, progress=self.progress,
+            eccentricity=case.joint.eccentricity, progress=self.progress,
         )  # fmt: skip
 
     def _made(
-        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: "Refined | None" = None
+        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: Refined | None = None
     ) -> Form:
         """The form, with what it takes over from the earlier one."""
         built = stages if better is None else better.after
         form = Form(case, self.asked, built, self.options, self.inputs, searched, better)
-        earlier = self.earlier
+        earlier, known = self.earlier, dict[str, Any]()
         if earlier is None:
             return form
         reused = ["target"] if "target" in same else []
@@ -279,8 +271,8 @@ class Run:
                 loaded = earlier.known_loaded if "loads" in same else None
                 loaded = None if loaded is None or loaded.stopped else loaded
                 reused += ["loads"] if "loads" in same and (loaded is not None or not case.loads) else []
-                form = replace(form, _known_checks=checks, _known_fabrication=made, _known_loaded=loaded)
-        return replace(form, reused=tuple(reused))
+                known = {"checks": checks, "fabrication": made, "loaded": loaded}
+        return replace(form, reused=tuple(reused)).knowing(**known)
 
     def _unchanged(self, case: Case) -> list[str]:
         """The stages up to the first one whose part of the decided case has changed."""
@@ -295,7 +287,7 @@ class Run:
         """Whether these tables are as they were, and so are their files; without a decided `case`, as asked for."""
         before, now = (earlier.asked, self.asked) if case is None else (earlier.case, case)
         before, now = before.absolute(), now.absolute()
-        if "target" in tables and (dict(earlier.inputs) != self.inputs or not now.files <= self.inputs.keys()):
+        if "target" in tables and (dict(earlier.inputs) != dict(self.inputs) or not now.files <= self.inputs.keys()):
             return False  # a file too large to be kept may have changed
         return all(getattr(before, name) == getattr(now, name) for name in tables)
 
@@ -312,7 +304,7 @@ class Run:
             doubt = "" if lengths["spacing"] is None else doubt_of_unit(width, self.asked.rod.given_section, unit)
             self.announce(f"{name}, {length_text(width)} wide{doubt}; {said}")
 
-    def _announce_rod(self, rod: Rod, fit: "Fit | None") -> None:
+    def _announce_rod(self, rod: Rod, fit: Fit | None) -> None:
         """A rod of which the case left something open, and what decided its size."""
         left_open = self.asked.rod.left_open
         if not left_open or fit is None or self.announce is None:

@@ -350,9 +350,12 @@ def _one_table(field: Field, given: Any, place: Place, files: Files | None) -> A
     return _read(chosen, given, place, files)
 
 
-def read_value(hint: Any, given: object) -> Any:
-    """A value of a type of `quantities`; ValueError, with the reason."""
-    return next(mark for mark in _flat(hint)[1] if isinstance(mark, Value)).read(given)
+def value_of(hint: Any, name: str, given: object) -> Any:
+    """A value of a type of `quantities`; InputError, which calls it by its name."""
+    try:
+        return next(mark for mark in _flat(hint)[1] if isinstance(mark, Value)).read(given)
+    except ValueError as reason:
+        raise InputError(f"{name} = {shown(given)}: {reason}") from None
 
 
 def written(record: Any, *, changed: bool = False) -> dict[str, Any]:

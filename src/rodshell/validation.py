@@ -14,21 +14,19 @@ from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from types import UnionType
-from typing import TYPE_CHECKING, Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.units import NUMBER, as_float, out_of_range, shown
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
-
-    from rodshell.arrays import Floats
 
 MOST = 10**12  # of a count
 LARGEST = 1e18  # of the numbers in an array, whatever their unit: see `units.RANGES`
 _Choice = TypeVar("_Choice", bound=str)
-_Scalar = TypeVar("_Scalar", bound="np.generic")
+_Scalar = TypeVar("_Scalar", bound=np.generic)
 NAME = "[a-z0-9]{1,40}"  # of a support: it stands in names of states and files
 Ends = str  # the name of a support
 
@@ -246,15 +244,13 @@ def file_path(name: str, value: object) -> Path:
     return path
 
 
-def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
+def finite(name: str, given: ArrayLike, *shape: int) -> Floats:
     """Return `given` as an array of finite numbers.
 
     Args:
         given: numbers of the `shape`, or of one that can be broadcast to it.
         shape: of the result; none for a single number.
     """
-    import numpy as np  # here, so that the command line's help need not wait for it
-
     try:
         array = np.asarray(given, dtype=float)
         if array.shape != shape:
@@ -269,15 +265,13 @@ def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
     return array
 
 
-def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None) -> "NDArray[_Scalar]":
+def array(name: str, given: ArrayLike, kind: type[_Scalar], *shape: int | None) -> NDArray[_Scalar]:
     """Return `given` as an array; whether its numbers are finite is not checked.
 
     Args:
         given: an array or nested sequences.
         shape: length along each axis, None for any.
     """
-    import numpy as np
-
     wanted, whole = ", ".join("n" if count is None else str(count) for count in shape), issubclass(kind, np.integer)
     try:
         result = np.asarray(given)
@@ -292,10 +286,8 @@ def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None
     return result
 
 
-def vector(name: str, given: "ArrayLike") -> "Floats":
+def vector(name: str, given: ArrayLike) -> Floats:
     """Return `given` as an array (3,) of finite numbers."""
-    import numpy as np
-
     try:
         shape = np.shape(given)
     except ValueError:  # rows of several lengths, or without end
@@ -305,7 +297,7 @@ def vector(name: str, given: "ArrayLike") -> "Floats":
     return finite(name, given, 3)
 
 
-def direction(name: str, given: "ArrayLike") -> "Floats":
+def direction(name: str, given: ArrayLike) -> Floats:
     """Return the unit vector (3,) along `given`."""
     array = vector(name, given)
     length = float((array @ array) ** 0.5)
@@ -362,7 +354,7 @@ def brief(record: Any) -> str:
     shown = []
     for field in fields(record):
         value = getattr(record, field.name)
-        if hasattr(value, "dtype") and hasattr(value, "shape"):  # NumPy is not imported: cases show records without it
+        if isinstance(value, np.ndarray):
             shown.append(f"{field.name}={value.shape}")
         elif field.default is MISSING or type(value) is not type(field.default) or value != field.default:
             shown.append(f"{field.name}={value!r}")

@@ -28,7 +28,7 @@ from tests.acceptance.same_results import Difference
 
 KINDS = "dxf,svg,pdf,csv,obj,gltf,vtp,compas,png,report,3dm"
 NAMED = {
-    "energy": "LocalEnergy", "format": "vtp", "goal": "Deflection", "joint": "Rigid", "load": "LineLoad",
+    "energy": "LocalEnergy", "format": "vtp", "goal": "Prestress", "joint": "Rigid", "load": "LineLoad",
     "material": "bamboo", "section": "RectangularSection", "support": "clamped",
 }  # fmt: skip
 """By kinds of things that a new one may be added to: the name of one, which stands in as many files as one takes."""

@@ -89,7 +89,7 @@ def rows() -> Iterator[Row]:
 
 def rows_of(case: Case, found: Refinement) -> Iterator[Row]:
     name = f"{case.shell}, {case.ends}: {case.name}"
-    after = found.designs[-1].point
+    after = found.designs[-1]
     gap = 100 * found.gap_after.rms_relative
     note = f"before {100 * found.gap_before.rms_relative:.3f} %, {len(after.values)} variables"
     yield Row(name, "gap rms over the size", gap, case.gap, "%", note)

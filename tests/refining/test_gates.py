@@ -157,14 +157,14 @@ def test_another_shape_than_from_flat_is_refused() -> None:
     popped = form.popped["pinned"]
     flipped = replace(popped.equilibrium, state=popped.state * (1.0, 1.0, -1.0))
     mirrored = replace(form, popped={"pinned": replace(popped, equilibrium=flipped)})
-    reason, made = _from_flat(mirrored, silent)
+    reason, made = _from_flat(mirrored, None, silent)
     assert reason.startswith("pushed up from flat, it comes to another shape")
     assert made > 5
 
 
 def test_a_path_from_flat_that_takes_too_long_is_refused_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gates_module, "MOST_FROM_FLAT", 5)
-    reason, made = _from_flat(stages(), silent)
+    reason, made = _from_flat(stages(), None, silent)
     assert reason == "that it comes to this shape from flat is not shown within 5 factorisations"
     assert 5 <= made < 15  # of the first steps; the whole path takes 25 or more
 
@@ -222,9 +222,7 @@ def test_the_last_design_that_passes_is_kept(monkeypatch: pytest.MonkeyPatch) ->
     assert found.changed
     gap = agreement(tried[1].popped["pinned"], stages().target).rms
     assert found.gap_after.rms == pytest.approx(gap)
-    assert found.gap_after.rms == pytest.approx(
-        designs[-2].point.rms * stages().target.size, rel=0.05
-    )  # EA over EI differs
+    assert found.gap_after.rms == pytest.approx(designs[-2].rms * stages().target.size, rel=0.05)  # EA over EI differs
     assert "a nearer design was refused" in found.words
 
 
@@ -279,7 +277,7 @@ def test_an_interrupted_search_says_how_to_go_on_and_goes_on_there() -> None:
     start = [float(value) for value in str(stopped.value).rpartition("=")[2].split(",")]
     whole = refine.refine(stages(), "taper")
     rest = refine.refine(stages(), "taper", start=start)
-    assert rest.designs[0].point.rms == pytest.approx(whole.designs[2].point.rms, rel=1e-3)
+    assert rest.designs[0].rms == pytest.approx(whole.designs[2].rms, rel=1e-3)
     assert rest.gap_after.rms == pytest.approx(whole.gap_after.rms, rel=0.02)
     with pytest.raises(rs.InputError, match="has 2 values"):
         refine.refine(stages(), "taper", start=start[:2])

@@ -21,10 +21,14 @@ from rodshell.case.stage_tables import (
 from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
 from rodshell.fabrication.settings import Fabrication
+from rodshell.loads.combinations import Loads
 from rodshell.loads.settings import LockedJoints, Stability, Strength
 from rodshell.output.settings import CheckOptions, DrawingStyle
 from rodshell.progress import Progress, silent
+from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.joints import Ball, JointKind
+from rodshell.rods.materials import Material
+from rodshell.rods.section import Rod
 from rodshell.rods.supports import Support, supports_of
 from rodshell.schema import read, undescribed, written
 from rodshell.units import length_text, shown
@@ -32,12 +36,8 @@ from rodshell.units import length_text, shown
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
     from rodshell.formfinding.methods import Method
-    from rodshell.joints import Joint
     from rodshell.layout import Layout
-    from rodshell.loads.combinations import Loads
     from rodshell.output.options import OutputOptions
-    from rodshell.rods.materials import Material
-    from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
 HEADER = "# The full input of a rodshell job, in SI units. To run it again: rodshell form case.toml\n"
@@ -50,16 +50,13 @@ class Built(NamedTuple):
 
     Args:
         anchor: x, y where the axes cross [m]; None: the default, or one that is searched for.
-        ends: supports on which the grid is popped up.
     """
 
     target: "Target"
     layout: "Layout"
-    rod: "Rod"
-    joint: "Joint"
+    rod: Rod
     method: "Method"
     anchor: tuple[float, float] | None
-    ends: tuple[Support, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,8 +120,7 @@ class Case:
 
     def absolute(self) -> Self:
         """The same case, whose files are named from the root."""
-        paths = {key: getattr(self.target, key, None) for key in ("file", "boundary")}
-        rooted: dict[str, Any] = {key: str(Path(path).absolute()) for key, path in paths.items() if path is not None}
+        rooted: dict[str, Any] = {key: str(Path(path).absolute()) for key, path in self._paths.items()}
         return replace(self, target=replace(self.target, **rooted)) if rooted else self
 
     @property
@@ -136,8 +132,13 @@ class Case:
     @property
     def files(self) -> set[str]:
         """The files that the target is read from."""
-        paths = (getattr(self.target, key, None) for key in ("file", "boundary"))
-        return {path for path in paths if path is not None}
+        return set(self._paths.values())
+
+    @property
+    def _paths(self) -> dict[str, str]:
+        """The same by their keys."""
+        paths = {key: getattr(self.target, key, None) for key in ("file", "boundary")}
+        return {key: path for key, path in paths.items() if path is not None}
 
     def rod_on(
         self,
@@ -146,7 +147,7 @@ class Case:
         *,
         anchor: tuple[float, float] | None = None,
         progress: Progress = silent,
-    ) -> "Rod":
+    ) -> Rod:
         """The rod; material and section that were left to the target are chosen by the bends of its net."""
         if self.rod.held is not None:
             rod: Rod = self.rod.held.value
@@ -154,10 +155,8 @@ class Case:
         fit = partial(self.fit_on, target, layout, anchor=anchor, progress=progress)
         return self.rod.build(fit, strength=self.permanent_strength)
 
-    def permanent_strength(self, material: "Material") -> float | None:
+    def permanent_strength(self, material: Material) -> float | None:
         """What rods of a material withstand permanently [Pa]: as given, or by the building code of a preset."""
-        from rodshell.rods.design_strength import permanent_strength
-
         given = self.strength.permanent or self.checks.strength
         return given or permanent_strength(material, self.strength.service_class)
 
@@ -174,7 +173,7 @@ class Case:
 
         return Fit.on(target, layout, anchor=anchor, joint=self.joint, progress=progress)
 
-    def with_rod(self, rod: "Rod") -> "Case":
+    def with_rod(self, rod: Rod) -> "Case":
         """The same case with this rod spelled out."""
         if self.rod.held is not None or not self.rod.left_open:
             return self
@@ -231,7 +230,7 @@ class Case:
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if self.drape.anchor == "auto" else self.drape.anchor
-        joint, method = self.joint, built(self.drape)
+        method: Method = built(self.drape)
         seams = [Seam.of(line) for line in self.seams.lines]
         target = cut_at(target or built(self.target, progress), seams, progress)
         layout: Layout = built(self.layout, target)
@@ -243,7 +242,7 @@ class Case:
         self._require_allowance(target)
         loads = self.built_loads()
         if loads is not None and loads.locked_joints is not None:
-            loads.locked_joints.require_pins(joint)
+            loads.locked_joints.require_pins(self.joint)
         if self.refine.under not in ("nothing", "weight", *self.combination_names):
             known = ", ".join(("nothing", "weight", *self.combination_names))
             raise InputError(
@@ -254,13 +253,13 @@ class Case:
         if self.rod.left_open:
             progress("preparing", "net for the size of the rods", 0.0)
         rod = self.rod_on(target, layout, anchor=anchor, progress=progress)
-        self.require_strength(rod, joint)
-        return Built(target, layout, rod, joint, method, anchor, self.supports)
+        self.require_strength(rod)
+        return Built(target, layout, rod, method, anchor)
 
-    def require_strength(self, rod: "Rod", joint: "Joint") -> None:
+    def require_strength(self, rod: Rod) -> None:
         """InputError where what is said of the strength does not suit the rod, such as bolts as wide as it."""
         options = self.output_options()
-        options.require_known_stress(rod, joint)
+        options.require_known_stress(rod, self.joint)
         if self.strength != Strength():
             from rodshell.loads.strength import net_section
 
@@ -310,7 +309,7 @@ class Case:
         """Names of the combinations of loads."""
         return tuple(row.name for row in self.combinations)
 
-    def built_loads(self) -> "Loads | None":
+    def built_loads(self) -> Loads | None:
         """What the shell is to be checked under; None where the case has no loads.
 
         Raises:
@@ -318,8 +317,6 @@ class Case:
         """
         if not self.loads and not self.combinations:
             return None
-        from rodshell.loads.combinations import Loads
-
         for tables, rows in (("loads", self.loads), ("combinations", self.combinations)):
             names = [row.name for row in rows]
             for name in names:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rodshell.case.case import Case
-from rodshell.case.load import BY_SUFFIX, FILE_KEYS
+from rodshell.case.load import BY_SUFFIX, named_files
 from rodshell.errors import InputError
 from rodshell.schema import written
 from rodshell.units import shown
@@ -68,12 +68,10 @@ def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
     rooted = case.absolute()
     tables: dict[str, Any] = {"target": {"kind": rooted.target.kind}} | written(rooted, changed=True)
     paths = dict[str, Path]()
-    for table, keys in FILE_KEYS.items():
-        for key in keys:
-            if (path := tables.get(table, {}).get(key)) is not None:
-                name = upload_name(path)
-                paths[name] = Path(path)
-                tables[table][key] = UPLOAD + name
+    for table, key in named_files(tables):
+        name = upload_name(table[key])
+        paths[name] = Path(table[key])
+        table[key] = UPLOAD + name
     return tables, paths
 
 

@@ -26,7 +26,7 @@ from rodshell.case.keys import (
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
 from rodshell.quantities import Polylines, Unit
-from rodshell.schema import read, read_value, written
+from rodshell.schema import read, value_of, written
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import file_path, instance
@@ -67,7 +67,7 @@ _CASE_FILE = ".toml"
 FILES = f"a case ({_CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
 FILE_KEYS = file_keys()
 
-_TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
+TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
 """What a case about a table of rods has, in place of a target with its layout and drape."""
 
 RENAMED: dict[str, str] = {}
@@ -165,10 +165,10 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
 def require_keys_of_rods(changes: Mapping[str, object]) -> None:
     """InputError for a key that a table of rods does not use; unknown keys are left to the case."""
     for path, value in changes.items():
-        if path in case_keys() and path.partition(".")[0] not in _TABLES_OF_RODS:
+        if path in case_keys() and path.partition(".")[0] not in TABLES_OF_RODS:
             raise InputError(
                 f"{path} = {shown(value)}: a table of rods does not use this key: leave it out, or change one of "
-                f"{', '.join(f'[{name}]' for name in _TABLES_OF_RODS)}"
+                f"{', '.join(f'[{name}]' for name in TABLES_OF_RODS)}"
             )
 
 
@@ -266,8 +266,8 @@ def _read_seams(table: _Raw, files: Callable[[object], str] | None) -> None:
         return
     from rodshell.targets.curve_files import read_lines  # here, as most cases have no such file
 
-    unit = _value_of(Unit, "seams.unit", table.pop("unit", 1.0))
-    given = _value_of(Polylines, "seams.lines", table.get("lines", ()))
+    unit = value_of(Unit, "seams.unit", table.pop("unit", 1.0))
+    given = value_of(Polylines, "seams.lines", table.get("lines", ()))
     try:
         drawn = read_lines(file_path("the file", name if files is None else files(name)), unit)
     except InputError as reason:
@@ -285,20 +285,13 @@ def _read_drawn_rods(table: _Raw, files: Callable[[object], str] | None) -> None
 
     if "lines" in table or "names" in table:
         raise InputError("layout.lines and layout.names are those of layout.file: leave out one or the other")
-    unit = _value_of(Unit, "layout.unit", table.pop("unit", 1.0))
+    unit = value_of(Unit, "layout.unit", table.pop("unit", 1.0))
     try:
         drawn = read_drawn_rods(file_path("the file", name if files is None else files(name)), unit)
     except InputError as reason:
         raise InputError(f"layout.file = {shown(name)}: {reason}") from None
     del table["file"]
     table |= {"lines": list(drawn.values()), "names": list(drawn)}
-
-
-def _value_of(hint: Any, key: str, given: object) -> Any:
-    try:
-        return read_value(hint, given)
-    except ValueError as reason:
-        raise InputError(f"{key} = {shown(given)}: {reason}") from None
 
 
 def _found_table(raw: _Raw, path: str) -> _Raw:
@@ -471,11 +464,14 @@ def _wanted_in(folder: Path) -> str:
 def _from_its_folder(path: Path, raw: _Raw) -> _Raw:
     """Files that a case names lie in its own folder, unless they are given from the root; of a shell's pipe, here."""
     folder = Path() if path.parent.parts[:2] in (("/", "dev"), ("/", "proc")) else path.parent
+    for table, key in named_files(raw):
+        table[key] = str(folder / table[key])
+    return raw
+
+
+def named_files(raw: _Raw) -> Iterator[tuple[_Raw, str]]:
+    """Where the tables of a case name files to be read: the table and its key."""
     for name, keys in FILE_KEYS.items():
         table = raw.get(name)
-        if not isinstance(table, dict):
-            continue
-        for key in keys:
-            if isinstance(table.get(key), str):
-                table[key] = str(folder / table[key])
-    return raw
+        if isinstance(table, dict):
+            yield from ((table, key) for key in keys if isinstance(table.get(key), str))

@@ -1,10 +1,17 @@
 """`rodshell studio`: the live page, served from this machine."""
 
+import secrets
+import socket
+import threading
+import webbrowser
 from pathlib import Path
 
 import click
 
+from rodshell.case.link import LARGEST
+from rodshell.cli.options import seconds_of
 from rodshell.errors import InputError
+from rodshell.untrusted import limit
 
 _HOST = "Address to listen on."
 NO_TOKEN = "Let in all users of this machine, also without the token in the printed address."
@@ -35,15 +42,7 @@ def command(
         from rodshell.studio.server import Settings, studio_app
     except ImportError:
         raise InputError('the studio needs starlette and uvicorn: pip install "rodshell[studio]"') from None
-    import secrets
-    import socket
-    import threading
-    import webbrowser
-
-    from rodshell.case.link import LARGEST
-    from rodshell.cli.options import seconds_of
     from rodshell.studio.start import first_case, own_folder, sessions_folder
-    from rodshell.untrusted import limit
 
     loopback = host in _LOOPBACK
     if no_token and not loopback:

@@ -39,7 +39,6 @@ MOST = 300  # generations
 NEVER_REACHED = (
     10**6
 )  # factorisations: patience ends first, and what Newton's method loses is not followed in short steps
-DIFFERENCE, CROSSED = 0.6, 0.9  # smaller steps or populations converge to a worse minimum
 ROUGHNESS = 0.04  # of the first footprints; rougher ones are stable more rarely, and after many more iterations
 
 
@@ -222,7 +221,7 @@ def search(
     """Search from the random footprints of a seed, or continue, until the best gains less than `GAIN` in `WINDOW`
     generations.
 
-    By differential evolution, see `AskTell.differential_evolution`.
+    By differential evolution, see `AskTell`.
 
     Args:
         file: of all values, written after each generation and when interrupted; the search continues from it.
@@ -269,9 +268,7 @@ def _algorithm(design: Design, seed: int, population: int) -> AskTell:
     """Ready to be asked."""
     first = design.random(np.random.default_rng(seed), population, ROUGHNESS)
     try:
-        return AskTell.differential_evolution(
-            design.lower, design.upper, first, seed=seed, difference=DIFFERENCE, crossed=CROSSED
-        )
+        return AskTell(design.lower, design.upper, first, seed=seed)
     except ImportError as error:
         raise InputError('the genetic algorithm needs the package pymoo: pip install "rodshell[paper]"') from error
 

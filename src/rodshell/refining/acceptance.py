@@ -19,7 +19,8 @@ from rodshell.formfinding.pipeline import Agreement, Stages, meshed_again
 from rodshell.progress import Progress, silent
 from rodshell.refining.gates import GATES, LARGEST_ERROR, SPAN_ERROR, Gates, gates, span_lengths, worst_with_errors
 from rodshell.refining.gauss_newton import Step
-from rodshell.refining.refine import LEAST_EIGENVALUE, Candidate, Refinement, between, loaded_gap, popped_up, refine
+from rodshell.refining.refine import LEAST_EIGENVALUE, Refinement, alone, between, loaded_gap, popped_up, refine
+from rodshell.refining.structure import Point
 from rodshell.refining.variables import Family
 from rodshell.units import length_text, percent_text
 
@@ -31,8 +32,10 @@ NEARER = 1.0 - 1e-6  # of the gap before: more is not a gain
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What a refined shell carries when it is to meet its target, and how exactly it is built; see `refined`."""
+    """What is varied, what the shell carries when it meets its target, and how exactly it is built; see `refined`."""
 
+    vary: Sequence[Family]
+    ends: Ends
     weight: float
     dead_loads: Floats | None
     span_error: float | None
@@ -114,10 +117,10 @@ def refined(
     Raises:
         InputError: the form has no target, or no pop-up with these ends; `start` does not fit.
     """
-    asked = _Asked(under_weight, dead_loads, span_error)
     end = stages.ends[0] if ends is None else ends
+    asked = _Asked(vary, end, under_weight, dead_loads, span_error)
     if stages.seams is None:
-        return _of_piece(stages, vary, end, asked, start, progress)
+        return _of_piece(stages, asked, start, progress)
     if start is not None:
         raise InputError("refine.start: each patch of a form has a design of its own: leave it out")
     if dead_loads is not None:
@@ -128,8 +131,8 @@ def refined(
         def of_patch(stage: str, detail: str, residual: float, name: str = name) -> None:
             progress(stage, f"patch {name}, {detail}", residual)
 
-        parts[name] = _of_piece(patch, vary, end, asked, None, of_patch)
-        patches[name] = parts[name].after if parts[name].changed else _alone(patch, end)
+        parts[name] = _of_piece(patch, asked, None, of_patch)
+        patches[name] = parts[name].after if parts[name].changed else alone(patch, end)
     every = list(parts.values())
     changed = any(part.changed for part in every)
     loaded = tuple(Agreement.of_all(gaps) for gaps in zip(*(part.loaded for part in every), strict=True))
@@ -143,18 +146,14 @@ def refined(
     )  # fmt: skip
 
 
-def _of_piece(
-    stages: Stages, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
-    progress: Progress,
-) -> Refined:  # fmt: skip
+def _of_piece(stages: Stages, asked: _Asked, start: Sequence[float] | None, progress: Progress) -> Refined:
     """Of a form in one piece: where the best design is refused, what refused it is respected in another search."""
-    names = tuple(family.name for family in vary)
+    ends = asked.ends
     _check_error(stages, asked.span_error)
-    progress("refine", ", ".join(names), 0.0)
+    progress("refine", ", ".join(family.name for family in asked.vary), 0.0)
     if ends in stages.popped and not stages.popped[ends].report.stable:
-        judged = gates(_alone(stages, ends), span_error=asked.span_error, progress=progress)
-        return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
-    first = best = last = _searched(stages, vary, ends, asked, start, LEAST_EIGENVALUE, progress)
+        return _unsearched(stages, asked, progress)
+    first = best = last = _searched(stages, asked, start, LEAST_EIGENVALUE, progress)
     firmer, again = list(FIRMER), stages
     while last.refused and not last.stopped:
         gate = last.refused.partition(":")[0]
@@ -165,12 +164,12 @@ def _of_piece(
         elif gate not in ("tolerance", "from_flat") or not firmer:
             break
         least = firmer.pop(0) if gate != "remeshed" else LEAST_EIGENVALUE
-        last = _searched(again, vary, ends, asked, start, least, progress)
+        last = _searched(again, asked, start, least, progress)
         made = best.factorizations + last.factorizations, best.gate_factorizations + last.gate_factorizations
         nearer = last.changed and (not best.changed or last.gap_after.rms < best.gap_after.rms)
         best = replace(last if nearer else best, factorizations=made[0], gate_factorizations=made[1])
     if not best.changed:
-        refused, more = _explained(first.refused, _alone(stages, ends), asked)
+        refused, more = _explained(first.refused, alone(stages, ends), asked)
         more += best.gate_factorizations
         return replace(
             best, before=stages, after=stages, refused=refused, gate_factorizations=more, stopped=last.stopped
@@ -202,9 +201,8 @@ def _explained(refused: str, stages: Stages, asked: _Asked) -> tuple[str, int]:
 
 
 def _searched(
-    stages: Stages, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
-    least_eigenvalue: float, progress: Progress,
-) -> Refined:  # fmt: skip
+    stages: Stages, asked: _Asked, start: Sequence[float] | None, least_eigenvalue: float, progress: Progress
+) -> Refined:
     """One search, and the best of its designs that passes the gates."""
     best = list[Step]()
 
@@ -217,26 +215,31 @@ def _searched(
 
     try:
         found = refine(
-            stages, vary, ends=ends, under_weight=asked.weight, dead_loads=asked.dead_loads, start=start,
+            stages, asked.vary, ends=asked.ends, under_weight=asked.weight, dead_loads=asked.dead_loads, start=start,
             least_eigenvalue=least_eigenvalue, progress=searching,
         )  # fmt: skip
         late = _Late(silent if found.stopped else progress, found.stopped)
         form, design, judged, refused, made = _accepted(found, asked.span_error, late)
     except ConvergenceError as lost:
-        judged = gates(_alone(stages, ends), span_error=asked.span_error, progress=progress)
-        names = tuple(family.name for family in vary)
-        return Refined(names, ends, stages, stages, judged.passed, f"stable: {lost}", 0, judged.factorizations)
+        return replace(_unsearched(stages, asked, progress), refused=f"stable: {lost}")
     except KeyboardInterrupt as stopped:
         raise KeyboardInterrupt(_where(best) or str(stopped)) from stopped
     loaded: tuple[Agreement, ...] = ()
     if found.loaded is not None:
         before = found.loaded[0]
-        loaded = (before, before if form is None or design is None else loaded_gap(form, design, ends))
-    values = () if design is None else tuple(design.point.values.tolist())
+        loaded = (before, before if form is None or design is None else loaded_gap(form, design, asked.ends))
+    values = () if design is None else tuple(design.values.tolist())
     return Refined(
-        found.vary, ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
+        found.vary, asked.ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
         late.said, values, loaded,
     )  # fmt: skip
+
+
+def _unsearched(stages: Stages, asked: _Asked, progress: Progress) -> Refined:
+    """A form in which there is nothing to search, refused as the gates say."""
+    judged = gates(alone(stages, asked.ends), span_error=asked.span_error, progress=progress)
+    names = tuple(family.name for family in asked.vary)
+    return Refined(names, asked.ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
 
 
 def _where(best: list[Step]) -> str:
@@ -249,7 +252,7 @@ def _where(best: list[Step]) -> str:
 
 def _accepted(
     found: Refinement, span_error: float | None, progress: Progress
-) -> tuple[Stages | None, Candidate | None, Gates, str, int]:
+) -> tuple[Stages | None, Point | None, Gates, str, int]:
     """The best design that passes all gates, and its form, or None; its gates, or those of the best one found; why that
     one was refused; and the factorisations that all took.
 
@@ -258,7 +261,7 @@ def _accepted(
     """
     before = found.gap_before if found.loaded is None else found.loaded[0]
     least = NEARER * before.rms_relative
-    nearer = [design for design in found.designs if design.point.rms < least]
+    nearer = [design for design in found.designs if design.rms < least]
     if not nearer:
         judged = gates(found.before, span_error=span_error, progress=progress)
         return None, None, judged, "no nearer design was found", judged.factorizations
@@ -270,7 +273,7 @@ def _accepted(
         form, judged, more = _judged(found, design, span_error, False, progress)
         made += more
         if judged.open:
-            accepted, low, least = (form, design, judged), design, design.point.rms
+            accepted, low, least = (form, design, judged), design, design.rms
             break
         refused = design
     for _ in range(HALVINGS):
@@ -284,8 +287,8 @@ def _accepted(
             refused = middle
             continue
         low = middle
-        if middle.point.rms < least:
-            accepted, least = (form, middle, judged), middle.point.rms
+        if middle.rms < least:
+            accepted, least = (form, middle, judged), middle.rms
     if accepted is None:
         return None, None, best, best.reason, made
     return *accepted, best.reason, made
@@ -305,22 +308,16 @@ class _Late:
                 self.said = str(late)
 
 
-def _some(designs: Sequence[Candidate]) -> list[Candidate]:
+def _some(designs: Sequence[Point]) -> list[Point]:
     """At most `EARLIER` of a row of designs: the first, the last, and those evenly between them."""
     picked = np.unique(np.linspace(0, len(designs) - 1, min(EARLIER, len(designs))).round().astype(int))
     return [designs[k] for k in picked]
 
 
 def _judged(
-    found: Refinement, design: Candidate, span_error: float | None, all_of_them: bool, progress: Progress
+    found: Refinement, design: Point, span_error: float | None, all_of_them: bool, progress: Progress
 ) -> tuple[Stages, Gates, int]:
     """A design popped up, its gates, and the factorisations of both; tried at all gates, or until one refuses it."""
-    form, spent = popped_up(found.before, design, found.ends)
+    form, spent = popped_up(found.before, found.variables, design, found.ends)
     judged = gates(form, all_of_them=all_of_them, span_error=span_error, progress=progress)
     return form, judged, spent + judged.factorizations
-
-
-def _alone(stages: Stages, ends: Ends) -> Stages:
-    """The same with one end condition."""
-    kept = {end: gap for end, gap in stages.agreement.items() if end == ends}
-    return replace(stages, ends=(ends,), popped={ends: stages.popped[ends]}, agreement=kept)

@@ -43,10 +43,8 @@ class Change:
 
     @staticmethod
     def together(parts: Sequence["Change"]) -> "Change":
-        """The effect of several sets of variables, one after the other.
-
-        Args:
-            parts: of each set; factors multiply, lengths and displacements add up.
+        """The effect of several sets of variables, one after the other: factors multiply, lengths and displacements add
+        up.
         """
         return Change(
             sum(part.stiffness for part in parts),  # type: ignore[arg-type]
@@ -58,22 +56,14 @@ class Change:
         )
 
     def table(self, base: Floats) -> Floats:
-        """(e, 5) properties of the edges.
-
-        Args:
-            base: (e, 5) properties before.
-        """
+        """(e, 5) properties of the edges, by those (e, 5) before."""
         result = base.copy()
         result[:, :LENGTH] *= np.exp(self.stiffness)
         result[:, LENGTH] += self.lengths
         return result
 
     def property_slopes(self, table: Floats) -> csc_array:
-        """(5e, n) derivatives of the logarithms of the properties.
-
-        Args:
-            table: (e, 5) the properties.
-        """
+        """(5e, n) derivatives of the logarithms of the properties (e, 5)."""
         stiff, long = coo_array(self.stiffness_slopes), coo_array(self.length_slopes)
         rows = np.append(
             PROPERTIES * (stiff.row // STIFFNESSES) + stiff.row % STIFFNESSES, PROPERTIES * long.row + LENGTH

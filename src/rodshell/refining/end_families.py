@@ -16,6 +16,7 @@ from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
 from rodshell.rods.supports import CLAMPED
+from rodshell.targets import Target
 from rodshell.units import shown
 
 MOST_TURN, FIRST_TURN = radians(15.0), radians(1.0)
@@ -25,12 +26,11 @@ CORRECTIONS = 4  # of a support's place
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Two tangents of angles for each clamp: how much it is tilted out of the surface, and turned within it.
+    """Variables: two tangents of angles for each clamp, by which it is tilted out of the surface and turned within it.
 
     Args:
         axes: (2, 2m, 3) unit vectors across the clamp's direction: out of the surface, and within it.
-        box: of the variables, the tilts and turns of each end in turn [-].
-        image: where an operation maps the variables.
+        box: (4m,) the tilts and turns of each end in turn [-].
     """
 
     structure: Structure
@@ -52,11 +52,6 @@ class Directions:
         return unit(first + tilt + turn)
 
     def change(self, values: Floats) -> Change:
-        """What a design does.
-
-        Args:
-            values: (4m,) the design [-].
-        """
         structure = self.structure
         first, now = structure.popped.boundary.tangents, self.tangents(values)
         tilt, turn = values.reshape(-1, 2).T[:, :, None] * self.axes
@@ -71,11 +66,6 @@ class Directions:
         return replace(none, held=held, held_slopes=slopes)
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid with these clamps.
-
-        Args:
-            values: (4m,) the design [-].
-        """
         return replace(grid, boundary=replace(grid.boundary, tangents=self.tangents(values)))
 
 
@@ -97,8 +87,7 @@ class Clamps:
         normals = structure.target.gap(boundary.points).normal
         within = unit(cross(normals, boundary.tangents))
         axes = np.stack([cross(boundary.tangents, within), within])
-        zero = np.zeros(2 * len(boundary.points))
-        box = Box(zero, zero - np.tan(MOST_TURN), zero + np.tan(MOST_TURN), zero + np.tan(FIRST_TURN))
+        box = Box.about_zero(2 * len(boundary.points), np.tan(MOST_TURN), np.tan(FIRST_TURN))
 
         def image(by: Operation) -> Image:
             index = np.column_stack([2 * by.ends, 2 * by.ends + 1]).ravel()
@@ -109,12 +98,11 @@ class Clamps:
 
 @dataclass(frozen=True, eq=False)
 class Slides:
-    """How far each rod end is moved along the target's end, with its clamp; on the target it stays as near to its end.
+    """Variables: how far each rod end is moved along the target's end, with its clamp; it stays as near to that end.
 
     Args:
         along, inwards: (2m, 3) unit vectors in the surface, along its end and across it.
-        box: of the variables [m].
-        image: where an operation maps the variables.
+        box: (2m,) [m].
     """
 
     structure: Structure
@@ -138,11 +126,6 @@ class Slides:
         return np.asarray(self._placed(values) - self._placed(0.0 * values))
 
     def change(self, values: Floats) -> Change:
-        """What a design does.
-
-        Args:
-            values: (2m,) the design [m].
-        """
         structure, count = self.structure, len(values)
         held = len(structure.held)
         none = Change.none(len(structure.mesh.edges), held, count)
@@ -156,23 +139,23 @@ class Slides:
         return replace(none, held=moved, held_slopes=slopes)
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid with these supports.
-
-        Args:
-            values: (2m,) the design [m].
-        """
         return replace(grid, boundary=replace(grid.boundary, points=grid.boundary.points + self.moved(values)))
 
     def _placed(self, values: Floats) -> Floats:
         target, points = self.structure.target, self.structure.popped.boundary.points
         height, margin = target.distance(points), target.margin(points)
-        x, step = points + values[:, None] * self.along, PROBE * target.size
+        x = points + values[:, None] * self.along
         for _ in range(CORRECTIONS):
             gap = target.gap(x)
             x = x - (gap.distance - height)[:, None] * gap.normal
-            steep = (target.margin(x + step * self.inwards) - target.margin(x - step * self.inwards)) / (2.0 * step)
-            x = x + ((margin - target.margin(x)) / steep)[:, None] * self.inwards
+            x = x + ((margin - target.margin(x)) / _steepness(target, x, self.inwards))[:, None] * self.inwards
         return x
+
+
+def _steepness(target: Target, points: Floats, axes: Floats) -> Floats:
+    """(k,) growth of the distance from the target's end along unit vectors [-]."""
+    step = PROBE * target.size
+    return np.asarray((target.margin(points + step * axes) - target.margin(points - step * axes)) / (2.0 * step))
 
 
 @dataclass(frozen=True)
@@ -184,17 +167,11 @@ class Supports:
     def on(self, structure: Structure) -> Slides:
         """How far each rod end is moved."""
         target, points = structure.target, structure.popped.boundary.points
-        normals, step = target.gap(points).normal, PROBE * target.size
-        steep = np.stack(
-            [
-                (target.margin(points + step * axis) - target.margin(points - step * axis)) / (2 * step)
-                for axis in np.eye(3)
-            ],
-            axis=1,
-        )
+        normals = target.gap(points).normal
+        steep = np.stack([_steepness(target, points, axis) for axis in np.eye(3)], axis=1)
         inwards = unit(steep - np.einsum("ex,ex->e", steep, normals)[:, None] * normals)
-        span, zero = usual_span(structure.mesh), np.zeros(len(points))
-        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        span = usual_span(structure.mesh)
+        box = Box.about_zero(len(points), MOST * span, FIRST * span)
         return Slides(
             structure, cross(normals, inwards), inwards, box, lambda by: Image(by.ends, np.full(len(points), by.handed))
         )

@@ -9,20 +9,20 @@
 All sizes are relative to the target's.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, eye_array
 from scipy.sparse.linalg import spsolve
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats
 from rodshell.formfinding.pipeline import Stages, agreement, meshed_again
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.layout import GridMesh
-from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES, EdgeProperties
-from rodshell.model.rod_sections import RodSections
+from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES
 from rodshell.progress import Progress, silent
+from rodshell.refining.structure import Structure, spans
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
 from rodshell.solve.problem import Problem
 from rodshell.solve.sensitivity import Parameters, Sensitivity
@@ -79,23 +79,18 @@ def gates(
     passed, first, factorizations = dict[str, bool](), "", 0
     for name in GATES:
         progress("refine", f"gate {name}", 0.0)
-        if name == "tolerance":
-            reason, made = _tolerance(form, span_error, progress)
-        else:
-            reason, made = _TRIALS[name](form, progress)
+        reason, made = _TRIALS[name](form, span_error, progress)
         passed[name], factorizations = not reason, factorizations + made
         if reason and not first:
             first = f"{name}: {reason}"
         if first and (not all_of_them or name == "stable"):
             break
     if all_of_them:
-        passed |= {
-            name: False for name in GATES if name not in passed
-        }  # without a stable shell there is nothing to try
+        passed = dict.fromkeys(GATES, False) | passed  # without a stable shell there is nothing to try
     return Gates(passed, first, factorizations)
 
 
-def _stable(form: Stages, progress: Progress) -> tuple[str, int]:
+def _stable(form: Stages, *_: object) -> tuple[str, int]:
     report = _popped(form).report
     if not report.converged:
         return f"the pop-up {report.sentence}", 0
@@ -103,7 +98,7 @@ def _stable(form: Stages, progress: Progress) -> tuple[str, int]:
     return (f"the shell is not stable, with {count} negative mode{'s' if count > 1 else ''}" if count else ""), 0
 
 
-def _flat(form: Stages, progress: Progress) -> tuple[str, int]:
+def _flat(form: Stages, *_: object) -> tuple[str, int]:
     worst = misfit(form.footprint.mesh) / form.target.size
     if worst <= MISFIT:
         return "", 0
@@ -113,7 +108,7 @@ def _flat(form: Stages, progress: Progress) -> tuple[str, int]:
     ), 0
 
 
-def _remeshed(form: Stages, progress: Progress) -> tuple[str, int]:
+def _remeshed(form: Stages, *_: object) -> tuple[str, int]:
     (ends,) = form.popped
     again = meshed_again(form, ends)
     made = _popped(again).report.factorizations
@@ -158,7 +153,7 @@ def worst_with_errors(form: Stages, span_error: float, progress: Progress = sile
     return worst, made
 
 
-def _from_flat(form: Stages, progress: Progress) -> tuple[str, int]:
+def _from_flat(form: Stages, _: object, progress: Progress) -> tuple[str, int]:
     (shell,) = form.popped.values()
     found = pop_up(
         form.footprint, form.boundary, form.rod, ends=shell.support, start="flat", joint=form.joint,
@@ -178,7 +173,9 @@ def _from_flat(form: Stages, progress: Progress) -> tuple[str, int]:
     return f"pushed up from flat, it comes to another shape, {percent_text(apart)} of the size away", made
 
 
-_TRIALS = {"stable": _stable, "flat": _flat, "remeshed": _remeshed, "from_flat": _from_flat}
+_TRIALS: dict[str, Callable[[Stages, float | None, Progress], tuple[str, int]]] = {
+    "stable": _stable, "flat": _flat, "remeshed": _remeshed, "tolerance": _tolerance, "from_flat": _from_flat,
+}  # fmt: skip
 
 
 def with_errors(form: Stages, samples: int = SAMPLES, *, span_error: float | None = None) -> Iterator[PopUp]:
@@ -193,17 +190,14 @@ def with_errors(form: Stages, samples: int = SAMPLES, *, span_error: float | Non
         span_error: largest error of each span's length [m]; None: `SPAN_ERROR` of the target's size.
     """
     popped = _popped(form)
-    mesh, shell, found = popped.shell.mesh, popped.shell, popped.equilibrium
-    sections = RodSections.of(mesh, [form.rod] * len(mesh.grid.rods))
-    table = np.column_stack([sections.stretch, sections.edges, mesh.edge_lengths])
-    exact = EdgeProperties.of(shell, form.joint, table)
+    found, exact = popped.equilibrium, Structure(popped, form.rod, form.joint, form.target).edges
     errors = np.stack([_errors(form, span_error, seed) for seed in range(samples)])
     by_errors = np.log1p(errors).reshape(samples, -1).T
     foreseen = Sensitivity(found, exact).response(Parameters(csc_array(by_errors)))
     for sample, error in enumerate(errors):
 
         def built(here: Equilibrium, share: float, error: Floats = error) -> Problem:
-            other = exact.at(here.elements).varied(table * (1.0 + share * error)).shell
+            other = exact.at(here.elements).varied(exact.table * (1.0 + share * error)).shell
             return replace(here.problem, elements=other.elements, stretch=other.stretch)
 
         state, forces = found.state + foreseen.motions[sample], found.forces + foreseen.forces[sample]
@@ -218,7 +212,7 @@ def with_errors(form: Stages, samples: int = SAMPLES, *, span_error: float | Non
                 if not here.report.stable:
                     break
         report = here.report.after(*(report for report in reports if report is not here.report))
-        other = exact.at(here.elements).varied(table * (1.0 + error)).shell
+        other = exact.at(here.elements).varied(exact.table * (1.0 + error)).shell
         yield replace(popped, shell=other.with_elements(here.elements), equilibrium=replace(here, report=report))
 
 
@@ -235,17 +229,8 @@ def _errors(form: Stages, span_error: float | None, seed: int) -> Floats:
     return result
 
 
-def spans(mesh: GridMesh) -> Ints:
-    """(e,) number of the span, between two joints or from a joint to an end, that each edge belongs to."""
-    joint = np.zeros(mesh.node_count, dtype=bool)
-    joint[mesh.joint_pairs.ravel()] = True
-    rods = mesh.edge_rods
-    begins = np.append(True, (rods[1:] != rods[:-1]) | joint[mesh.edges[1:, 0]])
-    return np.cumsum(begins) - 1
-
-
 def span_lengths(mesh: GridMesh) -> Floats:
-    """(spans,) lengths [m]; see `spans`."""
+    """(spans,) lengths [m]; see `structure.spans`."""
     return np.bincount(spans(mesh), weights=mesh.edge_lengths).astype(float)
 
 
@@ -257,7 +242,7 @@ def misfit(mesh: GridMesh) -> float:
     Args:
         mesh: the rods, with the distances of their joints along them.
     """
-    rods, at = mesh.grid.crossings.rods, _joint_stations(mesh)
+    rods, at = mesh.grid.crossings.rods, mesh.stations[mesh.at_crossings]  # from the points of `FlatRod.origin`
     lines = mesh.grid.rods
     origin = np.array([rod.origin for rod in lines])
     direction = np.array([rod.direction for rod in lines])
@@ -285,11 +270,6 @@ def misfit(mesh: GridMesh) -> float:
         if np.abs(step).max() < 1e-9 * size:
             break
     return worst
-
-
-def _joint_stations(mesh: GridMesh) -> Floats:
-    """(c, 2) distance of each crossing's node along its two rods [m], from the points that `FlatRod.origin` names."""
-    return np.asarray(mesh.stations[mesh.at_crossings])
 
 
 def _popped(form: Stages) -> PopUp:

@@ -15,12 +15,9 @@ from rodshell.errors import InputError, OutOfTimeError
 from rodshell.figures.records import Ends
 from rodshell.formfinding.pipeline import Agreement, Stages, agreement
 from rodshell.formfinding.popup import PopUp
-from rodshell.formfinding.trim import Footprint
 from rodshell.layout.profile import DOUBLE, Profile
-from rodshell.model import Shell
 from rodshell.progress import Progress, silent
-from rodshell.solve.equilibrium import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.refining.structure import rebuilt
 from rodshell.units import percent_text
 
 FIRST, PROBE = 0.55, 0.1  # share of each rod that is double in the first design; the difference to the second
@@ -153,8 +150,4 @@ def _next_share(found: Sequence[_Design], before: Agreement) -> float | None:
 def _popped_up(patch: Stages, share: float, like: PopUp) -> PopUp:
     """The shell with double laths over a share of every rod, from the equilibrium of one with others."""
     mesh = like.shell.mesh.with_profiles(Profile.double(share))
-    shell = Shell.of(mesh, patch.rod, clamped=like.support.holds_directions, joint=patch.joint)
-    shell = shell.with_frames_of(like.shell.elements)
-    problem = Problem.of_shell(shell, like.boundary.points, pattern=like.equilibrium.problem.pattern)
-    found = find_equilibrium(problem, like.state, like.forces)
-    return PopUp(like.support, "draped", Footprint(mesh), like.boundary, shell.with_elements(found.elements), found)
+    return rebuilt(like, mesh, like.boundary, patch.rod, patch.joint, like.equilibrium)

@@ -15,20 +15,15 @@ from rodshell.errors import ConvergenceError, InputError
 from rodshell.figures.records import Ends
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, Stages, agreement
-from rodshell.formfinding.popup import PopUp
-from rodshell.formfinding.trim import Footprint
-from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
-from rodshell.refining.load_limits import Deflection, LoadFactor
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress, residuals
 from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
-from rodshell.refining.structure import Point, Structure, under_load
+from rodshell.refining.structure import Point, Structure, rebuilt, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
 from rodshell.solve.equilibrium import find_equilibrium
-from rodshell.solve.problem import Problem
 from rodshell.units import percent_text
 from rodshell.validation import choice
 
@@ -46,42 +41,29 @@ Progress = Callable[[Step], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """One design on the way.
-
-    Args:
-        point: its equilibrium on the mesh of the search.
-    """
-
-    point: Point
-    grid: Grid
-
-
-@dataclass(frozen=True, eq=False)
 class Refinement:
     """A shell before and after.
 
     Args:
         before, after: the stages, with the popped-up shell of these ends alone.
-        designs: those that were accepted on the way, the last best; the first is the shell before.
+        designs: those that were accepted on the way, on the mesh of the search, the last best; the first is the shell
+            before.
         converged: whether no further step would gain much.
         stopped: when and where the search was out of time, or "".
         loaded: gaps before and after under the loads, where it was refined under loads; else None.
-        as_found: whether its stiffnesses are built as they were found, see `built`.
     """
 
     vary: tuple[str, ...]
     ends: Ends
     before: Stages
     after: Stages
-    designs: tuple[Candidate, ...]
+    designs: tuple[Point, ...]
     converged: bool
     factorizations: int
     steps: tuple[Step, ...]
     variables: Design
     stopped: str = ""
     loaded: tuple[Agreement, Agreement] | None = None
-    as_found: bool = False
 
     def __repr__(self) -> str:
         gap = f"{percent_text(self.gap_before.rms_relative)} -> {percent_text(self.gap_after.rms_relative)} rms"
@@ -139,15 +121,12 @@ def refine(
     before = structure.lowest if here.equilibrium.problem.load is None else float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
-    goals = [Gap(), *stressed] if objectives is None else list(objectives)
+    goals: list[Objective] = [*([Gap(), *stressed] if objectives is None else objectives), floor]
     stiff = any(family.name in STIFFNESSES for family in families)
     most = (60 if stiff else 30) if most_evaluations is None else most_evaluations
 
     def searched(first: Point) -> Found:
-        return gauss_newton(
-            variables, first, [*goals, floor],
-            allows=floor.allows, lowest_before=before, most=most, progress=progress,
-        )  # fmt: skip
+        return gauss_newton(variables, first, goals, floor, most=most, progress=progress)
 
     found = searched(here)
     accepted = found.accepted
@@ -157,25 +136,22 @@ def refine(
         if opposite is not None:
             other = searched(opposite)
             steps, made = (*found.steps, *other.steps), found.factorizations + other.factorizations
-            nearer = _cost([*goals, floor], other.accepted[-1]) < _cost([*goals, floor], accepted[-1])
+            nearer = _cost(goals, other.accepted[-1]) < _cost(goals, accepted[-1])
             accepted = (here, *other.accepted) if nearer else accepted
             found = replace(other if nearer else found, factorizations=made, steps=steps, stopped=other.stopped)
     if any(sizes is not None for sizes in variables.stock):
-        chosen, more = rounded(variables, accepted[-1], [*goals, floor], floor.allows)
+        chosen, more = rounded(variables, accepted[-1], goals, floor.allows)
         spent += more
         nearer = chosen is not None and chosen.rms < here.rms
         accepted = (here, chosen) if chosen is not None and nearer else (here,)
-    as_found = any(isinstance(goal, (Deflection, LoadFactor)) for goal in goals)
-    designs = tuple(Candidate(point, built(variables, point, as_found=as_found)) for point in accepted)
-    after, made = popped_up(stages, designs[-1], ends)
+    after, made = popped_up(stages, variables, accepted[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
-        loaded = loaded_gap(stages, designs[0], ends), loaded_gap(after, designs[-1], ends)
-    held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
+        loaded = loaded_gap(stages, here, ends), loaded_gap(after, accepted[-1], ends)
     names = tuple(family.name for family in families)
     return Refinement(
-        names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
-        found.steps, variables, found.stopped, loaded, as_found,
+        names, ends, alone(stages, ends), after, accepted, found.converged, spent + found.factorizations + made,
+        found.steps, variables, found.stopped, loaded,
     )  # fmt: skip
 
 
@@ -197,7 +173,13 @@ def _cost(goals: Sequence[Objective], here: Point) -> float:
     return float(np.sum(residuals(goals, here) ** 2))
 
 
-def between(refinement: Refinement, low: Candidate, high: Candidate, share: float) -> tuple[Candidate | None, int]:
+def alone(stages: Stages, ends: Ends) -> Stages:
+    """The same with one end condition."""
+    kept = {end: gap for end, gap in stages.agreement.items() if end == ends}
+    return replace(stages, ends=(ends,), popped={ends: stages.popped[ends]}, agreement=kept)
+
+
+def between(refinement: Refinement, low: Point, high: Point, share: float) -> tuple[Point | None, int]:
     """A design on the way from one to another.
 
     Args:
@@ -207,30 +189,25 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
         The design, or None where it has no stable equilibrium near the first, or is of sizes in stock; and the
         factorisations that it took.
     """
-    variables, here = refinement.variables, low.point
+    variables = refinement.variables
     if any(sizes is not None for sizes in variables.stock):
         return None, 0
-    values = here.values + share * (high.point.values - here.values)
-    point, made = here.tried(values, variables.change(values))
-    if point is None:
-        return None, made + 1
-    return Candidate(point, built(variables, point, as_found=refinement.as_found)), made + 1
+    values = low.values + share * (high.values - low.values)
+    point, made = low.tried(values, variables.change(values))
+    return point, made + 1
 
 
-def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
+def built(variables: Design, point: Point) -> Grid:
     """The grid of a design.
 
     A common factor on all stiffnesses changes no unloaded shape, unless joints are springs. It is chosen such that the
     thickest place has the section itself, or more where the lowest eigenvalue would else be lower than before.
-
-    Args:
-        as_found: leave that factor as it is, since limits under loads decide on it.
     """
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
     joint = structure.joint
     springs = any(0.0 < stiffness < inf for stiffness in (joint.shear, joint.out_of_plane, joint.twist))
-    if point.equilibrium.problem.load is None and not springs and not as_found:
+    if point.equilibrium.problem.load is None and not springs:
         profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
         thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)
         least = STIFFER * structure.lowest / float(point.modes.values[0])
@@ -315,43 +292,33 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
     return Point(structure, values, change, edges.at(here.elements), here), made
 
 
-def popped_up(stages: Stages, design: Candidate, ends: Ends) -> tuple[Stages, int]:
+def popped_up(stages: Stages, variables: Design, design: Point, ends: Ends) -> tuple[Stages, int]:
     """The stages of a grid built to a design, and the factorisations that its pop-up took.
-
-    Args:
-        design: what is built, and the equilibrium that was found for it.
 
     Raises:
         InputError: it has no stable equilibrium there after all.
     """
-    grid, here = design.grid, design.point.equilibrium
-    support = stages.popped[ends].support
-    shell = Shell.of(grid.mesh, stages.rod, clamped=support.holds_directions, joint=stages.joint)
-    shell = shell.with_frames_of(here.elements)
-    problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
-    if here.problem.load is None:
-        found, made = find_equilibrium(problem, here.state, here.forces), 0
-    else:
-        found = find_equilibrium(replace(problem, load=here.problem.load), here.state, here.forces)
-        unloaded, made = under_load(found, np.zeros_like(here.state))
-        found = replace(unloaded or found, problem=replace((unloaded or found).problem, load=None))
-    shell = shell.with_elements(found.elements)
-    footprint = Footprint(grid.mesh)
-    popped = PopUp(support, "draped", footprint, grid.boundary, shell, found)
+    grid, here = built(variables, design), design.equilibrium
+    popped, made = rebuilt(stages.popped[ends], grid.mesh, grid.boundary, stages.rod, stages.joint, here), 0
+    if here.problem.load is not None:
+        unloaded, made = under_load(popped.equilibrium, np.zeros_like(here.state))
+        found = unloaded or popped.equilibrium
+        found = replace(found, problem=replace(found.problem, load=None))
+        popped = replace(popped, shell=popped.shell.with_elements(found.elements), equilibrium=found)
     result = replace(
-        stages, ends=(ends,), footprint=footprint, boundary=grid.boundary,
+        stages, ends=(ends,), footprint=popped.footprint, boundary=grid.boundary,
         popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
     )  # fmt: skip
-    return result, found.report.factorizations + made
+    return result, popped.report.factorizations + made
 
 
-def loaded_gap(stages: Stages, design: Candidate, ends: Ends) -> Agreement:
+def loaded_gap(stages: Stages, design: Point, ends: Ends) -> Agreement:
     """Distance to the target of a shell under the loads that it was refined for.
 
     Args:
         design: of which it is built, with its loaded equilibrium.
     """
-    popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
+    popped, here, structure = stages.popped[ends], design.equilibrium, design.structure
     load = np.zeros_like(popped.state)
     nodes = slice(0, popped.shell.first_angle)
     if structure.weight:

@@ -25,11 +25,9 @@ def rounded(
     objectives: Sequence[Objective],
     allows: Callable[[Point], bool],
 ) -> tuple[Point | None, int]:
-    """The best design of sizes of stock near one that was found.
+    """The best design of sizes of stock near one with values in between that was found.
 
     Args:
-        variables: some of them with a list of values.
-        found: the design with values in between.
         allows: limits that a design must keep.
 
     Returns:
@@ -55,12 +53,7 @@ def rounded(
 
 
 def nearest(stock: Sequence[Floats | None], values: Floats) -> Floats:
-    """(n,) the nearest values that are available.
-
-    Args:
-        stock: of each variable, or None.
-        values: (n,) of the variables.
-    """
+    """(n,) the nearest values that are available; of variables without stock their own."""
     chosen = [
         value if list_ is None else float(list_[np.argmin(np.abs(list_ - value))])
         for list_, value in zip(stock, values.tolist(), strict=True)

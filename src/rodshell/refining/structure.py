@@ -9,9 +9,11 @@ from scipy.sparse import csr_array
 from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.popup import PopUp
+from rodshell.formfinding.trim import Boundary, Footprint
 from rodshell.geometry.curves import on_curve
 from rodshell.joints import Joint
 from rodshell.layout import GridMesh
+from rodshell.model import Shell
 from rodshell.model.edge_properties import LENGTH, EdgeProperties
 from rodshell.model.rod_sections import RodSections
 from rodshell.refining.change import Change
@@ -19,6 +21,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.continuation import Continuation
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.path import farthest
+from rodshell.solve.problem import Problem
 from rodshell.solve.sensitivity import Parameters, Response, Sensitivity
 from rodshell.solve.tangent import Modes
 from rodshell.targets import Target
@@ -131,13 +134,30 @@ class Structure:
 
     @cached_property
     def span_edges(self) -> Ints:
-        """(e,) number of the span between joints that each edge belongs to."""
-        mesh = self.mesh
-        joint = np.zeros(mesh.node_count, dtype=bool)
-        joint[mesh.joint_pairs.ravel()] = True
-        rods, edges = mesh.edge_rods, mesh.edges
-        begins = np.append(True, (rods[1:] != rods[:-1]) | joint[edges[1:, 0]])
-        return np.cumsum(begins) - 1
+        """(e,) as `spans`."""
+        return spans(self.mesh)
+
+
+def rebuilt(like: PopUp, mesh: GridMesh, boundary: Boundary, rod: Rod, joint: Joint, near: Equilibrium) -> PopUp:
+    """A shell on another grid, with the load of an equilibrium near its own, from which it is solved.
+
+    Args:
+        like: the shell whose supports it has.
+        boundary: where its rods end.
+    """
+    shell = Shell.of(mesh, rod, clamped=like.support.holds_directions, joint=joint).with_frames_of(near.elements)
+    problem = Problem.of_shell(shell, boundary.points, pattern=near.problem.pattern)
+    found = find_equilibrium(replace(problem, load=near.problem.load), near.state, near.forces)
+    return PopUp(like.support, "draped", Footprint(mesh), boundary, shell.with_elements(found.elements), found)
+
+
+def spans(mesh: GridMesh) -> Ints:
+    """(e,) number of the span, between two joints or from a joint to an end, that each edge belongs to."""
+    joint = np.zeros(mesh.node_count, dtype=bool)
+    joint[mesh.joint_pairs.ravel()] = True
+    rods = mesh.edge_rods
+    begins = np.append(True, (rods[1:] != rods[:-1]) | joint[mesh.edges[1:, 0]])
+    return np.cumsum(begins) - 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,12 +43,32 @@ class Box:
     upper: Floats
     scale: Floats
 
+    @staticmethod
+    def about_zero(count: int, most: float, first: float) -> "Box":
+        """So many variables from -most to most, with one scale `first`."""
+        zero = np.zeros(count)
+        return Box(zero, zero - most, zero + most, zero + first)
+
 
 class Variables(Protocol):
-    """A set of variables on one shell."""
+    """The variables of a family on one shell; on a symmetric one they are `Tied`."""
 
     @property
     def box(self) -> Box: ...
+
+    @property
+    def stock(self) -> Floats | None:
+        """The only values that can be built, ascending; None: all within the bounds."""
+        ...
+
+    @property
+    def common(self) -> bool:
+        """Whether adding the same to all of them multiplies every stiffness alike."""
+        ...
+
+    def image(self, by: Operation) -> Image:
+        """Where a symmetry maps the variables."""
+        ...
 
     def change(self, values: Floats) -> Change:
         """What a design does, with its derivatives.
@@ -68,24 +88,6 @@ class Variables(Protocol):
         ...
 
 
-class Untied(Variables, Protocol):
-    """The variables of a family, which know their symmetric images, and what of them is available."""
-
-    @property
-    def stock(self) -> Floats | None:
-        """The only values that can be built, ascending; None: all within the bounds."""
-        ...
-
-    @property
-    def common(self) -> bool:
-        """Whether adding the same to all of them multiplies every stiffness alike."""
-        ...
-
-    def image(self, by: Operation) -> Image:
-        """Where a symmetry maps the variables."""
-        ...
-
-
 class Family(Protocol):
     """A kind of variables that a user chooses.
 
@@ -96,7 +98,7 @@ class Family(Protocol):
     @property
     def name(self) -> str: ...
 
-    def on(self, structure: Structure) -> Untied:
+    def on(self, structure: Structure) -> Variables:
         """The variables on a shell."""
         ...
 
@@ -109,7 +111,7 @@ class Tied:
         ties: (n, q) with one entry, 1 or -1, in each row: which of the q common values each variable has.
     """
 
-    whole: Untied
+    whole: Variables
     ties: csc_array
 
     @property
@@ -137,7 +139,7 @@ class Tied:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Several sets of variables, one after the other."""
+    """The variables of several families, one after the other; `box`, `change` and `applied` as of `Variables`."""
 
     parts: Sequence[Tied]
 
@@ -154,11 +156,7 @@ class Design:
         return [part.whole.stock for part in self.parts for _ in part.box.start]
 
     def stiffer(self, values: Floats, logarithm: float) -> Floats:
-        """Values with which every stiffness is multiplied by a common factor; unchanged where they cannot do that.
-
-        Args:
-            values: (n,) of the variables.
-        """
+        """(n,) values that multiply every stiffness by a common factor; unchanged where they cannot do that."""
         return np.concatenate([some + logarithm * part.whole.common for part, some in self._split(values)])
 
     def change(self, values: Floats) -> Change:

@@ -5,6 +5,7 @@ This is the only file of the folder that knows the forms: in one piece, in patch
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
+from importlib.metadata import version
 from math import degrees
 from platform import python_version
 from typing import TYPE_CHECKING, Any, get_args
@@ -32,7 +33,7 @@ from rodshell.rods.section import Rod
 from rodshell.rods.varied import sizes
 from rodshell.targets import Target
 from rodshell.targets.surface_mesh import surface_mesh
-from rodshell.version import __version__, version_of
+from rodshell.version import __version__
 
 if TYPE_CHECKING:
     from rodshell.refining.acceptance import Refined
@@ -137,7 +138,7 @@ def rod_type(rod: Rod) -> figures.RodType:
 
 def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
     """What every result begins with."""
-    versions = {"numpy": np.__version__, "scipy": version_of("scipy")}  # whose import most forms do not need
+    versions = {"numpy": np.__version__, "scipy": version("scipy")}  # whose import most forms do not need
     return {
         **{key: Results.model_fields[key].default for key in ("format", "version", "units")},
         "version_rodshell": __version__,

@@ -78,11 +78,7 @@ class Settings:
 
 
 def studio_app(settings: Settings) -> ASGIApp:
-    """The server as an ASGI application.
-
-    Args:
-        settings: see there.
-    """
+    """The server as an ASGI application."""
     first = settings.first or presets()["pavilion"]
     room = Room(settings.folder)
     sessions = Sessions(settings.folder / "sessions", first, settings.files or {}, settings.time_limit, room)

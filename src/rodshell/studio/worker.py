@@ -20,19 +20,17 @@ from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from time import monotonic, process_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from rodshell.case.link import UPLOAD
 from rodshell.case.load import load_case
 from rodshell.errors import InputError, RodshellError
+from rodshell.form import Form
 from rodshell.job import Job
+from rodshell.progress import Progress
 from rodshell.studio.preview import Preview
 from rodshell.studio.showing import checked
-
-if TYPE_CHECKING:
-    from rodshell.job import Job
-    from rodshell.progress import Progress
 
 _TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
 PAUSE = 0.1  # s between two messages of progress at least
@@ -93,8 +91,7 @@ def run_worker(connection: Connection, memory: int = MEMORY) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its workers
     resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     worker = _Worker(connection)
-    for task in (_end_with_the_server, _import_all):
-        threading.Thread(target=task, daemon=True).start()
+    threading.Thread(target=_end_with_the_server, daemon=True).start()
     while True:
         try:
             order = connection.recv()
@@ -111,13 +108,7 @@ def _end_with_the_server() -> None:
         os._exit(1)
 
 
-def _import_all() -> None:
-    """What the first order needs, before it comes."""
-    import rodshell.job
-    import rodshell.studio.showing  # noqa: F401
-
-
-def job_of(order: Order) -> "Job":
+def job_of(order: Order) -> Job:
     """The job of an order's case, which reads no file of the server but uploads, whatever its keys are.
 
     Raises:
@@ -136,8 +127,8 @@ def job_of(order: Order) -> "Job":
 class _Worker:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._form: Any = None  # the last form, from which the next drag starts
-        self._preview: Any = None
+        self._form: Form | None = None  # the last form, from which the next drag starts
+        self._preview = Preview()
 
     def obey(self, order: Order) -> None:
         if order.kind == "form" and self._connection.poll():
@@ -164,8 +155,7 @@ class _Worker:
             self._send(order, "done", {"cpu": process_time() - start})
 
     def _find(self, order: Order) -> None:
-        self._preview = show = self._preview or Preview()
-        job = job_of(order)
+        show, job = self._preview, job_of(order)
         plain = job.changed(refine__vary="") if job.case.refine.vary else job
         earlier, shown = self._form if order.live else None, False
         progress = self._progress(order, lambda: shown or not order.live)
@@ -182,7 +172,7 @@ class _Worker:
             self._form = form = form.finished(progress)
             self._show(order, "checks", *checked(form, job))
 
-    def _progress(self, order: Order, may_leave: Callable[[], bool]) -> "Progress":
+    def _progress(self, order: Order, may_leave: Callable[[], bool]) -> Progress:
         """Progress that is sent now and then, and leaves the order for a newer one where it may."""
         said = monotonic() if order.live else 0.0
 

@@ -24,6 +24,7 @@ from rodshell.units import shown
 from rodshell.validation import choice
 
 BASE = "base"
+_BELOW_ONE = 1 - 1e-12
 MOST = 1_000_000  # designs
 METHODS = ("latin-hypercube", "sobol")
 SCALES = ("linear", "log")
@@ -42,6 +43,10 @@ class Axis:
     keys: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
 
+    def row(self, share: float) -> tuple[Any, ...]:
+        """The values at a share of the axis in [0, 1]."""
+        return self.rows[min(int(share * len(self.rows)), len(self.rows) - 1)]
+
 
 @dataclass(frozen=True)
 class Span:
@@ -59,8 +64,17 @@ class Span:
     whole: bool
     scale: str
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Its key, as `Axis.keys`."""
+        return (self.key,)
+
+    def row(self, share: float) -> tuple[Any, ...]:
+        """As `Axis.row`."""
+        return (self.drawn(min(share, _BELOW_ONE) if self.whole else share),)
+
     def at(self, share: float) -> Any:
-        """The value at a share in [0, 1) or of 1 of the interval."""
+        """The value at a share in [0, 1] of the interval."""
         if isinstance(self.low, tuple):
             parts = zip(self.low, self.high, strict=True)
             return tuple(Span(self.key, low, high, self.whole, self.scale).at(share) for low, high in parts)
@@ -136,8 +150,9 @@ def read_span(key: str, given: Mapping[str, Any], base: Job, known: Sequence[str
     """The interval of a key.
 
     Args:
-        given: { from, to, scale }; known : the names that it may have.
+        given: { from, to, scale }.
         base: a job by whose case quantities are read.
+        known: the names that `given` may have.
 
     Raises:
         InputError: an end is missing or not a number, both are the same, or zero with a logarithmic scale.
@@ -163,7 +178,7 @@ def read_span(key: str, given: Mapping[str, Any], base: Job, known: Sequence[str
 
 def _evenly(span: Span, count: object) -> list[Any]:
     """So many values from one end to the other."""
-    count = _count(f"axes {shown(span.key)}: count", count, 2)
+    count = count_of(f"axes {shown(span.key)}: count", count, 2)
     values = [span.at(k / (count - 1)) for k in range(count)]
     if len(set(values)) < count:
         raise InputError(f"axes {shown(span.key)}: count = {count}: there are fewer whole numbers from from to to")
@@ -178,8 +193,8 @@ def _sampled(spans: Sequence[Span], sample: Mapping[str, Any]) -> Axis:
     if "count" not in sample:
         raise InputError("sample.count is missing: give the number of designs to be drawn")
     method = choice("sample.method", sample.get("method", METHODS[0]), METHODS)
-    count = _count("sample.count", sample["count"], 2)
-    shares = drawn_shares(method, len(spans), count, _count("sample.seed", sample.get("seed", 0), 0))
+    count = count_of("sample.count", sample["count"], 2)
+    shares = drawn_shares(method, len(spans), count, count_of("sample.seed", sample.get("seed", 0), 0))
     return Axis(
         tuple(span.key for span in spans),
         tuple(tuple(span.drawn(float(u)) for span, u in zip(spans, row, strict=True)) for row in shares),
@@ -187,10 +202,7 @@ def _sampled(spans: Sequence[Span], sample: Mapping[str, Any]) -> Axis:
 
 
 def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
-    """(count, dimensions) points in the unit cube [0, 1).
-
-    Args:
-        method: one of `METHODS`; dimensions : of the cube; count : of points; seed : of the random numbers.
+    """(count, dimensions) points in the unit cube [0, 1), by one of `METHODS`.
 
     Raises:
         InputError: Sobol points, whose count is not a power of two.
@@ -207,11 +219,10 @@ def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
 
 
 def read_listed(name: str, values: object, base: Job, folder: Path) -> Axis:
-    """An axis of listed values.
+    """An axis of listed values; `base` and `folder` as of `read_axes`.
 
     Args:
         name: of its key; of several keys, "a, b", whose values are rows.
-        values: the list; base, folder : as of `read_axes`.
 
     Raises:
         InputError: it is not such a list.
@@ -291,7 +302,8 @@ def _numbers(value: object) -> tuple[float, ...]:
     return tuple(items) if real else ()
 
 
-def _count(name: str, value: object, least: int) -> int:
+def count_of(name: str, value: object, least: int) -> int:
+    """A count from a table; InputError for anything but a whole number of at least so many."""
     if type(value) is not int or value < least:
         raise InputError(f"{name} = {shown(value)}: give a whole number of at least {least}")
     if value > MOST:

@@ -28,7 +28,7 @@ class Wanted:
     """A job that is wanted.
 
     Args:
-        id: its identity; job : itself.
+        id: its identity.
         archive: the folder for its files; None: they are not wanted.
         again: whether it is run even if it is finished.
     """
@@ -43,7 +43,6 @@ class Computation:
     """Computes jobs and records them; see `opened_computation`.
 
     Args:
-        plan: whose settings count; store : of finished jobs; table : which shows them; engine : that runs them.
         progress: called at least each fifth of a second.
         retry: whether jobs that were stopped by a limit, or died, are run again.
     """
@@ -58,11 +57,7 @@ class Computation:
         self._begun = monotonic()
 
     def wanted(self, job: Job, *, kept: bool) -> Wanted:
-        """A job as it is wanted; kept : with its result folder in archives/.
-
-        Raises:
-            InputError: a file of its case cannot be read.
-        """
+        """A job, perhaps with its result folder in archives/; InputError where a file of its case cannot be read."""
         name = job_identity(job, self._plan.settings.until)
         return Wanted(name, job, self.store.inside(f"{ARCHIVES}/{name}") if kept else None)
 
@@ -71,7 +66,7 @@ class Computation:
 
         Args:
             wanted: jobs, taken one by one as there is room for them; the same job may come twice.
-            stage: for the progress; total : number of jobs.
+            total: number of jobs.
 
         Raises:
             KeyboardInterrupt: what is finished is recorded. OutputError : it cannot be recorded. EngineError : jobs
@@ -144,8 +139,7 @@ def opened_computation(
     """A computation into a folder, in which the table shows what is finished however this is left.
 
     Args:
-        plan: of the sweep or search; folder : for it; progress, retry : as of `Computation`; address : of a
-            scheduler.
+        retry, address: as of `Computation` and `opened_engine`.
 
     Raises:
         InputError, EngineError: the engine cannot be used. OutputError : the folder cannot be written, is in use, or

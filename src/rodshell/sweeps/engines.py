@@ -26,10 +26,10 @@ HERE = Workers()  # of a process of dask
 
 
 class Engine:
-    """Runs tasks; `full` says when to wait.
+    """Runs tasks, at the same time `slots` at most.
 
     Args:
-        executor: that runs them; workers : of this process; None: those of dask.
+        workers: of this process; None: those of dask.
         settings: with the limits of a job.
     """
 
@@ -37,7 +37,6 @@ class Engine:
         self._executor, self._workers, self._settings = executor, workers, settings
 
     def submit(self, task: Task) -> "Future[Reply]":
-        """Run a task."""
         limits = (self._settings.time_limit, self._settings.memory_limit)
         run = _run_here if self._workers is None else self._workers.run
         return self._executor.submit(run, task, *limits)

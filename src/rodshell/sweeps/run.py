@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -10,12 +10,12 @@ from pathlib import Path
 from rodshell.figures.records import printable
 from rodshell.progress import Progress, silent
 from rodshell.sweeps.columns import CONVERGED, is_usable
-from rodshell.sweeps.computing import Computation, Wanted, opened_computation
+from rodshell.sweeps.computing import Computation, opened_computation
 from rodshell.sweeps.identity import job_identity
 from rodshell.sweeps.plan import Settings, Source, SweepPlan, read_plan
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.store import FOUND, STORE, Store
-from rodshell.sweeps.table import header_notes, header_of, names_of, table_rows
+from rodshell.sweeps.table import Sheet, header_notes
 from rodshell.validation import file_path
 
 _BEST = "best"
@@ -27,7 +27,7 @@ class Swept:
 
     Args:
         folder: of the sweep; None: nothing was written.
-        designs: their number; computed : jobs that were computed now.
+        computed: number of jobs that were computed now.
         verdicts: number of designs by verdict, "not checked" and "no form" among them.
         not_converged: number of forms that did not converge.
         failures: sentences of designs without a form, with their number, the most frequent first.
@@ -94,12 +94,14 @@ def sweep(
     folder = file_path("out", out)
     if report:
         require_plotly()
-    _check_designs(plan)
+    for _ in plan.designs():  # each case is made, so that none is refused when others were computed
+        pass
     with opened_computation(plan, folder, progress, retry=retry, address=address) as computation:
         store, until = computation.store, plan.settings.until
         designs = ((values, job_identity(job, until)) for values, job in plan.designs())
         store.plan(designs, notes=header_notes(plan.keys, plan.columns))
-        computation.compute(_wanted(plan, computation), "sweep", plan.count)
+        kept = plan.settings.keep == "all"
+        computation.compute((computation.wanted(job, kept=kept) for _, job in plan.designs()), "sweep", plan.count)
         found = swept(store, computation.computed)
         if plan.settings.keep == "best":
             _keep_best(plan, computation)
@@ -110,22 +112,8 @@ def sweep(
     return found
 
 
-def _check_designs(plan: SweepPlan) -> None:
-    """Make the case of each design, one by one.
-
-    Raises:
-        InputError: a case cannot have its values.
-    """
-    for _ in plan.designs():
-        pass
-
-
 def planned(plan: SweepPlan, out: str | PathLike[str]) -> tuple[int, int]:
-    """Number of different jobs of a sweep, and of those that are finished in a folder already; nothing is written.
-
-    Args:
-        plan: of the sweep; out : its folder, which may be missing.
-    """
+    """Number of different jobs of a sweep, and of those that are finished in its folder, if any; nothing is written."""
     jobs = {job_identity(job, plan.settings.until) for _, job in plan.designs()}
     folder = file_path("out", out)
     if not os.path.lexists(folder / STORE):
@@ -147,10 +135,6 @@ def swept(store: Store, computed: int) -> Swept:
     return Swept(store.folder, store.count(), computed, dict(verdicts), lost, tuple(failures.most_common()))
 
 
-def _wanted(plan: SweepPlan, computation: Computation) -> Iterator[Wanted]:
-    return (computation.wanted(job, kept=plan.settings.keep == "all") for _, job in plan.designs())
-
-
 def _keep_best(plan: SweepPlan, computation: Computation) -> None:
     """The result folder of the best design, in best/."""
     store = computation.store
@@ -164,12 +148,10 @@ def _keep_best(plan: SweepPlan, computation: Computation) -> None:
 
 def best_jobs(store: Store, settings: Settings) -> list[str]:
     """The jobs that converged, can be built, and are without the findings that are not wanted, the best first."""
-    keys, columns = header_of(store)
-    place = names_of(keys, columns).index(settings.best)
     found = dict[str, float]()
-    for design, row in zip(store.finished(), table_rows(store, columns), strict=True):
-        if is_usable(design.row, settings.without) and isinstance(row[place], int | float):
-            found[design.job] = float(row[place])
+    for design, cells in Sheet(store).rows():
+        if is_usable(design.row, settings.without) and isinstance(value := cells[settings.best], int | float):
+            found[design.job] = float(value)
     return sorted(found, key=lambda job: found[job])
 
 

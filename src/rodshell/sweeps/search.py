@@ -29,7 +29,6 @@ from rodshell.validation import file_path
 
 FRONT = "front.csv"
 _MOST_SHOWN = 10  # designs of the front in text
-DIFFERENCE, CROSSED = 0.6, 0.9
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Optimised:
     """What a search has come to.
 
     Args:
-        designs: their number; computed : jobs that were computed now.
+        computed: number of jobs that were computed now.
         feasible: number of designs that converged and keep all constraints.
         front: of those, the ones that no other is better than in all objectives, the smallest first objective first: by
             name the values of the variables' keys, objectives, verdict, further columns, and the job.
@@ -83,10 +82,8 @@ def optimise(
     Args:
         source: path of a search file, or its content as a mapping, see docs/sweeps.md.
         out: folder of the search. What an earlier run has finished there is not computed again.
-        retry: run jobs again that were stopped by a limit, or whose process died.
         report: also write report.html, and keep the results of up to twelve designs of the front.
-        address: as of `sweep`.
-        progress: called as progress(stage, detail, 0.0).
+        retry, address, progress: as of `sweep`.
 
     Returns:
         The best designs, also in front.csv; all are in table.csv, see `read_sweep`.
@@ -113,7 +110,7 @@ def optimise(
         computation.compute(computation.archived(kept), "best designs", len(kept))
         names = list(dict.fromkeys([*plan.keys[1:], *objectives, "verdict", *(c.name for c in plan.columns), JOB]))
         rows = tuple(dict(zip(names, _cells(plan, design, names), strict=True)) for design in front)
-        write_csv(folder / FRONT, names, (list(row.values()) for row in rows))
+        write_csv(folder / FRONT, names, rows)
         found = Optimised(folder, store.count(), computed, feasible, rows)
         if report:
             page = Page(
@@ -134,15 +131,9 @@ def optimise(
 def _algorithm(plan: SearchPlan) -> AskTell:
     dimensions, violations = len(plan.variables), 1 + len(plan.constraints)
     first = drawn_shares("latin-hypercube", dimensions, plan.population, plan.seed)
-    lower, upper = np.zeros(dimensions), np.ones(dimensions)
+    cube = np.zeros(dimensions), np.ones(dimensions)
     try:
-        if len(plan.objectives) == 1:
-            return AskTell.differential_evolution(
-                lower, upper, first, constraints=violations, seed=plan.seed, difference=DIFFERENCE, crossed=CROSSED
-            )
-        return AskTell.nsga2(
-            lower, upper, first, objectives=len(plan.objectives), constraints=violations, seed=plan.seed
-        )
+        return AskTell(*cube, first, objectives=len(plan.objectives), constraints=violations, seed=plan.seed)
     except ImportError:
         raise InputError('optimise needs the package pymoo: pip install "rodshell[optimise]"') from None
 
@@ -189,9 +180,6 @@ def front_of(plan: SearchPlan, store: Store) -> tuple[list[Finished], int]:
     """The designs that keep all constraints and that no other is better than, and the number that keep them.
 
     Of designs that are as good in every objective, the first is taken.
-
-    Args:
-        plan: of the search; store : with its designs.
     """
     kept = [
         (_judged(plan, design.outcome, design.row)[0], design)

@@ -51,7 +51,7 @@ class Finished:
     """A design whose job is finished.
 
     Args:
-        position: of the design; job : its identity.
+        job: its identity.
         keys: values of the axes' keys, in JSON's types.
         outcome: "found", "refused" (bad input), "failed" (an error of the program), "stopped" (by a limit) or
             "crashed".
@@ -185,11 +185,10 @@ class Store:
     # Designs
 
     def plan(self, designs: Iterable[tuple[Sequence[Any], str]], *, notes: Mapping[str, str] | None = None) -> None:
-        """Write the designs of the sweep in place of earlier ones, all or none.
+        """Write the designs of the sweep in place of earlier ones, all or none, with notes by their names.
 
         Args:
             designs: values of the keys, and the identity of the job.
-            notes: by name, to be noted with them.
         """
         self._write(designs, notes or {}, more=False)
 
@@ -248,14 +247,7 @@ class Store:
             return _read_row(row)
 
     def record(self, job: str, outcome: str, row: Mapping[str, Any]) -> None:
-        """A job is finished.
-
-        Args:
-            job: its identity; outcome, row : see `Finished`.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """A job is finished, see `Finished`; OutputError where that cannot be written."""
         try:
             content = json.dumps(row, separators=(",", ":"), allow_nan=False)
         except ValueError:
