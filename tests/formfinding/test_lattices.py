@@ -194,3 +194,24 @@ def test_curves_pass_over_an_opening_and_rods_end_at_it() -> None:
     assert np.count_nonzero(radius < 1.0) >= 8
     inside = form.popped["pinned"].positions[:, :2]
     assert np.linalg.norm(inside, axis=1).min() > 0.75
+
+
+def test_a_rod_that_swings_on_one_joint_does_not_keep_the_others_from_lying_flat() -> None:
+    """Nothing resists it in the plane; it is left out when the shell is trimmed."""
+    target = rs.HeightField(formula="4*(log(cos(y/4)) - log(cos(x/4)))", domain=rs.Disc(4.5))
+    job = rs.Job(target, rs.Geodesic(spacing=0.8), lath(0.024), joint=rs.Pin(), anchor=(0.0, 0.0))
+    form = job.run(until="drape")
+    assert form.draped.mesh.grid.joint_counts().min() == 1
+    assert form.flat_state is not None
+    assert form.flat_state.negative_modes == 0
+
+
+def test_laths_that_would_cross_just_past_their_ends_do_not_touch() -> None:
+    """As at a crossing next to an end: on one support they lie one over the other."""
+    target = rs.HeightField(formula="(x^3 - 3*x*y^2)/90", domain=rs.Disc(5.0))
+    rod = rs.Rod(rs.RectangularSection(width=0.006, height=0.060), GFRP)
+    form = rs.find_form(target, rs.Geodesic(spacing=0.8), rod, joint=rs.Pin(), ends="pinned")
+    first, last = form.footprint.mesh.grid.ends[form.footprint.mesh.grid.meetings(0.1).rods].transpose(2, 0, 1)
+    at = form.footprint.mesh.grid.meetings(0.1).at
+    assert ((at < first) | (last < at)).any()
+    assert form.checks.contact["pinned"].pairs == 0

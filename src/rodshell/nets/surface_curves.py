@@ -154,7 +154,7 @@ class SurfaceCurves:
         return np.column_stack([ends[np.searchsorted(of, each), 0], ends[np.searchsorted(of, each, "right") - 1, 1]])
 
     def crossings(self, family: Ints) -> Crossings:
-        """Where curves of different families cross, up to their last knots.
+        """Where curves of different families cross, up to a step past their last knots, where broad laths still meet.
 
         Args:
             family: (m,) of each curve.
@@ -178,7 +178,7 @@ class SurfaceCurves:
         low, high = self.reach.T
         met = np.linalg.norm(p - q, axis=1) < MET * self.step
         for side, each in enumerate((a, b)):
-            met &= (at[:, side] >= low[each]) & (at[:, side] <= high[each])
+            met &= (at[:, side] >= low[each] - self.step) & (at[:, side] <= high[each] + self.step)
         rods, at = np.column_stack([a, b])[met], at[met]
         order = np.lexsort((at[:, 0], rods[:, 1], rods[:, 0]))
         rods, at = rods[order], at[order]
