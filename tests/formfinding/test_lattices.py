@@ -1,5 +1,6 @@
 """Shells of rods along geodesics and asymptotic lines: laid, popped up, flat or assembled in place, kept and drawn."""
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from rodshell.case import load_case
 from rodshell.errors import InputError
 from rodshell.output.drawings import drawing_set
 from rodshell.output.grid import joints_of, rods_of, shape_names
+from rodshell.output.schedules import joints_table
 from rodshell.results.archive import Archive, read
 
 LOW, HIGH = rs.Cap(radius=2.0, base=1.6), rs.Cap(radius=2.0, base=1.0)
@@ -99,6 +101,24 @@ def test_a_rod_that_bends_in_the_flat_state_is_drawn_along_its_course() -> None:
     for joint in joints_of(rods):
         (a, b), (at_a, at_b) = joint.rods, joint.at
         np.testing.assert_allclose(rods[a].point(at_a), rods[b].point(at_b), atol=1e-5)
+
+
+@pytest.mark.parametrize("form", [low, high])
+def test_schedules_have_the_places_of_joints_and_no_flat_ones_of_a_shell_that_is_assembled_in_place(
+    form: Callable[[], rs.Form],
+) -> None:
+    archive, mesh = kept(form()), form().footprint.mesh
+    names, rows = joints_table(archive)
+    places = form().popped["pinned"].positions[mesh.joint_nodes]
+    for joint, place in zip(mesh.grid.joint_names, places, strict=True):
+        row = next(dict(zip(names, row, strict=True)) for row in rows if row[0] == joint)
+        found = [float(row[f"final_{axis}_mm"]) for axis in "xyz"]
+        np.testing.assert_allclose(found, 1e3 * place, atol=0.1)  # twice the rounding
+        assert bool(row["flat_x_mm"]) == bool(row["scissor_deg"]) == (form is low)
+    if form is low:
+        scissors = {"/".join(load.rods): load.scissor_deg for load in archive.results.joint_loads["pinned"]}
+        for row in rows:
+            assert float(row[names.index("scissor_deg")]) == pytest.approx(scissors[row[0]], abs=0.05)
 
 
 def test_a_result_is_kept_and_its_case_gives_it_again(tmp_path: Path) -> None:

@@ -89,6 +89,11 @@ class GridRod:
         (first, second), start = self.course[k : k + 2], self.stations[k]
         return np.asarray(first + (at - start) / (self.stations[k + 1] - start) * (second - first))
 
+    def heading(self, at: float) -> Floats:
+        """(2,) direction of the flat rod at the distance `at` from the start, half an edge to either side."""
+        step = 0.5 * float(np.diff(self.stations).min())
+        return self.point(at + step) - self.point(at - step)
+
     @property
     def as_cut(self) -> Floats:
         """(k, 2) its course with its allowances at both ends [m]."""
@@ -99,6 +104,15 @@ class GridRod:
 def along(points: Floats) -> Floats:
     """(k,) distances of points (k, d) of a polyline from its first, along it [m]."""
     return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+
+
+def node_stations(archive: Archive, rod: GridRod) -> Floats:
+    """(k,) distances of a rod's nodes from its start [m]; its flat state may not keep them if it is assembled in place,
+    so that rods along curves of the target are measured there."""
+    if archive.results.flat_state is None:
+        return along(archive.states["flat"][rod.nodes])
+    found = along(archive.states[DRAPED][rod.nodes])
+    return np.asarray(found * (rod.length / found[-1]))
 
 
 @dataclass(frozen=True)
@@ -161,11 +175,10 @@ def outlines_of(rods: list[GridRod]) -> list[Ints]:
 @made_once
 def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
     """The nodes of each joint that has some, on both of its rods, by its id: one node twice, or one in either layer."""
-    rods, flat = rods_of(archive), archive.states.get("flat")
-    nodes = dict[str, list[int]]()
-    if flat is None:
+    rods, nodes = rods_of(archive), dict[str, list[int]]()
+    if "flat" not in archive.states:
         return nodes
-    stations = [along(flat[rod.nodes]) for rod in rods]
+    stations = [node_stations(archive, rod) for rod in rods]
     for joint in joints_of(rods):
         if all(len(rods[k].nodes) for k in joint.rods):
             pairs = zip(joint.rods, joint.at, strict=True)

@@ -18,7 +18,7 @@ from rodshell.figures.form import Meeting, Stiffness
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends, printable
 from rodshell.geometry.frames import unit
-from rodshell.output.grid import GridRod, joints_of, rods_of
+from rodshell.output.grid import GridRod, joints_of, lies_flat, node_stations, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.states import POPPED
@@ -93,7 +93,7 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
             True,
             lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
         ),
-        *_ends(mm, "flat", 2, lambda rod: rod.flat),
+        *_ends(mm, "flat", 2, lambda rod: rod.flat if lies_flat(archive) else None),
         ("final_state", False, lambda rod: final or "" if len(rod.nodes) else ""),
         *_ends(
             mm, "final", 3, lambda rod: archive.states[final][rod.nodes[[0, -1]]] if final and len(rod.nodes) else None
@@ -172,10 +172,10 @@ def _all_of_joints(archive: Archive) -> Table:
     """All columns. Each entry of `columns` is a name and what it says of a joint: more may be added there."""
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
     placed = [_joints_in_space(archive, rod, final) for rod in rods]
-    joints, along = joints_of(rods), np.array([rod.flat[1] - rod.flat[0] for rod in rods]).reshape(-1, 2)
+    joints, is_flat = joints_of(rods), lies_flat(archive)
     in_space = [(placed[i].get(rods[j].id), placed[j].get(rods[i].id)) for i, j in (joint.rods for joint in joints)]
-    first, second = np.array([joint.rods for joint in joints], dtype=np.intp).reshape(-1, 2).T
-    flats = _degrees(along[first], along[second])
+    along = [rods[k].heading(at) for joint in joints for k, at in zip(joint.rods, joint.at, strict=True)]
+    flats = _degrees(*np.array(along).reshape(-1, 2, 2).transpose(1, 0, 2))
     tangents = np.array([[UNKNOWN if on is None else on[1] for on in pair] for pair in in_space]).reshape(-1, 2, 3)
     angles = _degrees(tangents[:, 0], tangents[:, 1])
     loads = _joint_loads(archive, final)
@@ -191,13 +191,13 @@ def _all_of_joints(archive: Archive) -> Table:
             "at_a_from_cut_end_mm": mm(a.from_cut_end(joint.at[0])),
             "at_b_from_cut_end_mm": mm(b.from_cut_end(joint.at[1])),
             "over": joint.over(rods),
-            "flat_x_mm": mm(x),
-            "flat_y_mm": mm(y),
+            "flat_x_mm": mm(x) if is_flat else "",
+            "flat_y_mm": mm(y) if is_flat else "",
             "final_state": (final or "") if on_a else "",
             **dict(zip(("final_x_mm", "final_y_mm", "final_z_mm"), space, strict=True)),
-            "flat_deg": f"{flat:.2f}",
+            "flat_deg": f"{flat:.2f}" if is_flat else "",
             "final_deg": "" if isnan(angle) else f"{angle:.2f}",
-            "scissor_deg": "" if isnan(angle) else f"{round(angle - flat, 2) + 0.0:.2f}",
+            "scissor_deg": "" if isnan(angle) or not is_flat else f"{round(angle - flat, 2) + 0.0:.2f}",
             **loads.get((a.id, b.id), dict.fromkeys(_LOADS, "") if loads else {}),
         }  # fmt: skip
         rows.append(list(columns.values()))
@@ -278,7 +278,8 @@ def bracing_table(archive: Archive, *, brief: bool = False) -> Table:
     results, mm = archive.results, rounding_of(archive.results).mm
     braces = results.fabrication.bracing if results.fabrication else ()
     columns = ["from", "to", "flat_mm", "final_mm"]
-    rows = [[brace.start, brace.end, mm(brace.flat), mm(brace.final)] for brace in braces]
+    is_flat = lies_flat(archive)
+    rows = [[brace.start, brace.end, mm(brace.flat) if is_flat else "", mm(brace.final)] for brace in braces]
     cables = any(brace.cut is not None for brace in braces)
     if cables:
         columns.append("cut_mm")
@@ -389,8 +390,7 @@ def _joints_in_space(archive: Archive, rod: GridRod, state: str | None) -> dict[
     """Position (3,) [m] and a tangent (3,) of a rod at its joints, by the rod that is met; empty if not known."""
     if state is None or len(rod.nodes) < 2 or "flat" not in archive.states:
         return {}
-    flat, x = archive.states["flat"][rod.nodes], archive.states[state][rod.nodes]
-    stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(flat, axis=0), axis=1))])
+    x, stations = archive.states[state][rod.nodes], node_stations(archive, rod)
     at = np.array([at for _, at in rod.joints])
     step = 0.5 * np.diff(stations).min()  # stays within the edges on both sides
     before, position, after = (

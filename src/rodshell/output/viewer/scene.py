@@ -18,7 +18,17 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
-from rodshell.output.grid import GridJoint, GridRod, Shape, along, joints_of, laid_out, rods_of, shape_names, shape_of
+from rodshell.output.grid import (
+    GridJoint,
+    GridRod,
+    Shape,
+    joints_of,
+    laid_out,
+    node_stations,
+    rods_of,
+    shape_names,
+    shape_of,
+)
 from rodshell.output.models import section_outline, widths_along
 from rodshell.output.pictures import FAMILIES
 from rodshell.output.schedules import Table, heading, joints_table, rods_table
@@ -237,8 +247,7 @@ def _drawn_joints(archive: Archive, rods: list[GridRod]) -> list[tuple[GridJoint
     if "flat" not in archive.states:
         return []
     starts = np.cumsum([0, *(len(rod.nodes) for rod in rods)])
-    flat = archive.states["flat"]
-    stations = [along(flat[rod.nodes]) for rod in rods]
+    stations = [node_stations(archive, rod) for rod in rods]
     found = []
     for joint in joints_of(rods):
         pairs = zip(joint.rods, joint.at, strict=True)
