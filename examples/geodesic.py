@@ -1,30 +1,19 @@
-"""Wide laths on a dome: along an inextensible net they buckle, along geodesics they stand.
+"""Laths of 2 x 40 mm along geodesics of a dome, where they are straight when developed; along a net they buckle.
 
-Laths 2 x 40 mm have EI2/EI1 = 400. Prints whether each lattice stands, how near it comes to the target, and whether its
-grid lies flat.
+They bend 400 times as easily out of the surface as within it. The dome is too high for its laths to lie flat together.
 """
 
 import rodshell as rs
 
-TARGET = rs.Cap(radius=2.0, base=1.0)
-LATH = rs.Rod(rs.RectangularSection(width=0.002, height=0.040), rs.Material.preset("gfrp"))
-
-
-def main() -> None:
-    for layout in (
-        rs.GridLayout.orthogonal(spacing=0.3),
-        rs.Geodesic(spacing=0.3),
-        rs.Geodesic(spacing=0.3, families=3),
-    ):
-        form = rs.find_form(TARGET, layout, LATH, joint=rs.Pin(), ends="pinned")
-        name = f"{layout.kind}, {len(form.footprint.rods)} laths"
-        if form.status != "converged":
-            print(f"{name}: does not stand: {form.status}")
-            continue
-        flat = form.flat_state
-        where = "lies flat" if flat is None or flat.lies_flat else "is assembled in place"
-        print(f"{name}: {form.agreement['pinned']}; {where}")
-
-
-if __name__ == "__main__":
-    main()
+target = rs.Cap(radius=2.0, base=1.0)
+lath = rs.Rod(rs.RectangularSection(width=0.002, height=0.040), rs.Material.preset("gfrp"))
+net = rs.find_form(target, rs.GridLayout.orthogonal(spacing=0.3), lath, joint=rs.Pin(), ends="pinned")
+print(f"along a net: {net.status}")
+form = rs.find_form(target, rs.Geodesic(spacing=0.3), lath, joint=rs.Pin(), ends="pinned")
+gap, flat = form.agreement["pinned"], form.flat_state
+print(f"along geodesics, {len(form.footprint.rods)} laths: {gap}")
+assert net.status != "converged"
+assert form.popped["pinned"].report.stable
+assert gap.max_relative < 0.002
+assert flat is not None
+assert not flat.lies_flat

@@ -284,7 +284,7 @@ class Form:
 
     def results(self) -> Results:
         """The typed content of result.json before anything was checked."""
-        found = results_of(self.stages)
+        found = results_of(self.stages).changed(flat_state=self.flat_state)
         return found if self.refined is None else with_refinement(found, self.refined)
 
     def unchecked(self) -> Archive:
@@ -386,7 +386,7 @@ class Form:
     @cached_property
     def _archive(self) -> Archive:
         checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
-        results = self.results().changed(flat_state=self.flat_state)
+        results = self.results()
         if self.stages.seams is not None:
             results = with_seam_forces(results, self.stages.seams, checks)
         mesh, asked = self.footprint.mesh, self.case.strength

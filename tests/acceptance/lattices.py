@@ -16,6 +16,7 @@ from rodshell.geometry.frames import cross, unit
 from rodshell.layout import GridMesh
 from rodshell.nets.surface_curves import SurfaceCurves, geodesic, trace
 from rodshell.nets.surface_lattice import surface_net
+from tests.acceptance.lattices_gallery import gallery_rows
 from tests.acceptance.rows import Row, print_table
 from tests.targets.meshes import lattice
 
@@ -213,7 +214,7 @@ def flat_rows() -> Iterator[Row]:
         yield Row(f"flat state, low cap, {1e3 * width:.0f} mm", "negative modes", found.report.negative_modes, 0)
 
 
-ROWS = (geodesic_rows, straight_rows, shell_rows, family_rows, strip_rows, flat_rows)
+ROWS = (geodesic_rows, straight_rows, shell_rows, family_rows, strip_rows, flat_rows, gallery_rows)
 
 
 def main() -> int:

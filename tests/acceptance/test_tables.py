@@ -44,6 +44,7 @@ CHEAP: dict[str, tuple[Rows, ...]] = {
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
     "lattices": (
         lattices.geodesic_rows, lattices.straight_rows, lattices.shell_rows, lattices.family_rows, lattices.flat_rows,
+        partial(lattices.gallery_rows, ("garden pavilion", "saddle")),
     ),
     "loads": (
         loads_stability.benchmark_rows, loads_stability.closed_form_rows, loads_stability.vibration_rows,

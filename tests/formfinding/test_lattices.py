@@ -1,5 +1,6 @@
 """Shells of rods along geodesics and asymptotic lines: laid, popped up, flat or assembled in place, kept and drawn."""
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from rodshell.errors import InputError
 from rodshell.nets.surface_lattice import surface_net
 from rodshell.output.drawings import drawing_set
 from rodshell.output.grid import joints_of, rods_of, shape_names
+from rodshell.output.schedules import joints_table
 from rodshell.results.archive import Archive, read
 
 LOW, HIGH = rs.Cap(radius=2.0, base=1.6), rs.Cap(radius=2.0, base=1.0)
@@ -101,6 +103,24 @@ def test_a_rod_that_bends_in_the_flat_state_is_drawn_along_its_course() -> None:
     for joint in joints_of(rods):
         (a, b), (at_a, at_b) = joint.rods, joint.at
         np.testing.assert_allclose(rods[a].point(at_a), rods[b].point(at_b), atol=1e-5)
+
+
+@pytest.mark.parametrize("form", [low, high])
+def test_schedules_have_the_places_of_joints_and_no_flat_ones_of_a_shell_that_is_assembled_in_place(
+    form: Callable[[], rs.Form],
+) -> None:
+    archive, mesh = kept(form()), form().footprint.mesh
+    names, rows = joints_table(archive)
+    places = form().popped["pinned"].positions[mesh.joint_nodes]
+    for joint, place in zip(mesh.grid.joint_names, places, strict=True):
+        row = next(dict(zip(names, row, strict=True)) for row in rows if row[0] == joint)
+        found = [float(row[f"final_{axis}_mm"]) for axis in "xyz"]
+        np.testing.assert_allclose(found, 1e3 * place, atol=0.1)  # twice the rounding
+        assert bool(row["flat_x_mm"]) == bool(row["scissor_deg"]) == (form is low)
+    if form is low:
+        scissors = {"/".join(load.rods): load.scissor_deg for load in archive.results.joint_loads["pinned"]}
+        for row in rows:
+            assert float(row[names.index("scissor_deg")]) == pytest.approx(scissors[row[0]], abs=0.05)
 
 
 def test_a_result_is_kept_and_its_case_gives_it_again(tmp_path: Path) -> None:
@@ -302,3 +322,24 @@ def test_on_a_plane_a_curved_lattice_is_free_of_stress() -> None:
     bent = 0.02 * 0.4  # half the breadth times the lines' curvature: what straight rods would have
     assert strains[0] < 2e-3 * bent
     assert strains[1] < 0.3 * strains[0]
+
+
+def test_a_rod_that_swings_on_one_joint_does_not_keep_the_others_from_lying_flat() -> None:
+    """Nothing resists it in the plane; it is left out when the shell is trimmed."""
+    target = rs.HeightField(formula="4*(log(cos(y/4)) - log(cos(x/4)))", domain=rs.Disc(4.5))
+    job = rs.Job(target, rs.Geodesic(spacing=0.8), lath(0.024), joint=rs.Pin(), anchor=(0.0, 0.0))
+    form = job.run(until="drape")
+    assert form.draped.mesh.grid.joint_counts().min() == 1
+    assert form.flat_state is not None
+    assert form.flat_state.negative_modes == 0
+
+
+def test_laths_that_would_cross_just_past_their_ends_do_not_touch() -> None:
+    """As at a crossing next to an end: on one support they lie one over the other."""
+    target = rs.HeightField(formula="(x^3 - 3*x*y^2)/90", domain=rs.Disc(5.0))
+    rod = rs.Rod(rs.RectangularSection(width=0.006, height=0.060), GFRP)
+    form = rs.find_form(target, rs.Geodesic(spacing=0.8), rod, joint=rs.Pin(), ends="pinned")
+    first, last = form.footprint.mesh.grid.ends[form.footprint.mesh.grid.meetings(0.1).rods].transpose(2, 0, 1)
+    at = form.footprint.mesh.grid.meetings(0.1).at
+    assert ((at < first) | (last < at)).any()
+    assert form.checks.contact["pinned"].pairs == 0

@@ -13,6 +13,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import rod_breadth
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures, FlatState, smallest_joint_angle
+from rodshell.formfinding.trim import FEWEST_JOINTS
 from rodshell.geometry.frames import unit
 from rodshell.joints import Joint
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
@@ -31,7 +32,7 @@ from rodshell.solve.problem import Problem, Supports
 from rodshell.targets import Target
 from rodshell.units import shown
 
-MOST_ITERATIONS = 100  # of the flat state: a grid that lies flat takes less than ten
+MOST_ITERATIONS = 24  # of the flat state: a grid that lies flat takes less than ten, another may take hundreds
 PENALTY = 8e4  # stiffness of the edges against that of bending over the size, as of a bound drape
 
 
@@ -109,7 +110,9 @@ def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
         named = zip(piece_names(name, len(pieces)), pieces, strict=True)
         rods += [lines[k].cut(*piece)._replace(name=label) for label, piece in named]
     marks = [ends[of == k].ravel().tolist() for k in range(len(lines))]
-    grid = FlatGrid(tuple(lines), net.crossings, net.crossings.select(np.zeros(len(net.crossings), dtype=bool)))
+    low, high = reach[net.crossings.rods].transpose(2, 0, 1)
+    on_both = ((low <= net.crossings.at) & (net.crossings.at <= high)).all(axis=1)
+    grid = FlatGrid(tuple(lines), net.crossings.select(on_both), net.crossings.select(~on_both))
     whole = mesh_grid(grid, lattice.longest_edge, marks=marks)
     mesh, nodes = cut_mesh(whole, rods)
     positions = np.empty((whole.node_count, 3))
@@ -133,6 +136,12 @@ def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progres
     Args:
         positions: (n, 3) of the mesh's nodes on the target [m], from whose plan the search starts.
     """
+    standing, _ = mesh.grid.without(lambda grid: grid.joint_counts() < FEWEST_JOINTS)  # nothing resists a swinging rod
+    if standing.rods and len(standing.rods) < len(mesh.grid.rods):
+        inner, nodes = cut_mesh(mesh, standing.rods)
+        without, lying = flat_state(inner, positions[nodes], rod, progress=progress), positions[:, :2].copy()
+        lying[nodes] = without.positions
+        return replace(without, positions=lying)
     start = positions * [1.0, 1.0, 0.0]
     chords = np.linalg.norm(np.diff(start[mesh.edges], axis=1)[:, 0], axis=1)
     start *= mesh.edge_lengths.sum() / chords.sum()

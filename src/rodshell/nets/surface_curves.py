@@ -26,6 +26,7 @@ LONGEST = 20.0  # sizes that a curve may go without reaching the end
 NEWTON_STEPS = 30
 BISECTIONS = 50
 FINER = 4  # places of a step at which openings are looked for
+BEYOND = 3.0  # steps past the last knots up to which crossings are known: there broad laths still lie on each other
 MET = 1e-4  # steps between curves at a crossing: between their knots both leave the surface by less
 
 Law = Callable[[Target, Floats, Floats], tuple[Floats, Floats]]
@@ -170,13 +171,17 @@ class SurfaceCurves:
         return np.column_stack([ends[np.searchsorted(of, each), 0], ends[np.searchsorted(of, each, "right") - 1, 1]])
 
     def crossings(self, family: Ints) -> Crossings:
-        """Where curves of different families cross, up to their last knots.
+        """Where curves of different families cross, up to `BEYOND` past their last knots.
 
         Args:
             family: (m,) of each curve.
         """
         curve, s = self.knots
-        near = cKDTree(self.points).query_pairs(1.01 * self.step, output_type="ndarray")
+        last = np.zeros(len(self.points), dtype=bool)
+        last[self.begin[:-1]] = last[self.begin[1:] - 1] = True
+        near = cKDTree(self.points).query_pairs(BEYOND * self.step, output_type="ndarray")
+        apart = np.linalg.norm(self.points[near[:, 0]] - self.points[near[:, 1]], axis=1)
+        near = near[(apart <= 1.01 * self.step) | last[near].any(axis=1)]
         of = curve[near]
         near = np.where((of[:, 0] < of[:, 1])[:, None], near, near[:, ::-1])
         pairs = near[family[of[:, 0]] != family[of[:, 1]]]
@@ -190,10 +195,10 @@ class SurfaceCurves:
             change = np.column_stack([by_a - mixed * by_b, mixed * by_a - by_b]) / sine[:, None]
             at = at + np.clip(change, -self.step, self.step)
         (p, _), (q, _) = self.at(a, at[:, 0]), self.at(b, at[:, 1])
-        low, high = self.reach.T
+        (low, high), past = self.reach.T, BEYOND * self.step
         met = np.linalg.norm(p - q, axis=1) < MET * self.step
         for side, each in enumerate((a, b)):
-            met &= (at[:, side] >= low[each]) & (at[:, side] <= high[each])
+            met &= (at[:, side] >= low[each] - past) & (at[:, side] <= high[each] + past)
         rods, at = np.column_stack([a, b])[met], at[met]
         order = np.lexsort((at[:, 0], rods[:, 1], rods[:, 0]))
         rods, at = rods[order], at[order]

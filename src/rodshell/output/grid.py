@@ -90,6 +90,11 @@ class GridRod:
         (first, second), start = self.course[k : k + 2], self.stations[k]
         return np.asarray(first + (at - start) / (self.stations[k + 1] - start) * (second - first))
 
+    def heading(self, at: float) -> Floats:
+        """(2,) direction of the flat rod at the distance `at` from the start, half an edge to either side."""
+        step = 0.5 * float(np.diff(self.stations).min())
+        return self.point(at + step) - self.point(at - step)
+
     @property
     def as_cut(self) -> Floats:
         """(k, 2) its course with its allowances at both ends [m]."""
@@ -100,6 +105,15 @@ class GridRod:
 def along(points: Floats) -> Floats:
     """(k,) distances of points (k, d) of a polyline from its first, along it [m]."""
     return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+
+
+def node_stations(archive: Archive, rod: GridRod) -> Floats:
+    """(k,) distances of a rod's nodes from its start [m]; its flat state may not keep them if it is assembled in place,
+    so that rods along curves of the target are measured there."""
+    if archive.results.flat_state is None:
+        return along(archive.states["flat"][rod.nodes])
+    found = along(archive.states[DRAPED][rod.nodes])
+    return np.asarray(found * (rod.length / found[-1]))
 
 
 @dataclass(frozen=True)
@@ -174,9 +188,9 @@ def joint_entries(archive: Archive) -> list[tuple[GridJoint, list[int]]]:
     twice, or one in either layer."""
     if "flat" not in archive.states:
         return []
-    rods, flat = meshed_rods(archive), archive.states["flat"]
+    rods = meshed_rods(archive)
     starts: list[int] = np.cumsum([0, *(len(rod.nodes) for rod in rods)]).tolist()
-    stations = [along(flat[rod.nodes]) for rod in rods]
+    stations = [node_stations(archive, rod) for rod in rods]
 
     def entry(rod: int, at: float) -> int:
         return starts[rod] + int(np.abs(stations[rod] - at).argmin())

@@ -22,7 +22,7 @@ from rodshell.figures.form import Meeting, Stiffness
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends, printable
 from rodshell.geometry.frames import unit
-from rodshell.output.grid import GridJoint, GridRod, along, end_nodes, joints_of, rods_of
+from rodshell.output.grid import GridJoint, GridRod, end_nodes, joints_of, lies_flat, node_stations, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.laths import laths_on
@@ -99,7 +99,15 @@ def rods_table(archive: Archive) -> Table:
         points = [archive.states[final][rod.nodes[-end]] if final and len(rod.nodes) else None for rod in rods]
         table |= _by_axis("final_", f"{end}_mm", points, mm)
     table["joints_from_cut_end_mm"] = [_joints_at(rod, mm) for rod in rods]
-    return table
+    return _of_a_flat_grid(table, archive)
+
+
+def _of_a_flat_grid(table: Table, archive: Archive) -> Table:
+    """What is said of the flat grid is left empty where there is none, as the shell is assembled in place."""
+    if lies_flat(archive):
+        return table
+    flat = {name for name in table if name.startswith("flat_")} | {"scissor_deg"}
+    return {name: [""] * len(cells) if name in flat else cells for name, cells in table.items()}
 
 
 def sections_table(archive: Archive) -> Table:
@@ -158,7 +166,8 @@ def joints_table(archive: Archive) -> Table:
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
     joints = joints_of(rods)
     pairs = [(rods[i], rods[j]) for i, j in (joint.rods for joint in joints)]
-    ways = np.array([[rod.flat[1] - rod.flat[0] for rod in pair] for pair in pairs]).reshape(-1, 2, 2)
+    ways = np.array([[rods[k].heading(s) for k, s in zip(joint.rods, joint.at, strict=True)] for joint in joints])
+    ways = ways.reshape(-1, 2, 2)
     points, tangents = _in_space(archive, rods, joints, final)
     flats, angles = _degrees(ways[:, 0], ways[:, 1]), _degrees(tangents[:, 0], tangents[:, 1])
     known = np.isfinite(points[:, 0, 0]).tolist()
@@ -183,7 +192,7 @@ def joints_table(archive: Archive) -> Table:
         table["normal_force_N"] = [_six(load.normal_force) for load in joint_loads]
         table["shear_moment_Nm"] = [_six(load.shear_moment) for load in joint_loads]
         table["out_of_plane_moment_Nm"] = [_six(load.out_of_plane_moment) for load in joint_loads]
-    return table
+    return _of_a_flat_grid(table, archive)
 
 
 def supports_table(archive: Archive) -> Table:
@@ -243,7 +252,7 @@ def bracing_table(archive: Archive) -> Table:
         slack = [[f"{name} ({ends})" for (name, ends), forces in loaded.items() if forces[k] == 0]
                  for k in range(len(braces))]  # fmt: skip
         table["slack_under"] = ["; ".join(names) for names in slack]
-    return table
+    return _of_a_flat_grid(table, archive)
 
 
 def foundations_table(archive: Archive) -> Table:
@@ -325,7 +334,7 @@ def _in_space(
     at = np.array([joint.at for joint in joints]).reshape(-1, 2)
     points, tangents = np.full((2, len(joints), 2, 3), np.nan)
     for k, rod in enumerate(rods if state in archive.states and "flat" in archive.states else ()):
-        x, stations = archive.states[state or ""][rod.nodes], along(archive.states["flat"][rod.nodes])
+        x, stations = archive.states[state or ""][rod.nodes], node_stations(archive, rod)
         if len(x):
             here, step = on == k, 0.5 * np.diff(stations).min()  # stays within the edges on both sides
             before, points[here], after = (

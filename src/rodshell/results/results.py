@@ -188,7 +188,7 @@ def read_results(path: Path) -> Results:
     return Results.from_text(json.dumps(upgraded(content, source=str(path))), source=str(path))
 
 
-def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
+def upgraded(given: Mapping[str, Any], *, source: str) -> dict[str, Any]:
     """The content of a result.json of any version with the keys of the present one.
 
     Until November 2026 the format was called gridshell-result. Version 2 renamed drape.own_ends to drape.net_deviation.
@@ -196,7 +196,7 @@ def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
     Raises:
         OutputError: another format, or a newer version.
     """
-    content = dict(content)
+    content = dict(given)
     if content.get("format", FORMAT) not in (FORMAT, "gridshell-result"):
         raise OutputError(f'{source} is not a rodshell result: its "format" is not "{FORMAT}"')
     version = content.get("version", VERSION)
