@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-drawn attack ci-full house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-drawn accept-lattices attack ci-full house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -61,11 +61,14 @@ accept-studio: ## print the table of the studio: dragging, sessions, flows in a 
 accept-drawn: ## print the table of targets as they are drawn
 	python -m tests.acceptance.drawn
 
+accept-lattices: ## print the table of lattices along curves of the target
+	python -m tests.acceptance.lattices
+
 attack:    ## hostile input of every kind, a hundred times as many tries as in the tests (an hour)
 	RODSHELL_ATTACK=$(or $(TRIES),100) python -m pytest -n 2 -m attack tests
 	python -m tests.acceptance.verdict harm
 
-accept-house: ## print the table of results before and after, archives, misuses (ten minutes)
+accept-house: ## print the table of kept results, archives of all formats, misuses, the source tree (a minute)
 	python -m tests.acceptance.house
 
 accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1000 ten minutes)
@@ -74,9 +77,9 @@ accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1
 ci-full:   ## what .ci/run does, and every acceptance table (hours; DESIGNS=1000 for a shorter sweep)
 	.ci/run
 	$(MAKE) --keep-going test-indices accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
-		accept-house accept-loads accept-refine accept-sweep accept-studio accept-drawn attack
+		accept-house accept-loads accept-refine accept-sweep accept-studio accept-drawn accept-lattices attack
 
-house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
+house:     ## print the source by room, before and after: statements, lines, public names, files; circles, long files
 	python -m tests.acceptance.house_figures
 
 paper:     ## the paper's figures again, into docs/paper/ and docs/paper.md (some minutes)

@@ -66,8 +66,7 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the deprecation
         from numba.pycc import CC, compiler
-    from rodshell.kernels import jit, library_name
-    from rodshell.kernels.table import KERNELS
+    from rodshell.kernels import KERNELS, jit, library_name, modules
 
     compile_extra = compiler.compile_extra
     options = dict[object, dict[str, object]]()
@@ -96,13 +95,14 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
         def __iter__(self) -> Iterator[compiler.ExportEntry]:
             """Those that were taken; and, the first time, those that can still be, the longest sources first."""
             yield from self._exported_functions.values()
-            for module in sorted(KERNELS, key=lambda module: -source_of(module).stat().st_size):
+            for module in sorted(modules(), key=lambda module: -source_of(module).stat().st_size):
                 try:
                     (claims / module).touch(exist_ok=False)
                 except FileExistsError:
                     continue
-                for name, row in KERNELS[module].items():
-                    kernel = getattr(import_module(f"rodshell.{module}"), name)
+                source = import_module(f"rodshell.{module}")
+                for name, row in sorted(KERNELS[module].items()):
+                    kernel = getattr(source, name)
                     options[kernel.py_func] = {k: v for k, v in kernel.targetoptions.items() if k != "cache"}
                     types_of_row = signature(None, *jit.arguments_of(row))
                     entry = compiler.ExportEntry(f"{module}.{name}", types_of_row, kernel.py_func)

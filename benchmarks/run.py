@@ -1,14 +1,14 @@
 """All benchmarks in one table: `python benchmarks/run.py [--quick] [--only NAME,...] [--write FILE]`.
 
-Ratios and counts are what to trust; times belong to the machine. --quick leaves out what takes minutes: large systems,
-long falls. Without --quick the table is written to docs/performance.md, with --quick only where --write says so.
+--quick leaves out what takes minutes: large systems, long falls. Without --quick the table is written to
+docs/performance.md, with --quick only where --write says so.
 """
 
 import argparse
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -18,9 +18,7 @@ sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 
 from benchmarks import (  # noqa: E402
-    beside,
     costs,
-    earlier,
     factorisation,
     first_run,
     jobs,
@@ -37,8 +35,6 @@ from benchmarks.rows import Row, Section, machine  # noqa: E402
 
 SECTIONS: dict[str, Callable[[bool], Section]] = {
     "job": lambda quick: jobs.whole_job(5 if quick else 15),
-    "earlier": lambda quick: earlier.earlier(2 if quick else 7),
-    "beside": beside.beside,
     "paper": others.paper,
     "factorisation": factorisation.factorisation,
     "scaling": scaling.scaling,
@@ -47,8 +43,7 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "warm": lambda quick: jobs.warm(3 if quick else 9),
     "startup": lambda quick: startup.section(3 if quick else 7),
     "first": lambda _: first_run.section(),
-    "first-alike": lambda _: first_run.section(alike=True),
-    "first-compiled": lambda _: first_run.section(alike=True, compiled=True),
+    "first-compiled": lambda _: first_run.section(compiled=True),
     "costs": costs.costs,
     "loads": lambda quick: loads.loads(1 if quick else 3),
     "sameness": sameness.sameness,
@@ -58,8 +53,8 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
 }
 HEAD = """# How fast it is
 
-Printed by `make bench` (`python benchmarks/run.py`; `--quick` for the short ones). Ratios and counts are what to trust:
-times belong to the machine, and to what else it does. Nothing here is asserted by a test.
+Printed by `make bench`, which is `python benchmarks/run.py`; the command below a title prints that table again, in less
+time with `--quick`. Ratios and counts can be compared between machines, times cannot. No test asserts any of it.
 
 """
 
@@ -74,11 +69,11 @@ def main() -> int:
     unknown = [name for name in names if name not in SECTIONS]
     if unknown:
         parser.error(f"unknown benchmark {unknown[0]}: use {', '.join(SECTIONS)}")
-    sections = list[Section]()
+    sections = dict[str, Section]()
     for k, name in enumerate(names, start=1):
         print(f"benchmark {k} of {len(names)}: {name}", file=sys.stderr, flush=True)
-        sections.append(SECTIONS[name](given.quick))
-        print(_plain(sections[-1]), flush=True)
+        sections[name] = SECTIONS[name](given.quick)
+        print(_plain(sections[name]), flush=True)
     where = given.write or (None if given.quick or given.only else ROOT / "docs" / "performance.md")
     if where is not None:
         Path(where).write_text(document(sections, quick=given.quick), encoding="utf-8")
@@ -86,18 +81,18 @@ def main() -> int:
     return 0
 
 
-def document(sections: Sequence[Section], *, quick: bool) -> str:
-    """The table as Markdown, what was asked first."""
-    asked = [row for section in sections for row in section.rows if row.asked]
+def document(sections: Mapping[str, Section], *, quick: bool) -> str:
+    """The tables as Markdown."""
     how = "short runs (`--quick`)" if quick else "whole runs"
     parts = [f"{HEAD}Measured on {machine()}; commit {_commit()}; {how}.\n"]
-    if asked:
-        parts.append(f"## What was asked\n\n{_table(('what', 'measured', 'asked'), asked)}")
-    parts += [f"## {one.title}\n\n{one.said.strip()}\n\n{_table(('what', 'measured'), one.rows)}" for one in sections]
+    for name, one in sections.items():
+        said = " ".join(one.said.split())
+        parts.append(f"## {one.title}\n\n`python benchmarks/run.py --only {name}`: {said}\n\n{_table(one.rows)}")
     return "\n".join(parts)
 
 
-def _table(heads: Sequence[str], rows: Sequence[Row]) -> str:
+def _table(rows: Sequence[Row]) -> str:
+    heads = ("what", "measured", *(["asked"] * any(row.asked for row in rows)))
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for row in rows:
         cells = (row.what.replace("   ", "&nbsp;&nbsp;"), row.figure, row.asked)[: len(heads)]

@@ -15,8 +15,8 @@ HEAD = """# The paper's figures
 
 HQK = W. Huang, L. Qin, M. Khalid Jawed, J. Appl. Mech. 88 (2021). Made by `make paper`; a single one by
 `rodshell paper FIGURE`, all of them by `rodshell paper all`. Differences from the paper, with their reasons,
-are in [equations.md](equations.md), E1 to E23. Times are those of one thread on one machine: only their ratios can be
-compared.
+are in [equations.md](equations.md), E1 to E23. Times are those of one thread on one machine, with other
+work: only ratios within one table can be compared.
 """
 
 MORE = {"fig6": ["fig6-differences"]}  # pictures beside the figure's own
@@ -27,8 +27,9 @@ COMPARED = {  # what the paper shows in this place
     "fig4": "The paper states that the second rod turns at the same angular velocity, 10 rpm, in both demonstrations, "
     "and gives no lag.",
     "fig6": 'The paper shows the same panels for its method only, without numbers: "the good match indicates the '
-    'correctness". Rod counts, spacing and rod are those of the paper; edges are 15 mm, which gives its 8000 unknowns '
-    "(E21). The bound drape starts from the net and uses the net's G0; the figure shows where the rods of the drape "
+    'correctness". Rod counts, spacing and rod are those of the paper; edges are 15 mm, as its 8000 unknowns mean for '
+    "rods with nodes of their own (8262, E21), while rods here share the nodes of their joints. The bound drape starts "
+    "from the net and uses the net's G0; the figure shows where the rods of the drape "
     "alone would end, which measures the effect of the finite spacing. Below, panel (4) in numbers: the zero line is "
     "the exact net; on the hemisphere the analytical solution [12] agrees with it within a micrometre (`make accept`). "
     "Falls and gravity lie short of it by as much as their rods stretch, and alike; on the ellipsoid the grid rests on "
@@ -36,10 +37,11 @@ COMPARED = {  # what the paper shows in this place
     "not the net.",
     "fig7": 'The paper: the flat grids "match well with the analytical solution in both of these two cases".',
     "fig8": "The paper, on one thread of an i7-6600U at some 8000 unknowns: 50 s (hemisphere), 30 s (paraboloid), 20 s "
-    "(ellipsoid), which may be simulated times or computing times: the diamonds in (b). Its chart against unknowns has "
-    "h = 0.1 s, at which explicit ties are unstable (E7); ours has 5 ms, at which all six sizes are stable. The "
-    "machine did other work: a fall is slowed by it all the time, while of our own runs, which are short, the least "
-    "of four counts.",
+    "(ellipsoid), which may be simulated times or computing times: the diamonds in (b). Its chart against "
+    "unknowns has h = 0.1 s, at which explicit ties are unstable (E7); ours has 5 ms, at which all six sizes "
+    "are stable. Of the two with edges of 30 mm one has rods 60 mm apart, the other 30 mm. The machine did "
+    "other work: a fall is slowed by it all the time, while of our own runs, which are short, the least of four "
+    "counts.",
     "genetic": 'The paper: a hemispherical gridshell "may take approximately" 100 generations of 500 individuals, or '
     "50,000 forward simulations, where its direct method needs one. It shows the algorithm's G0 for the paraboloid and "
     "the ellipsoid, from reference 30, as a line in its figure, without numbers. There is one search for each target, "

@@ -14,6 +14,8 @@ from rodshell.case import BUILT_IN
 from rodshell.cli import main
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.run import STAGES
+from tests.acceptance.targets_broken import as_obj
+from tests.targets.meshes import sheet
 
 SIZE = 0.2
 ROD = rs.Rod(rs.Circle(1e-3), rs.Material(1e6, 1e3))
@@ -447,7 +449,8 @@ def test_patches_are_taken_over_too() -> None:
     assert job.run(warm_start=first).reused == ALL
     pinned = job.changed(pop_up__ends="pinned").run(warm_start=first)
     assert pinned.reused == ALL[:3]
-    assert pinned.patches[1].popped["pinned"] is first.patches[1].popped["pinned"]
+    assert pinned.popped["pinned"] is first.popped["pinned"]
+    assert np.array_equal(pinned.patches[1].popped["pinned"].state, first.patches[1].popped["pinned"].state)
     turned = job.changed(layout__rotate="5 deg")
     warm, cold = turned.run(warm_start=first, until="pop-up"), turned.run(until="pop-up")
     assert warm.reused == ALL[:1]
@@ -537,7 +540,7 @@ def test_a_notebook_shows_the_shell_and_its_verdict(earlier: rs.Form) -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda job: job.changed(layout=3), r"layout = 3: must be a table; \[layout\] has rods"),
+        (lambda job: job.changed(layout=3), r"layout = 3: must be a table; \[layout\] has kind, rods"),
         (lambda job: job.changed({3: 4}), "words such as target.radius, not 3"),
         (lambda job: job.run(time_limit="60 s"), 'time_limit must be a number in s, not "60 s"'),
         (lambda _: rs.Job.load(""), "the name of the case is empty"),
@@ -598,6 +601,55 @@ def test_the_time_limit_holds_before_the_rod_is_sized_and_within_the_net(monkeyp
         with pytest.raises(OutOfTimeError, match=rf"out of time after .* s in stage {re.escape(stage)}"):
             roof.run(progress=told, time_limit=k + 0.5)
     assert [detail for _, detail in calls].count("net for the size of the rods") == 3
+
+
+def test_the_time_limit_holds_at_each_step_of_reading_and_fitting_a_mesh(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With as many fits as the mesh needs, each with its rings past the edge, and those of pieces between creases."""
+    x, faces = sheet(lambda x, y: 2.5 - 0.05 * (x**2 + y**2) + np.exp(-((x - 1.3) ** 2) / 0.5), 5.0, 33)
+    (tmp_path / "bump.obj").write_bytes(as_obj(x, faces))
+    x, faces = sheet(lambda x, y: 3 - 0.6 * np.abs(x) - 0.03 * y**2, 5.0, 21)
+    (tmp_path / "roof.obj").write_bytes(as_obj(x, faces))
+
+    class PreparedError(Exception):
+        pass
+
+    def told(stage: str, detail: str, residual: float) -> None:
+        if stage != "preparing":
+            raise PreparedError
+        calls.append(detail)
+
+    for name, seams in (("bump", {}), ("roof", {"seams.lines": "0,-6; 0,6"})):
+        job, calls = rs.Job.load(tmp_path / f"{name}.obj", {"target.unit": "m"} | seams), list[str]()
+        with pytest.raises(PreparedError):
+            job.run(progress=told)
+        steps = calls.copy()
+        fits = [step for step in steps if step.startswith("fit of the mesh, cubics ")]
+        assert steps[0] == f'reading "{name}.obj"'
+        assert steps[1].startswith("mesh of ")
+        assert len(set(fits)) >= (2 if name == "bump" else 1)  # pieces of one size have cubics of one spacing
+        assert len(fits) >= 2 * 6  # of each fit: three, and rings
+        for k in (*range(4), *range(4, len(steps), 5)):
+            clock = iter(range(1000))
+            monkeypatch.setattr("rodshell.progress.monotonic", lambda clock=clock: float(next(clock)))
+            where = re.escape(f"in stage preparing ({steps[k]})")
+            with pytest.raises(OutOfTimeError, match=f"out of time after {k + 0.5} s {where}"):
+                job.run(time_limit=k + 0.5)
+
+
+def test_out_of_time_in_the_fit_of_a_mesh_is_said_with_exit_code_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = iter(range(1000))
+    monkeypatch.setattr("rodshell.progress.monotonic", lambda: float(next(clock)))
+    (tmp_path / "dome.obj").write_bytes(as_obj(*sheet(lambda x, y: 2.5 - 0.05 * (x**2 + y**2), 5.0, 17)))
+    asked = ["form", str(tmp_path / "dome.obj"), "--unit", "m", "--out", str(tmp_path / "dome"), "-q"]
+    assert main([*asked, "--time-limit", "2.5 s"]) == 3
+    said = capsys.readouterr().err
+    assert "out of time after 2.5 s in stage preparing (fit of the mesh, cubics " in said
+    assert "nothing was found yet that could be written" in said
+    assert not (tmp_path / "dome").exists()
 
 
 FINE = {"layout.spacing": "20 um", "layout.edge": "auto", "rod.section.radius": "3 um"}

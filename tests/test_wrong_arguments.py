@@ -35,7 +35,10 @@ def form():
             "warm_start must be a form .*, not a GridLayout",
         ),
         (lambda: rs.find_form(LAYOUT, TARGET, ROD), "target must be a rodshell Target, not a GridLayout"),
-        (lambda: rs.find_form(TARGET, ROD, LAYOUT), "layout must be a rodshell GridLayout, not a Rod"),
+        (
+            lambda: rs.find_form(TARGET, ROD, LAYOUT),
+            "layout must be a rodshell GridLayout or Geodesic or A",
+        ),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD.section), "rod must be a rodshell Rod, not a Circle"),
         (
             lambda: rs.find_form("dome", LAYOUT, ROD, seams=[[(-1, 0), (1, 0)]]),
@@ -43,7 +46,10 @@ def form():
         ),
         (lambda: rs.Job(TARGET, LAYOUT), "a job needs target, layout and rod; for a case"),
         (lambda: rs.Job("hemisphere", LAYOUT, ROD), 'target must be a rodshell Target, not "hemisphere"'),
-        (lambda: rs.drape(TARGET, LAYOUT, ROD), "layout must be a rodshell GridLayout, not a Hemisphere"),
+        (
+            lambda: rs.drape(TARGET, LAYOUT, ROD),
+            "layout must be a rodshell GridLayout or Geodesic or A",
+        ),
         (lambda: rs.drape(LAYOUT, ROD, 3.0), "target must be a rodshell Target, not 3.0"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, warm_start="x"), 'warm_start must be what .* rodshell.drape .*"x"'),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, anchor="0,0"), "anchor must be two finite numbers x, y in m, not '0,0'"),
@@ -240,6 +246,8 @@ LINE = rs.ElasticRod.of([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], ROD, clamped=("st
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, time_limit="60"), 'time_limit must be a number in s, not "60"'),
         (lambda: rs.save(form().unchecked(), "x", [], more="x"), 'more must be texts by the names .*, not "x"'),
         (lambda: rs.save(form().unchecked(), "x", [], force="no"), 'force must be True or False, not "no"'),
+        (lambda: rs.surface_from("x.obj", unit=1.0, progress=3), "progress must be a function of stage, .*, not 3"),
+        (lambda: rs.heights_from("x.csv", size=(1, 1), progress="x"), 'progress must be a function .*, not "x"'),
         (lambda: rs.search(LAYOUT, TARGET, ROD), "target must be a rodshell Target, not a GridLayout"),
         (lambda: rs.search(TARGET, LAYOUT, "rod"), 'rod must be a rodshell Rod, not "rod"'),
         (lambda: rs.search(TARGET, LAYOUT, ROD, anchors=(0.0, 0.0)), "each of the anchors must be two finite numbers"),

@@ -58,7 +58,18 @@ if TYPE_CHECKING:
         SharedDofs,
         Spring,
     )
-    from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, Profile, mesh_grid, straight_rods
+    from rodshell.layout import (
+        Asymptotic,
+        Curves,
+        FlatGrid,
+        FlatRod,
+        Geodesic,
+        GridLayout,
+        GridMesh,
+        Profile,
+        mesh_grid,
+        straight_rods,
+    )
     from rodshell.loads.combinations import Loads
     from rodshell.loads.kinds import LineLoad, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
     from rodshell.loads.settings import Cables, Laths, LockedJoints, Stability, Strength
@@ -73,6 +84,7 @@ if TYPE_CHECKING:
     from rodshell.rods.local_energy import LocalEnergy
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+    from rodshell.rods.supports import Support
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.problem import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.rod_statics import RodLoads, RodShape, RodSupports, solve_rod
@@ -114,7 +126,10 @@ _HOMES = {
     "rodshell.formfinding.settle": ("settle",),
     "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
-    "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
+    "rodshell.layout": (
+        "Asymptotic", "Curves", "FlatGrid", "FlatRod", "Geodesic", "GridLayout", "GridMesh", "Profile", "mesh_grid",
+        "straight_rods",
+    ),
     "rodshell.loads.combinations": ("Loads",),
     "rodshell.loads.settings": ("Cables", "Laths", "LockedJoints", "Stability", "Strength"),
     "rodshell.loads.kinds": ("LineLoad", "PointLoad", "SelfWeight", "Settlement", "Snow", "Temperature", "Wind"),
@@ -126,6 +141,7 @@ _HOMES = {
     "rodshell.output.settings": ("DrawingStyle",),
     "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.rods.local_energy": ("LocalEnergy",),
+    "rodshell.rods.supports": ("Support",),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.solve.problem": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
@@ -143,20 +159,20 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cables", "Cap", "ChebyshevNet", "Circle", "ConvergenceError",
-    "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse",
-    "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form",
-    "Freeform", "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere",
-    "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Laths", "LineLoad", "Linker", "Loads",
-    "LocalEnergy", "LockedJoints", "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError",
-    "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile",
-    "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports",
-    "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability",
-    "StabilityError", "Strength", "Target", "Temperature", "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind",
-    "__version__", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export",
-    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise", "pop_up", "pop_up_table", "read",
-    "read_sweep", "refine", "save", "search", "settle", "simulate", "solve_rod", "straight_rods", "surface_from",
-    "sweep", "trim",
+    "Agreement", "Archive", "Asymptotic", "Ball", "Bound", "Boundary", "Cables", "Cap", "ChebyshevNet", "Circle",
+    "ConvergenceError", "Curves", "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings",
+    "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid",
+    "FlatRod", "Footprint", "Form", "Freeform", "Geodesic", "GivenSection", "Gravity", "GravityForce", "GridLayout",
+    "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Job",
+    "Laths", "LineLoad", "Linker", "Loads", "LocalEnergy", "LockedJoints", "Material", "Motion", "NetLimitError",
+    "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoad",
+    "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads",
+    "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow",
+    "Spring", "Stability", "StabilityError", "Strength", "Support", "Target", "Temperature", "TimeSeries", "Trimmed",
+    "Tube", "Verdict", "Wind", "__version__", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape",
+    "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise", "pop_up",
+    "pop_up_table", "read", "read_sweep", "refine", "save", "search", "settle", "simulate", "solve_rod",
+    "straight_rods", "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 

@@ -36,9 +36,8 @@ class OutOfTimeError(RodshellError):
 class OutOfMemoryError(RodshellError, MemoryError):
     """A job needs more memory than it may have.
 
-    Parameters
-    ----------
-    why : what the system said, if anything.
+    Args:
+        why: what the system said, if anything.
     """
 
     def __init__(self, why: object = "") -> None:
@@ -51,9 +50,8 @@ class OutOfMemoryError(RodshellError, MemoryError):
 class ConvergenceError(RodshellError):
     """A solver did not reach its tolerance.
 
-    Parameters
-    ----------
-    report : what was reached, as the solver reports it.
+    Args:
+        report: what was reached, as the solver reports it.
     """
 
     exit_code = 3

@@ -1,7 +1,7 @@
 """A form that was found: its stages, its checks and fabrication, and its files."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from os import PathLike
@@ -13,22 +13,17 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.case import Case
 from rodshell.checks import Checks, check
-from rodshell.checks.check import merged_checks
-from rodshell.checks.contact import contact_of_patches
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
-from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
-from rodshell.formfinding.patches import MergedPopUp, PatchedForm
-from rodshell.formfinding.popup import Ends
+from rodshell.figures.form import FlatState
+from rodshell.figures.records import Ends
+from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PopUp, Stages, Trimmed
 from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
-from rodshell.layout import GridLayout
+from rodshell.layout import Layout
 from rodshell.layout.cells import Pattern
-from rodshell.loads.check import (
-    check_shells,  # most forms have no loads
-    unchecked,  # most forms have no loads
-)
+from rodshell.loads.check import LoadChecks, check_shells, unchecked
 from rodshell.loads.combinations import Loads
 from rodshell.loads.strength import net_factors
 from rodshell.output.files import save, wanted_kinds
@@ -36,6 +31,7 @@ from rodshell.output.options import OutputOptions
 from rodshell.output.pictures import picture_svg
 from rodshell.output.viewer import frame_html, scene_of, widget_of
 from rodshell.progress import Progress, require_progress, silent
+from rodshell.refining.acceptance import Refined
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import (
     checked_results,
@@ -47,6 +43,7 @@ from rodshell.results.from_checks import (
     sharpest,
 )
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
+from rodshell.results.strength_used import THIN
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance
@@ -54,27 +51,20 @@ from rodshell.validation import instance
 if TYPE_CHECKING:
     from anywidget import AnyWidget
 
-    from rodshell.loads.check import LoadChecks
-    from rodshell.loads.combinations import Loads
-    from rodshell.refining.acceptance import Refined
-
-Stages = PatchForm | PatchedForm
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Form:
     """What `Job.run` and `find_form` return. Two forms are equal that have the same case and the same shapes.
 
-    Parameters
-    ----------
-    case : everything that decided it, in SI, with what was left open ("auto") as it was decided.
-    asked : the same as it was asked for.
-    stages : what form finding returned, of the whole or of its patches; where it was refined, the refined ones.
-    options : of checks, fabrication and drawings.
-    inputs : contents of the files that the case names, by their path in it.
-    search : the search for anchor and heading, where the case asked for one.
-    refined : the form before and after its refinement, where the case asked for one.
-    reused : the stages that were taken over from an earlier form, see `Job.run`.
+    Args:
+        case: everything that decided it, in SI, with what was left open ("auto") as it was decided.
+        asked: the same as it was asked for.
+        stages: what form finding returned, of the whole or of its patches; where it was refined, the refined ones.
+        options: of checks, fabrication and drawings.
+        inputs: contents of the files that the case names, by their path in it.
+        search: the search for anchor and heading, where the case asked for one.
+        refined: the form before and after its refinement, where the case asked for one.
+        reused: the stages that were taken over from an earlier form, see `Job.run`.
     """
 
     case: Case
@@ -83,11 +73,8 @@ class Form:
     options: OutputOptions
     inputs: Mapping[str, bytes]
     search: Search | None = None
-    refined: "Refined | None" = None
+    refined: Refined | None = None
     reused: tuple[str, ...] = ()
-    _known_checks: Checks | None = field(default=None)
-    _known_fabrication: Fabricated | None = field(default=None)
-    _known_loaded: "LoadChecks | None" = field(default=None)
 
     # What was asked for
 
@@ -100,14 +87,13 @@ class Form:
     def target(self) -> Target:
         """The shape wanted.
 
-        Raises
-        ------
-        InputError : the form comes from a table of rods; so for `layout`.
+        Raises:
+            InputError: the form comes from a table of rods; so for `layout`.
         """
         return self.stages.target
 
     @property
-    def layout(self) -> GridLayout:
+    def layout(self) -> Layout:
         """The flat grid asked for."""
         return self.stages.layout
 
@@ -127,39 +113,38 @@ class Form:
     @property
     def from_table(self) -> bool:
         """Whether it comes from a table of rods, which has no target."""
-        return isinstance(self.stages, PatchForm) and self.stages.from_table
+        return self.stages.from_table
 
     # The stages
 
     @property
-    def patches(self) -> tuple[PatchForm, ...]:
+    def patches(self) -> tuple[Stages, ...]:
         """The stages of each patch; a form in one piece has one."""
-        return tuple(self.stages.patches.values()) if isinstance(self.stages, PatchedForm) else (self.stages,)
+        return self.stages.parts
 
     @property
     def seams(self) -> tuple[Seam, ...]:
         """The lines along which the target was cut: where it is creased along a seam, its crease."""
-        return self.stages.cut_along if isinstance(self.stages, PatchedForm) else ()
+        return self.stages.seams.lines if self.stages.seams else ()
 
     @property
     def meetings(self) -> tuple[Meeting, ...]:
         """Where rods of two patches end at one point of a seam."""
-        return self.stages.meetings if isinstance(self.stages, PatchedForm) else ()
+        return self.stages.seams.meetings if self.stages.seams else ()
 
     @property
     def draped(self) -> Draped:
         """The grid on its target, of a form in one piece; of several patches see `patches`.
 
-        Raises
-        ------
-        InputError : the form has several patches, or comes from a table of rods; so for `trimmed`.
+        Raises:
+            InputError: the form has several patches, or comes from a table of rods; so for `trimmed`.
         """
-        return self._only_patch("draped").draped
+        return self.stages.draped
 
     @property
     def trimmed(self) -> Trimmed:
         """The draped grid cut to its target, of a form in one piece."""
-        return self._only_patch("trimmed").trimmed
+        return self.stages.trimmed
 
     @property
     def footprint(self) -> Footprint:
@@ -172,7 +157,7 @@ class Form:
         return self.stages.boundary
 
     @property
-    def popped(self) -> Mapping[Ends, PopUp | MergedPopUp]:
+    def popped(self) -> Mapping[Ends, PopUp]:
         """The popped-up shell with each kind of ends; of several patches that of all together."""
         return self.stages.popped
 
@@ -196,18 +181,31 @@ class Form:
         """Sentences of form finding that a user should read; those of checks are in the archive."""
         return self.stages.warnings
 
+    @property
+    def flat_state(self) -> FlatState | None:
+        """Whether rods along curves of the target can be laid out in the plane, by what they withstand while they are
+        erected; None where the flat grid is a straight lattice."""
+        found = self.stages.flat_state
+        if found is None:
+            return None
+        limits, material = self.options.limits(self.rod, self.case.strength), self.rod.material
+        strength = limits.erection or self.options.judged_by(self.rod).strength
+        limit = strength / material.youngs_modulus if strength and material else THIN
+        return FlatState(
+            lies_flat=found.report.stable and (found.strain or 0.0) <= limit, in_plane_strain=found.strain, limit=limit,
+            negative_modes=found.report.negative_modes,
+        )  # fmt: skip
+
     # Checks, fabrication, verdict
 
     @cached_property
     def checks(self) -> Checks:
         """The checks of every shell that converged; made when they are first asked for, if `Job.run` made none."""
-        return self._known_checks or self._checked(silent)
+        return self._checked(silent)
 
     @cached_property
     def fabrication(self) -> Fabricated:
         """Cut list, layers, splices, stock and bracing; made as `checks` are."""
-        if self._known_fabrication is not None:
-            return self._known_fabrication
         ends = final_ends(self.checks)
         shape = None if ends is None else self.popped[ends].positions
         return fabricate(
@@ -222,28 +220,25 @@ class Form:
         )
 
     @cached_property
-    def loaded(self) -> "LoadChecks | None":
+    def loaded(self) -> LoadChecks | None:
         """The checks under the loads of the case, None where it has none; made as `checks` are."""
-        if self._known_loaded is not None:
-            return self._known_loaded
         loads = self.case.built_loads()
         return None if loads is None else check_loads(self, loads)
 
     @property
-    def known_loaded(self) -> "LoadChecks | None":
+    def known_loaded(self) -> LoadChecks | None:
         """The checks under loads, if they were made."""
-        found: LoadChecks | None = self.__dict__.get("loaded", self._known_loaded)
-        return found
+        return vars(self).get("loaded")
 
     @property
     def known_checks(self) -> Checks | None:
         """The checks, if they were made."""
-        return self.__dict__.get("checks", self._known_checks)
+        return vars(self).get("checks")
 
     @property
     def known_fabrication(self) -> Fabricated | None:
         """The fabrication, if it was made."""
-        return self.__dict__.get("fabrication", self._known_fabrication)
+        return vars(self).get("fabrication")
 
     @property
     def verdict(self) -> Verdict:
@@ -257,9 +252,15 @@ class Form:
         known = self.known_checks if same else None
         case = replace(self.case, **options.tables)
         loaded = self.known_loaded if same and options.strength == self.options.strength else None
-        return replace(
-            self, case=case, options=options, _known_checks=known, _known_fabrication=None, _known_loaded=loaded
-        )
+        return replace(self, case=case, options=options).knowing(checks=known, loaded=loaded)
+
+    def knowing(self, **made: Checks | Fabricated | LoadChecks | None) -> "Form":
+        """The same form with what was made of it before, by the names of its properties; None: nothing new."""
+        form = replace(self)
+        for name in ("checks", "fabrication", "loaded"):
+            if (found := made.get(name) or vars(self).get(name)) is not None:
+                vars(form)[name] = found
+        return form
 
     def finished(self, progress: Progress = silent) -> "Form":
         """This form, its checks and fabrication made now; a progress may end the checks early. Under loads that do not
@@ -268,7 +269,7 @@ class Form:
         checks = self.known_checks
         if checks is None or checks.stopped:
             checks = self._checked(progress)
-        known = replace(self, _known_checks=checks)
+        known = self.knowing(checks=checks)
         loaded, loads = self.known_loaded, self.case.built_loads()
         if loads is not None and (loaded is None or loaded.stopped):
             try:  # the form is kept in any case
@@ -277,13 +278,13 @@ class Form:
                 loaded = unchecked(loads, refused=str(error))
             except ConvergenceError as error:
                 loaded = unchecked(loads, stopped=str(error))
-        return replace(known, _known_fabrication=known.fabrication, _known_loaded=loaded)
+        return known.knowing(fabrication=known.fabrication, loaded=loaded)
 
     # Files
 
     def results(self) -> Results:
         """The typed content of result.json before anything was checked."""
-        found = results_of(self.stages)
+        found = results_of(self.stages).changed(flat_state=self.flat_state)
         return found if self.refined is None else with_refinement(found, self.refined)
 
     def unchecked(self) -> Archive:
@@ -311,17 +312,15 @@ class Form:
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
 
-        Parameters
-        ----------
-        options : as of `archive`.
-        kinds : of files in addition to the archive, such as ["dxf", "csv"] or "dxf, csv"; default: all that every
-            installation can.
-        force : also replace files that rodshell did not write, or that were changed since, where it has to write.
+        Args:
+            options: as of `archive`.
+            kinds: of files in addition to the archive, such as ["dxf", "csv"] or "dxf, csv"; default: all that every
+                installation can.
+            force: also replace files that rodshell did not write, or that were changed since, where it has to write.
 
-        Raises
-        ------
-        InputError : an unknown kind. OutputError : the folder cannot be written, or such files are there and `force` is
-            False.
+        Raises:
+            InputError: an unknown kind. OutputError : the folder cannot be written, or such files are there and `force`
+                is False.
         """
         wanted = wanted_kinds(kinds)  # before the checks, which take time
         return save(self.archive(options=options), folder, wanted, force=force)
@@ -329,9 +328,8 @@ class Form:
     def widget(self) -> "AnyWidget":
         """The 3D viewer for a notebook, whose `picked` is the id of the rod or joint that was clicked last.
 
-        Raises
-        ------
-        InputError : anywidget is not installed, or there is no shape in space.
+        Raises:
+            InputError: anywidget is not installed, or there is no shape in space.
         """
         scene = scene_of(self._archive)
         if scene is None:
@@ -369,27 +367,15 @@ class Form:
     def _shapes(self) -> dict[str, Floats]:
         return {"flat": self.footprint.mesh.flat} | {ends: shell.positions for ends, shell in self.popped.items()}
 
-    def _only_patch(self, what: str) -> PatchForm:
-        if isinstance(self.stages, PatchedForm):
-            raise InputError(f"this form has {len(self.patches)} patches: take patches[k].{what}")
-        return self.stages
-
     def _weight(self, options: OutputOptions) -> float:
         return options.judged_by(self.rod).shear_weight
 
     def _checked(self, progress: Progress) -> Checks:
         self.options.require_known_stress(self.rod, self.joint)
-        settings: dict[str, Any] = {"stages": self.options.stages, "shear_weight": self._weight(self.options)}
-        if not isinstance(self.stages, PatchedForm):
-            return check(self.stages.popped, self.rod, **settings, progress=progress)
-        found = self.stages.patches
-        each = {name: check(patch.popped, self.rod, **settings, progress=progress) for name, patch in found.items()}
-        met = {}
-        for ends in self.stages.popped:
-            shells = [patch.popped[ends] for patch in found.values()]
-            states = [(shell.shell, shell.state) for shell in shells]
-            met[ends] = contact_of_patches(self.footprint.mesh, states, self.rod)
-        return merged_checks(each, met)
+        flat = self.flat_state
+        stages = self.options.stages if flat is None or flat.lies_flat else 0  # else it is assembled in place
+        settings: dict[str, Any] = {"stages": stages, "shear_weight": self._weight(self.options)}
+        return check(self.stages.popped, self.rod, **settings, progress=progress)
 
     @property
     def _design(self) -> dict[str, Floats]:
@@ -401,8 +387,8 @@ class Form:
     def _archive(self) -> Archive:
         checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
         results = self.results()
-        if isinstance(self.stages, PatchedForm):
-            results = with_seam_forces(results, self.stages, checks)
+        if self.stages.seams is not None:
+            results = with_seam_forces(results, self.stages.seams, checks)
         mesh, asked = self.footprint.mesh, self.case.strength
         results = checked_results(
             results, mesh, checks, self.fabrication,
@@ -418,17 +404,15 @@ class Form:
         return Archive(results, states, self.case.text(), self.inputs)
 
 
-def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "LoadChecks":
+def check_loads(form: Form, loads: Loads, *, progress: Progress = silent) -> LoadChecks:
     """Check a form under loads: deflections, reactions, stability and utilisation under each of their combinations.
 
-    Parameters
-    ----------
-    form : whose shells are loaded, with each end condition that converged.
-    progress : called with stage and figures.
+    Args:
+        form: whose shells are loaded, with each end condition that converged.
+        progress: called with stage and figures.
 
-    Raises
-    ------
-    InputError : a load does not fit the form; the form comes from a table of rods.
+    Raises:
+        InputError: a load does not fit the form; the form comes from a table of rods.
     """
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")

@@ -18,17 +18,18 @@ from rodshell.case.from_objects import case_of, case_of_rod_ends
 from rodshell.case.load import changed_case, flattened, is_described, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
 from rodshell.errors import InputError, OutOfMemoryError
+from rodshell.figures.records import Ends
 from rodshell.form import Form
 from rodshell.formfinding import Bound, Method
 from rodshell.formfinding.methods import require_method
-from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
-from rodshell.layout import FlatGrid, GridLayout
+from rodshell.layout import FlatGrid, Layout
 from rodshell.output.options import OutputOptions
 from rodshell.progress import Progress, limited, silent
 from rodshell.results.folder import reading
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import BOTH, SUPPORTS, Asked, support_of, supports_of
 from rodshell.run import Announce, Run, inputs_of
 from rodshell.targets import Target
 from rodshell.targets.patch_layout import PatchLayout
@@ -36,7 +37,6 @@ from rodshell.units import length_text, shown
 from rodshell.validation import (
     array,
     choice,
-    choices_of,
     file_path,
     function_of,
     instance,
@@ -49,7 +49,6 @@ from rodshell.validation import (
 )
 
 Auto = Literal["auto"]
-AskedEnds = Literal["pinned", "clamped", "both"]
 
 FOUND = "a form that Job.run or find_form returned (one read from a folder: run its case.toml again)"
 OBJECTS = 'a job needs target, layout and rod; for a case by its name or its file use rodshell.Job.load("...")'
@@ -60,26 +59,25 @@ class Job:
 
     It is its resolved case. Make one of objects by its constructor, or load one: `Job.load("roof.toml")`.
 
-    Parameters
-    ----------
-    layout : the flat grid asked for.
-    rod : section and material of every rod.
-    method : of the drape: `Bound()`, `Gravity()` or `Fall()`, see `drape`.
-    anchor : x, y of the point of the target where the axes of the grid cross [m]; "auto": the best found; default: the
-        target's highest point.
-    rotate : heading in place of the layout's [rad]; "auto": the best found.
-    objective : what an "auto" anchor or heading makes smallest, see `search`.
-    joint : the joints where rods cross, see `pop_up`; default: ball joints.
-    ends : end conditions of the pop-up: "pinned", "clamped", or "both"; also in a tuple, which may be empty.
-    seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down into patches; each
-        continues straight past its ends, unless it is closed. Rods and length of the layout are then "auto"; its
-        heading is that at the target's summit, and "auto" is the heading that leaves out the fewest rods.
-    patches : what patches, by their names A, B, ... from left to right, have of their own.
-    options : of checks, fabrication and drawings.
+    Args:
+        layout: the flat grid asked for.
+        rod: section and material of every rod.
+        method: of the drape: `Bound()`, `Gravity()` or `Fall()`, see `drape`.
+        anchor: x, y of the point of the target where the axes of the grid cross [m]; "auto": the best found; default:
+            the target's highest point.
+        rotate: heading in place of the layout's [rad]; "auto": the best found.
+        objective: what an "auto" anchor or heading makes smallest, see `search`.
+        joint: the joints where rods cross, see `pop_up`; default: ball joints.
+        ends: supports of the pop-up: "pinned", "clamped", "both", or a `Support` of your own; also in a tuple, which
+            may be empty.
+        seams: rows of points (x, y) of the plan [m], lines along which the target is cut straight down into patches;
+            each continues straight past its ends, unless it is closed. Rods and length of the layout are then "auto";
+            its heading is that at the target's summit, and "auto" is the heading that leaves out the fewest rods.
+        patches: what patches, by their names A, B, ... from left to right, have of their own.
+        options: of checks, fabrication and drawings.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind; a target too is missing.
+    Raises:
+        InputError: a value is of the wrong kind; a target too is missing.
     """
 
     __slots__ = ("_case", "_inputs", "_target")
@@ -90,7 +88,7 @@ class Job:
     def __init__(
         self,
         target: Target | None = None,
-        layout: GridLayout | None = None,
+        layout: Layout | None = None,
         rod: Rod | None = None,
         *,
         method: Method = Bound(),
@@ -98,14 +96,14 @@ class Job:
         rotate: float | Auto | None = None,
         objective: Objective = "shear",
         joint: Joint | None = None,
-        ends: AskedEnds | Sequence[AskedEnds] = "both",
+        ends: Asked = BOTH,
         seams: Iterable[ArrayLike] = (),
         patches: Mapping[str, PatchLayout] | None = None,
         options: OutputOptions | None = None,
     ) -> None:
         if target is None or layout is None or rod is None:
             raise InputError(OBJECTS)
-        for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
+        for name, value, kind in (("target", target, Target), ("layout", layout, Layout), ("rod", rod, Rod)):
             instance(name, value, kind)
         require_method(method)
         require_joint(joint)
@@ -122,7 +120,7 @@ class Job:
         case = case_of(
             target, layout, rod,
             joint=joint or Ball(), method=method, anchor=anchor, rotate=rotate,
-            objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
+            objective=choice("objective", objective, get_args(Objective)), ends=supports_of(ends),
             seams=listed("seams", seams, "a list of lines, each of points x, y in m"),
             patches=patches, options=options or OutputOptions(),
         )  # fmt: skip
@@ -138,15 +136,13 @@ class Job:
     ) -> Self:
         """The job of a case, with some keys changed: `Job.load("hemisphere", layout__rotate="45 deg")`.
 
-        Parameters
-        ----------
-        source : the name of a built-in case; the path of a case file, or of a surface; the text of a case file; its
-            content as a mapping.
-        overrides, more : values by dotted key; in Python's names two underscores stand for the dot.
+        Args:
+            source: the name of a built-in case; the path of a case file, or of a surface; the text of a case file; its
+                content as a mapping.
+            overrides, more: values by dotted key; in Python's names two underscores stand for the dot.
 
-        Raises
-        ------
-        InputError : no such case or file, an unknown key, a value that cannot be used; in one sentence.
+        Raises:
+            InputError: no such case or file, an unknown key, a value that cannot be used; in one sentence.
         """
         return cls.of_case(load_case(source, _changes(overrides, more)))
 
@@ -172,17 +168,15 @@ class Job:
     ) -> Self:
         """The job of popping up rods that are given by where their ends lie flat and where they go.
 
-        Parameters
-        ----------
-        source : a CSV table; the folder of an earlier result; or the ends themselves.
-        overrides, more : as of `load`, of the tables rod, joint, checks, fabrication and drawings.
-        unit : of the coordinates in a table, unless its columns end in _mm.
-        rod : section and material; default: those of the result, or a rod that is chosen to fit.
-        joint : where rods cross, without eccentricity; default: that of the result, or ball joints.
+        Args:
+            source: a CSV table; the folder of an earlier result; or the ends themselves.
+            overrides, more: as of `load`, of the tables rod, joint, checks, fabrication and drawings.
+            unit: of the coordinates in a table, unless its columns end in _mm.
+            rod: section and material; default: those of the result, or a rod that is chosen to fit.
+            joint: where rods cross, without eccentricity; default: that of the result, or ball joints.
 
-        Raises
-        ------
-        InputError : the source cannot be read, or a value cannot be used. OutputError : there is no such result.
+        Raises:
+            InputError: the source cannot be read, or a value cannot be used. OutputError : there is no such result.
         """
         require_joint(joint)
         if rod is not None:
@@ -199,10 +193,9 @@ class Job:
     def changed(self, overrides: Mapping[str, object] | None = None, /, **more: object) -> Self:
         """The same job with some keys changed: `job.changed(layout__rotate="10 deg")`; arguments as of `load`.
 
-        Raises
-        ------
-        InputError : as of `load`; also a key of a table that was made from an object which no key describes, and one
-            that a table of rods does not use.
+        Raises:
+            InputError: as of `load`; also a key of a table that was made from an object which no key describes, and one
+                that a table of rods does not use.
         """
         changes = _changes(overrides, more)
         job = type(self).of_case(changed_case(self._case, changes))
@@ -218,9 +211,8 @@ class Job:
     def to_toml(self) -> str:
         """The job as a case file, in SI; `Job.load` of it gives an equal job.
 
-        Raises
-        ------
-        InputError : it holds an object that no case file can describe, such as a Python function as its target.
+        Raises:
+            InputError: it holds an object that no case file can describe, such as a Python function as its target.
         """
         return self._case.to_toml()
 
@@ -236,32 +228,31 @@ class Job:
     ) -> Form:
         """Find the form: target, drape, trim, pop-up, checks, fabrication.
 
-        Parameters
-        ----------
-        warm_start : an earlier form. Only the stages from the first one on whose part of the case has changed are run
-            again, see `STAGES`; `Form.reused` names the others. Where a stage runs again, the earlier form is its first
-            guess: its net is where the new net is looked for (with `Bound()`), and where its shells went from their
-            draped states is where the new ones start, rods being matched by their place in the lattice. Any form is
-            accepted; what does not help is left, and the shapes are the same as without, to the solver's tolerance. A
-            shell that has several equilibria stays in its present one. The search for other stable shapes may take half
-            of the factorisations that the form took, so that it tries fewer starts after a warm start.
-        progress : called as progress(stage, detail, residual) at every iteration.
-        time_limit : [s] after which the job ends, at its next iteration, with what was found until then.
-        announce : called with a sentence for each value that the job chose itself, as soon as it is known.
-        until : the last stage that is run now. With "drape" the form has the flat grid, but no popped-up shells; as
-            `warm_start` of the next run it saves the drape. With "pop-up", checks and fabrication are made when first
-            asked for.
-        frames_in : folder in which a fall's folder of frames (drape.frames) is made; default: the current one.
+        Args:
+            warm_start: an earlier form. Only the stages from the first one on whose part of the case has changed are
+                run again, see `STAGES`; `Form.reused` names the others. Where a stage runs again, the earlier form is
+                its first guess: its net is where the new net is looked for (with `Bound()`), and where its shells went
+                from their draped states is where the new ones start, rods being matched by their place in the lattice.
+                Any form is accepted; what does not help is left, and the shapes are the same as without, to the
+                solver's tolerance. A shell that has several equilibria stays in its present one. The search for other
+                stable shapes may take half of the factorisations that the form took, so that it tries fewer starts
+                after a warm start.
+            progress: called as progress(stage, detail, residual) at every iteration.
+            time_limit: [s] after which the job ends, at its next iteration, with what was found until then.
+            announce: called with a sentence for each value that the job chose itself, as soon as it is known.
+            until: the last stage that is run now. With "drape" the form has the flat grid, but no popped-up shells; as
+                `warm_start` of the next run it saves the drape. With "pop-up", checks and fabrication are made when
+                first asked for.
+            frames_in: folder in which a fall's folder of frames (drape.frames) is made; default: the current one.
 
-        Returns
-        -------
-        The form. Its `status` is "converged", or says which stage stopped, or was out of time; nothing is raised for
-        that.
+        Returns:
+            The form. Its `status` is "converged", or says which stage stopped, or was out of time; nothing is raised
+            for that.
 
-        Raises
-        ------
-        InputError : values do not fit together. NetLimitError : no net covers the target from this anchor and heading.
-        OutOfTimeError : the time limit came before there was a net.
+        Raises:
+            InputError: values do not fit together. NetLimitError : no net covers the target from this anchor and
+                heading.
+            OutOfTimeError: the time limit came before there was a net.
         """
         if warm_start is not None:
             instance("warm_start", warm_start, Form, FOUND)
@@ -273,7 +264,7 @@ class Job:
         run = Run(
             self._case,
             self._target,
-            self._inputs,
+            inputs_of(self._case) if self._inputs is None else self._inputs,
             warm_start,
             limited(progress, time_limit),
             announce,
@@ -295,7 +286,8 @@ class Job:
             return f"<rodshell.Job: pop up {target}>"
         what = case.drawings.name or target
         source = getattr(case.target, "file", None)
-        spacing = "auto" if case.layout.spacing == "auto" else " x ".join(map(length_text, case.layout.spacing))
+        spacings = (case.layout.spacing,) if isinstance(case.layout.spacing, float | str) else case.layout.spacing
+        spacing = " x ".join(each if isinstance(each, str) else length_text(each) for each in spacings)
         cuts = len(case.seams.lines)
         seams = f", {cuts} seam{'s' if cuts > 1 else ''}" if cuts else ""
         return (
@@ -331,12 +323,6 @@ def _changes(overrides: Mapping[str, object] | None, more: Mapping[str, object])
     return flattened({**given, **more})
 
 
-def _ends(given: AskedEnds | Sequence[AskedEnds]) -> tuple[Ends, ...]:
-    """The end conditions asked for, in their order."""
-    words = choices_of("ends", given, ("pinned", "clamped", "both"))
-    return ENDS if "both" in words else tuple(end for word in words for end in ENDS if end == word)
-
-
 def _ends_and_case(
     source: "str | PathLike[str] | RodEnds", unit: str | None, overrides: dict[str, object]
 ) -> tuple[RodEnds, Case]:
@@ -360,13 +346,13 @@ def _ends_and_case(
 
 def find_form(
     target: Target,
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     method: Method = Bound(),
     anchor: tuple[float, float] | Auto | None = None,
     joint: Joint | None = None,
-    ends: AskedEnds | Sequence[AskedEnds] = "both",
+    ends: Asked = BOTH,
     seams: Iterable[ArrayLike] = (),
     patches: Mapping[str, PatchLayout] | None = None,
     warm_start: Form | None = None,
@@ -377,14 +363,12 @@ def find_form(
 
     Checks and fabrication are made when they are first asked for.
 
-    Parameters
-    ----------
-    target, layout, rod, method, anchor, joint, ends, seams, patches : as of `Job`.
-    warm_start, progress, time_limit : as of `Job.run`.
+    Args:
+        target, layout, rod, method, anchor, joint, ends, seams, patches: as of `Job`.
+        warm_start, progress, time_limit: as of `Job.run`.
 
-    Raises
-    ------
-    InputError, NetLimitError, OutOfTimeError : as of `Job` and `Job.run`.
+    Raises:
+        InputError, NetLimitError, OutOfTimeError: as of `Job` and `Job.run`.
     """
     job = Job(
         target, layout, rod,
@@ -412,28 +396,26 @@ def refine(
     stable and near its target when it is built with errors. Where none is, the form is as it was; `Form.refined` says
     why.
 
-    Parameters
-    ----------
-    vary : families, one or several: "taper" (EI along rods), "double" (two laths over a share of each rod), "tails"
-        (cut lengths), "clamps" (directions of clamped ends), "holes" (joints along rods), "offsets" (of rods).
-    ends : the only end condition of the refined form; None: the first of the form's.
-    ratio : of the largest EI to the smallest along a taper [-].
-    per : one taper for the whole shell, one for each family of rods, or one for each rod.
-    varies : what of the section a taper changes: "size", all its lengths alike, or one of them by its name.
-    under : "nothing": unloaded; "weight": with its own weight; or the name of a combination of the form's case.
-    tolerance : largest error of a span between two joints as it is built [m]; None: 0.05 % of the target's size.
-    progress, time_limit : as of `Job.run`.
+    Args:
+        vary: families, one or several: "taper" (EI along rods), "double" (two laths over a share of each rod), "tails"
+            (cut lengths), "clamps" (directions of clamped ends), "holes" (joints along rods), "offsets" (of rods).
+        ends: the only end condition of the refined form; None: the first of the form's.
+        ratio: of the largest EI to the smallest along a taper [-].
+        per: one taper for the whole shell, one for each family of rods, or one for each rod.
+        varies: what of the section a taper changes: "size", all its lengths alike, or one of them by its name.
+        under: "nothing": unloaded; "weight": with its own weight; or the name of a combination of the form's case.
+        tolerance: largest error of a span between two joints as it is built [m]; None: 0.05 % of the target's size.
+        progress, time_limit: as of `Job.run`.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind; the form comes from a table of rods, or has no such combination; one of
-        its loads is not a force.
+    Raises:
+        InputError: a value is of the wrong kind; the form comes from a table of rods, or has no such combination; one
+            of its loads is not a force.
     """
     instance("form", form, Form, FOUND)
     if form.from_table:
         raise InputError("a table of rods has no target to come nearer to: refine the form of a target")
     asked = form.case.ends
-    end = choice("ends", ends, ENDS) if ends is not None else (asked or ENDS)[0]
+    end = support_of(ends).name if ends is not None else (asked or tuple(SUPPORTS))[0]
     changes: dict[str, object] = {"vary": vary, "ends": end, "ratio": ratio, "per": per, "varies": varies}
     changes |= {"under": under, "tolerance": tolerance}
     job = Job.of_case(form.case).changed({f"refine.{key}": value for key, value in changes.items()})
@@ -454,18 +436,16 @@ def pop_up_table(
 ) -> Form:
     """Pop up rods from elsewhere, pinned, from flat: a `Job` of a table of rods, run.
 
-    Parameters
-    ----------
-    grid : the rods, flat (see `straight_rods`).
-    finals : (m, 2, 3) where the ends of each rod go [m].
-    rod : section and material of every rod.
-    joint : where rods cross, see `pop_up`, without eccentricity; ball joints without.
-    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
-    progress, time_limit : as of `Job.run`.
+    Args:
+        grid: the rods, flat (see `straight_rods`).
+        finals: (m, 2, 3) where the ends of each rod go [m].
+        rod: section and material of every rod.
+        joint: where rods cross, see `pop_up`, without eccentricity; ball joints without.
+        edge: longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+        progress, time_limit: as of `Job.run`.
 
-    Raises
-    ------
-    InputError : `finals` does not fit `grid`; no rod has three joints; the joint is eccentric.
+    Raises:
+        InputError: `finals` does not fit `grid`; no rod has three joints; the joint is eccentric.
     """
     job = Job.of_table(RodEnds(grid, array("finals", finals, np.float64, None, 2, 3), edge), rod=rod, joint=joint)
     return job.run(progress=progress, time_limit=time_limit, until="pop-up")

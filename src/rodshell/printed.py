@@ -41,9 +41,8 @@ def say(sentence: str) -> None:
 class Printed(TextIOBase):
     """A stream through which everything to a standard stream goes; writing to it never fails.
 
-    Parameters
-    ----------
-    stream : what is behind it; None where the process has none.
+    Args:
+        stream: what is behind it; None where the process has none.
     """
 
     encoding, errors = "utf-8", "strict"  # of what it is given, so that click does not go around it

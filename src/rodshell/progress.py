@@ -24,6 +24,11 @@ def silent(stage: str, detail: str, residual: float) -> None:
     """Report nothing."""
 
 
+def where(stage: str, detail: str, residual: float) -> str:
+    """An iteration in words."""
+    return f"{stage}: {detail}" + (f", residual {residual:.1e}" if residual else "")
+
+
 class Bar:
     """Progress for scripts and notebooks: one live line on a terminal, elsewhere a line for each stage.
 
@@ -47,8 +52,7 @@ class Bar:
 
     def __call__(self, stage: str, detail: str, residual: float) -> None:
         if self._live is not None:
-            reached = f", residual {residual:.1e}" if residual else ""
-            self._live.live(f"{stage}: {detail}{reached}")
+            self._live.live(where(stage, detail, residual))
         elif stage != self._stage:
             say(stage)
         self._stage = stage
@@ -76,9 +80,8 @@ class TimeLimit:
 def limited(progress: Progress, seconds: float | None) -> Progress:
     """`progress` with a time limit of `seconds` [s] from now; None: no limit.
 
-    Raises
-    ------
-    InputError : it cannot be called.
+    Raises:
+        InputError: it cannot be called.
     """
     require_progress(progress)
     return progress if seconds is None else TimeLimit(progress, seconds)

@@ -17,8 +17,8 @@ from rodshell.units import Kind, read_quantity, require_unit_of_all, shown, si_u
 from rodshell.validation import described, is_auto, not_negative, number, numbers, positive, whole
 
 Auto = Literal["auto"]
-Reader = Callable[[object], Any]
-Sign = Callable[..., float]
+_Reader = Callable[[object], Any]
+_Sign = Callable[..., float]
 T = TypeVar("T")
 MOST_STAGES = 1000  # of a deployment
 
@@ -27,27 +27,26 @@ MOST_STAGES = 1000  # of a deployment
 class Value:
     """How a value is given.
 
-    Parameters
-    ----------
-    read : from a case file or an option, to SI. A ValueError says what is wrong, without the key.
-    check : as read(name, value) of what Python gives; None: it is checked elsewhere.
-    words : that it may also be.
-    role : "name": it is text that is not empty; "file": the path of a file to be read; "folder": of one to be written.
+    Args:
+        read: from a case file or an option, to SI. A ValueError says what is wrong, without the key.
+        check: as read(name, value) of what Python gives; None: it is checked elsewhere.
+        words: that it may also be.
+        role: "name": it is text that is not empty; "file": the path of a file to be read; "folder": of one to be
+            written.
     """
 
-    read: Reader
+    read: _Reader
     check: Callable[[str, Any], Any] | None = None
     words: tuple[str, ...] = ()
     role: Literal["", "name", "file", "folder"] = ""
 
 
-def quantity(kind: Kind, sign: Sign = number, unit: str | None = None) -> Value:
+def quantity(kind: Kind, sign: _Sign = number, unit: str | None = None) -> Value:
     """A number with a unit.
 
-    Parameters
-    ----------
-    sign : `number`, `positive` or `not_negative` of `validation`.
-    unit : in messages of Python; None: the SI unit of the kind.
+    Args:
+        sign: `number`, `positive` or `not_negative` of `validation`.
+        unit: in messages of Python; None: the SI unit of the kind.
     """
     si = si_unit(kind) if unit is None else unit
 
@@ -60,7 +59,7 @@ def quantity(kind: Kind, sign: Sign = number, unit: str | None = None) -> Value:
     return Value(read, lambda name, value: sign(name, value, si))
 
 
-def or_auto(value: Value) -> Value:
+def _or_auto(value: Value) -> Value:
     def read(given: object) -> object:
         if is_auto(given.strip() if isinstance(given, str) else given):
             return "auto"
@@ -75,46 +74,38 @@ def or_auto(value: Value) -> Value:
 def pair(value: Value, words: str, *, one_for_both: bool = False) -> Value:
     """[a, b] or "a, b"; a single value may stand for both.
 
-    Parameters
-    ----------
-    words : what Python has to give.
+    Args:
+        words: what Python has to give.
     """
-
-    def read(given: object) -> tuple[float, float]:
-        items = _parted(given)
-        if not isinstance(items, list | tuple):
-            items = [items]
-        if len(items) == 1 and one_for_both:
-            return value.read(items[0]), value.read(items[0])
-        if len(items) != 2:
-            needs = "one or two values" if one_for_both else "two values"
-            raise ValueError(f'needs {needs}, such as ["30 mm", "40 mm"] or "30 mm, 40 mm"')
-        return _named("first", value, items[0]), _named("second", value, items[1])
-
-    return Value(read, _each(value, words, 2))
+    needs = f"needs {'one or two' if one_for_both else 'two'} values, such as "
+    return _several(2, value, needs + '["30 mm", "40 mm"] or "30 mm, 40 mm"', words, one_for_all=one_for_both)
 
 
-def triple(kind: Kind) -> Value:
+def _triple(kind: Kind) -> Value:
     """[a, b, c] or "a, b, c"."""
-    value = quantity(kind)
-
-    def read(given: object) -> tuple[float, ...]:
-        items = _parted(given)
-        if not isinstance(items, list | tuple) or len(items) != 3:
-            raise ValueError(f"needs three values, along or about x, y and z; each is {wanted(kind)}")
-        return tuple(_named(ordinal, value, item) for ordinal, item in zip(_ORDER, items, strict=True))
-
-    return Value(read, _each(value, f"three finite numbers in {si_unit(kind)}", 3))
+    needs = f"needs three values, along or about x, y and z; each is {wanted(kind)}"
+    return _several(3, quantity(kind), needs, f"three finite numbers in {si_unit(kind)}")
 
 
 _ORDER = ("first", "second", "third")
 
 
-def _each(value: Value, words: str, count: int) -> Callable[[str, Any], tuple[float, ...]]:
-    """So many numbers from Python, each as a value."""
+def _several(count: int, value: Value, needs: str, words: str, *, one_for_all: bool = False) -> Value:
+    """So many values, each read and checked as one is; `needs` and `words` say what a file and Python have to give."""
     assert value.check is not None
     check = value.check
-    return lambda name, given: tuple(check(name, item) for item in numbers(name, given, words, count))
+
+    def read(given: object) -> tuple[float, ...]:
+        items = _parted(given)
+        if not isinstance(items, list | tuple):
+            items = [items]
+        if len(items) == 1 and one_for_all:
+            return (value.read(items[0]),) * count
+        if len(items) != count:
+            raise ValueError(needs)
+        return tuple(_named(ordinal, value, item) for ordinal, item in zip(_ORDER, items, strict=False))
+
+    return Value(read, lambda name, given: tuple(check(name, item) for item in numbers(name, given, words, count)))
 
 
 def _parted(value: object) -> object:
@@ -197,7 +188,7 @@ def _poisson_ratio(value: object) -> float:
     return found
 
 
-def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
+def _polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
     """Rows of points of the plan: [[[x, y], [x, y]], ...], or "x, y; x, y | x, y; x, y"."""
     rows = value
     if isinstance(value, str):
@@ -208,9 +199,24 @@ def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
     return tuple(tuple(_POINT.read(point) for point in row) for row in rows)
 
 
+def _strokes(value: object) -> tuple[tuple[tuple[float, ...], ...], ...]:
+    """Rows of points in plan or in space: [[[x, y, z], [x, y, z]], ...], or "x, y, z; x, y, z | x, y; x, y"."""
+    rows = value
+    if isinstance(value, str):
+        rows = [[point.split(",") for point in row.split(";")] for row in value.split("|")]
+    wanted = 'give rows of two points or more, of x, y or x, y, z: [[[-1, 0], [1, 0]]] or "-1, 0; 1, 0"'
+    if not isinstance(rows, list | tuple):
+        raise ValueError(wanted)
+    for row in rows:
+        sizes = {len(point) if isinstance(point, list | tuple) else 0 for point in row} if len(row) > 1 else {0}
+        if sizes not in ({2}, {3}):
+            raise ValueError(wanted)
+    return tuple(tuple(tuple(read_quantity(x, "length") for x in point) for point in row) for row in rows)
+
+
 def _line(value: object) -> tuple[tuple[float, float], ...]:
     """Points of one line: [[x, y], [x, y]], or "x, y; x, y"."""
-    rows = polylines(value if isinstance(value, str) else [value])
+    rows = _polylines(value if isinstance(value, str) else [value])
     if len(rows) != 1:
         raise ValueError('give one line of two points or more, such as "-1, 0; 1, 0"')
     return rows[0]
@@ -293,8 +299,9 @@ Corners = Annotated[Literal[2, 4], Value(_corners, _checked_corners)]
 Unit = Annotated[float, Value(_unit)]
 Ratio = Annotated[float, Value(_ratio)]
 Numbers = Annotated[tuple[float, ...], Value(_numbers)]
-Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], Value(polylines)]
+Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], Value(_polylines)]
 Line = Annotated[tuple[tuple[float, float], ...], Value(_line)]
+Strokes = Annotated[tuple[tuple[tuple[float, ...], ...], ...], Value(_strokes)]
 PoissonRatio = Annotated[float, Value(_poisson_ratio, lambda name, value: number(name, value))]
 Stiffness = Annotated[
     float,
@@ -305,22 +312,22 @@ Length = Annotated[float, _LENGTH]
 Distance = Annotated[float, quantity("length", not_negative)]
 Coordinate = Annotated[float, quantity("length")]
 Angle = Annotated[float, _ANGLE]
-LengthOrAuto = Annotated[float | Auto, or_auto(_LENGTH)]
-AngleOrAuto = Annotated[float | Auto, or_auto(_ANGLE)]
+LengthOrAuto = Annotated[float | Auto, _or_auto(_LENGTH)]
+AngleOrAuto = Annotated[float | Auto, _or_auto(_ANGLE)]
 Lengths = Annotated[tuple[float, float], _LENGTHS]
-LengthsOrAuto = Annotated[tuple[float, float] | Auto, or_auto(_LENGTHS)]
+LengthsOrAuto = Annotated[tuple[float, float] | Auto, _or_auto(_LENGTHS)]
 Size = Annotated[tuple[float, float], pair(_LENGTH, _TWO)]
 Point = Annotated[tuple[float, float], _POINT]
-PointOrAuto = Annotated[tuple[float, float] | Auto, or_auto(_POINT)]
-Point3 = Annotated[tuple[float, float, float], triple("length")]
-Angles = Annotated[tuple[float, float, float], triple("angle")]
+PointOrAuto = Annotated[tuple[float, float] | Auto, _or_auto(_POINT)]
+Point3 = Annotated[tuple[float, float, float], _triple("length")]
+Angles = Annotated[tuple[float, float, float], _triple("angle")]
 
 Factor = Annotated[float, quantity("number", positive)]
 Share = Annotated[float, quantity("number", not_negative)]
 PerKelvin = Annotated[float, quantity("number", positive, "1/K")]
 Force = Annotated[float, quantity("force", positive)]
-Forces3 = Annotated[tuple[float, float, float], triple("force")]
-ForcePerLength3 = Annotated[tuple[float, float, float], triple("force per length")]
+Forces3 = Annotated[tuple[float, float, float], _triple("force")]
+ForcePerLength3 = Annotated[tuple[float, float, float], _triple("force per length")]
 SlipMoment = Annotated[float, quantity("moment", positive)]
 Stress = Annotated[float, quantity("stress", positive)]
 Pressure = Annotated[float, quantity("pressure", not_negative)]
@@ -335,4 +342,5 @@ InertiaPerLength = Annotated[float, quantity("inertia per length", not_negative)
 Density = Annotated[float, quantity("density", positive)]
 Acceleration = Annotated[float, quantity("acceleration", positive)]
 Duration = Annotated[float, quantity("time", positive)]
+Memory = Annotated[float, quantity("memory", positive)]
 KelvinChange = Annotated[float, quantity("temperature")]

@@ -1,36 +1,33 @@
 """One run of a case: what is left open is decided, and each stage runs or is taken over from an earlier form."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rodshell.case import Case
 from rodshell.case.case import Built
 from rodshell.case.held import built
 from rodshell.case.rod_ends import RodEnds
-from rodshell.checks.sizing import Fit, require_likely_sizes
+from rodshell.checks.sizing import Fit, doubt_of_unit, require_likely_sizes
 from rodshell.errors import OutOfTimeError
-from rodshell.form import Form, Stages
-from rodshell.formfinding import Bound, Fall, PatchForm, find_stages, pop_up_stages
-from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
+from rodshell.form import Form
+from rodshell.formfinding import Bound, Fall, Stages, find_stages, pop_up_stages
+from rodshell.formfinding.patches import best_heading, find_patched_stages
 from rodshell.formfinding.search import Search, search
 from rodshell.loads.fixed import fixed_forces
 from rodshell.progress import Progress
-from rodshell.refining.acceptance import refined
+from rodshell.refining.acceptance import Refined, refined
+from rodshell.refining.variables import Family
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
 from rodshell.results.summary import chosen, rod_text
 from rodshell.rods.section import GivenSection, Rod, size_text
+from rodshell.rods.supports import PINNED
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
 from rodshell.units import length_text
-
-if TYPE_CHECKING:
-    from rodshell.checks.sizing import Fit
-    from rodshell.refining.acceptance import Refined
-    from rodshell.refining.variables import Family
 
 Announce = Callable[[str], None]
 
@@ -56,34 +53,29 @@ SIZED_BY = (*DECIDED_BY, "pop_up", "strength")
 MOST_SIZES = 6  # that are popped up: of like sections the second is right; with elastic joints up to four were needed
 
 
+@dataclass
 class Run:
-    """One run of a case; parameters as of `Job.run`, with the target where it was built before, and what its files held
-    then.
+    """One run of a case; parameters as of `Job.run`.
 
-    Parameters
-    ----------
-    pops_up : False ends it with the drape, trimmed and mapped back.
+    Args:
+        target: where it was built before.
+        inputs: what the files of the case hold, by their path in it.
+        earlier: from which it starts; one of another kind is left.
+        pops_up: False ends it with the drape, trimmed and mapped back.
     """
 
-    def __init__(
-        self,
-        case: Case,
-        target: Target | None,
-        inputs: Mapping[str, bytes] | None,
-        warm_start: Form | None,
-        progress: Progress,
-        announce: Announce | None,
-        frames_in: Path,
-        *,
-        pops_up: bool = True,
-    ) -> None:
-        self.pops_up = pops_up
-        self.asked, self.target, self.progress = case, target, progress
-        self.announce, self.frames_in = announce, frames_in
-        self.inputs = inputs_of(case) if inputs is None else dict(inputs)
-        self.options = case.output_options()
-        self.earlier = warm_start
-        if warm_start is not None and warm_start.from_table != case.of_table:
+    asked: Case
+    target: Target | None
+    inputs: Mapping[str, bytes]
+    earlier: Form | None
+    progress: Progress
+    announce: Announce | None
+    frames_in: Path
+    pops_up: bool
+
+    def __post_init__(self) -> None:
+        self.options = self.asked.output_options()
+        if self.earlier is not None and self.earlier.from_table != self.asked.of_table:
             self.earlier = None
 
     def form(self) -> Form:
@@ -98,9 +90,9 @@ class Run:
         rod, fit, stages, tried = found.rod, None, None, found._replace(method=Bound())
         if case.rod.left_open:
             fit = case.fit_on(found.target, found.layout, anchor=None if case.seams.lines else found.anchor)
-        if fit and found.joint.resists_shear and found.ends and self.pops_up and self._sizes(rod):
+        if fit and case.joint.resists_shear and case.ends and self.pops_up and self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, partial(self._stages, case, tried))
-            case.require_strength(rod, found.joint)
+            case.require_strength(rod)
         self._announce_rod(rod, fit)
         if stages is None or found.method != tried.method:
             stages = self._stages(case, found, rod)
@@ -115,7 +107,7 @@ class Run:
         ends: RodEnds = case.target.held.value
         fit, stages = Fit.between(ends.lengths, ends.final), None
         rod = case.rod.held.value if case.rod.held else case.rod.build(lambda: fit, strength=case.permanent_strength)
-        require_likely_sizes(rod, fit.width, ends.grid.span)
+        require_likely_sizes(fit.width, min(ends.grid.span, fit.width), rod.section)  # flat, rods may be longer
         if self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, self._table_stages)
         self._announce_rod(rod, fit)
@@ -129,13 +121,12 @@ class Run:
         left_open = table.held is None and "section" in table.left_open
         return left_open and material is not None and self.asked.permanent_strength(material) is not None
 
-    def _sized(self, rod: Rod, estimate: "Fit", stages_of: Callable[[Rod], Stages]) -> "tuple[Rod, Fit, Stages]":
+    def _sized(self, rod: Rod, estimate: Fit, stages_of: Callable[[Rod], Stages]) -> tuple[Rod, Fit, Stages]:
         """The rod whose section is chosen by the bends of shells popped up with it; what it fits; those shells.
 
-        Parameters
-        ----------
-        rod : provisional, of which the first shell is made.
-        stages_of : the shells of a rod.
+        Args:
+            rod: provisional, of which the first shell is made.
+            stages_of: the shells of a rod.
         """
         fit, weight, before = estimate, self.options.judged_by(rod).shear_weight, self._sized_before()
         rod = before or rod
@@ -145,8 +136,7 @@ class Run:
         for popped_before in range(MOST_SIZES):
             if stages.status != "converged":
                 break
-            shells = [shell for piece in _pieces(stages) for shell in piece.popped.values()]
-            fit = estimate.by_pop_ups(shells, rod, shear_weight=weight)
+            fit = estimate.by_pop_ups(list(stages.popped.values()), rod, shear_weight=weight)
             section = fit.section(rod.material, strength=strength, shape=self.asked.rod.shape)
             chosen_so = popped_before > 0 or before is not None
             if section == rod.section or (chosen_so and fit.allows(rod, strength)):
@@ -174,50 +164,44 @@ class Run:
         stages = earlier.unrefined
         return stages.rod if stages.status == "converged" and stages.popped else None
 
-    def _table_stages(self, rod: Rod) -> PatchForm:
+    def _table_stages(self, rod: Rod) -> Stages:
         case, earlier = self.asked.with_rod(rod), self.earlier
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
         stages = earlier.stages if earlier is not None else None
-        if isinstance(stages, PatchForm) and "pop-up" in self._unchanged(case) and stages.finished_pop_ups(stages.ends):
+        known = stages is not None and "pop-up" in self._unchanged(case)
+        if stages is not None and known and stages.finished_pop_ups((PINNED,)):
             return stages
         joint = case.joint
         return pop_up_stages(ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress)
 
     def _stages(self, case: Case, found: Built, rod: Rod) -> Stages:
         """The shells of a rod on a target, of which those of the earlier form are taken over that are the same."""
-        same = self._unchanged(case.with_rod(rod))
-        made = found._replace(rod=rod)
-        return self._patches(case, made, same) if case.seams.lines else self._one_piece(case, made, same)
-
-    def _one_piece(self, case: Case, found: Built, same: Sequence[str]) -> PatchForm:
+        same, seams = "trim" in self._unchanged(case.with_rod(rod)), [Seam.of(line) for line in case.seams.lines]
+        earlier = self.earlier.unrefined if self.earlier is not None else None
+        options: dict[str, Any] = {
+            "joint": case.joint,
+            "ends": case.supports if self.pops_up else (),
+            "warm_start": earlier if earlier is not None and bool(earlier.seams) == bool(seams) else None,
+            "progress": self.progress,
+        }
+        if seams:
+            layouts = case.seams.patch_layouts()
+            return find_patched_stages(
+                found.target, seams, found.layout, rod, patch_layouts=layouts, same_drape=same, **options
+            )
         method = found.method
         if isinstance(method, Fall) and case.drape.frames is not None and case.drape.held is None:
             method = replace(method, stream=self.frames_in / case.drape.frames)
         if isinstance(method, Fall) and self.announce is not None:
             height = length_text(method.height)
             self.announce(f"the flat grid falls from {height} above the target until it is at rest; then it is trimmed")
-        earlier = self.earlier.unrefined if self.earlier is not None else None
-        streams = isinstance(method, Fall) and method.stream is not None
+        same &= not (isinstance(method, Fall) and method.stream is not None)
         return find_stages(
-            found.target, found.layout, found.rod,
-            method=method, anchor=found.anchor, joint=found.joint,
-            ends=found.ends if self.pops_up else (),
-            warm_start=earlier if isinstance(earlier, PatchForm) else None,
-            same_drape="trim" in same and not streams, progress=self.progress,
-        )  # fmt: skip
+            found.target, found.layout, rod, method=method, anchor=found.anchor, same_drape=same, **options
+        )
 
-    def _patches(self, case: Case, found: Built, same: Sequence[str]) -> PatchedForm:
-        earlier = self.earlier.unrefined if self.earlier is not None else None
-        return find_patched_stages(
-            found.target, [Seam.of(line) for line in case.seams.lines], found.layout, found.rod,
-            patch_layouts=case.seams.patch_layouts(), joint=found.joint,
-            ends=found.ends if self.pops_up else (),
-            warm_start=earlier if isinstance(earlier, PatchedForm) else None,
-            same_drape="trim" in same, progress=self.progress,
-        )  # fmt: skip
-
-    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> "Refined | None":
+    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> Refined | None:
         """The refinement of these stages, where the case asks for one."""
         vary: tuple[Family, ...] = built(case.refine)
         if not vary or stages.status != "converged" or not stages.ends:
@@ -254,26 +238,26 @@ class Run:
         best = searched.best
         layout = replace(found.layout, rotate=best.heading)
         case = case.decided(best.anchor, best.heading)
-        rod = case.rod_on(found.target, layout, anchor=best.anchor)
+        rod = case.rod_on(found.target, layout, anchor=best.anchor, progress=self.progress)
         return case, found._replace(layout=layout, anchor=best.anchor, rod=rod), searched
 
     def _best_heading(self, case: Case, found: Built) -> float:
         return best_heading(
             found.target, [Seam.of(line) for line in case.seams.lines], found.layout, case.seams.patch_layouts(),
-            eccentricity=found.joint.eccentricity, progress=self.progress,
+            eccentricity=case.joint.eccentricity, progress=self.progress,
         )  # fmt: skip
 
     def _made(
-        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: "Refined | None" = None
+        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: Refined | None = None
     ) -> Form:
         """The form, with what it takes over from the earlier one."""
         built = stages if better is None else better.after
         form = Form(case, self.asked, built, self.options, self.inputs, searched, better)
-        earlier = self.earlier
+        earlier, known = self.earlier, dict[str, Any]()
         if earlier is None:
             return form
         reused = ["target"] if "target" in same else []
-        if _same_drapes(stages, earlier.unrefined):
+        if stages.lies_as(earlier.unrefined):
             reused += [] if form.from_table else ["drape", "trim"]
             taken = _same_pop_ups(stages, earlier.unrefined)
             reused += ["pop-up"] if taken else []
@@ -287,8 +271,8 @@ class Run:
                 loaded = earlier.known_loaded if "loads" in same else None
                 loaded = None if loaded is None or loaded.stopped else loaded
                 reused += ["loads"] if "loads" in same and (loaded is not None or not case.loads) else []
-                form = replace(form, _known_checks=checks, _known_fabrication=made, _known_loaded=loaded)
-        return replace(form, reused=tuple(reused))
+                known = {"checks": checks, "fabrication": made, "loaded": loaded}
+        return replace(form, reused=tuple(reused)).knowing(**known)
 
     def _unchanged(self, case: Case) -> list[str]:
         """The stages up to the first one whose part of the decided case has changed."""
@@ -303,22 +287,24 @@ class Run:
         """Whether these tables are as they were, and so are their files; without a decided `case`, as asked for."""
         before, now = (earlier.asked, self.asked) if case is None else (earlier.case, case)
         before, now = before.absolute(), now.absolute()
-        if "target" in tables and (dict(earlier.inputs) != self.inputs or not now.files <= self.inputs.keys()):
+        if "target" in tables and (dict(earlier.inputs) != dict(self.inputs) or not now.files <= self.inputs.keys()):
             return False  # a file too large to be kept may have changed
         return all(getattr(before, name) == getattr(now, name) for name in tables)
 
     def _announce_sizes(self, found: Built) -> None:
         """Which lengths were left to the target's size: a wrong unit shows here."""
+        unit = getattr(self.asked.target, "unit", None)
         lengths = {
-            "spacing": min(found.layout.spacing) if self.asked.layout.spacing == "auto" else None,
-            "edge": found.layout.edge if self.asked.layout.edge == "auto" else None,
+            "spacing": found.layout.least_spacing if self.asked.layout.spacing == "auto" else None,
+            "edge": found.layout.longest_edge if self.asked.layout.edge == "auto" else None,
         }
         said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
         if said and self.announce is not None:
-            name = self.asked.drawings.name or found.target.name
-            self.announce(f"{name}, {length_text(2 * found.target.size)} wide; {said}")
+            name, width = self.asked.drawings.name or found.target.name, 2 * found.target.size
+            doubt = "" if lengths["spacing"] is None else doubt_of_unit(width, self.asked.rod.given_section, unit)
+            self.announce(f"{name}, {length_text(width)} wide{doubt}; {said}")
 
-    def _announce_rod(self, rod: Rod, fit: "Fit | None") -> None:
+    def _announce_rod(self, rod: Rod, fit: Fit | None) -> None:
         """A rod of which the case left something open, and what decided its size."""
         left_open = self.asked.rod.left_open
         if not left_open or fit is None or self.announce is None:
@@ -336,30 +322,7 @@ def inputs_of(case: Case) -> dict[str, bytes]:
     return read_inputs(case.text()) if case.files else {}
 
 
-def _pieces(stages: Stages) -> tuple[PatchForm, ...]:
-    """The form of each patch, or the only one."""
-    return (stages,) if isinstance(stages, PatchForm) else tuple(stages.patches.values())
-
-
-def _same_drapes(now: Stages, before: Stages) -> bool:
-    """Whether a form's drapes are those of an earlier one; a table of rods has none to run again."""
-    if isinstance(now, PatchForm) and isinstance(before, PatchForm) and not now.from_table:
-        return now.draped is before.draped
-    if isinstance(now, PatchedForm) and isinstance(before, PatchedForm):
-        return list(now.patches) == list(before.patches) and all(
-            patch.draped is before.patches[name].draped for name, patch in now.patches.items()
-        )
-    return now is before
-
-
 def _same_pop_ups(now: Stages, before: Stages) -> bool:
     """Whether all pop-ups of a form are those of an earlier one, which has no others."""
-    pieces = [_pieces(form) for form in (now, before)]
-    if now.ends != before.ends or len(pieces[0]) != len(pieces[1]):
-        return False
-    pairs = zip(*pieces, strict=True)
-    return all(
-        list(patch.popped) == list(earlier.popped)
-        and all(shell is earlier.popped[ends] for ends, shell in patch.popped.items())
-        for patch, earlier in pairs
-    )
+    same = now.ends == before.ends and list(now.popped) == list(before.popped)
+    return same and all(shell is before.popped[ends] for ends, shell in now.popped.items())

@@ -29,7 +29,7 @@ from rodshell.validation import choice, either, not_a_choice
 Table = Mapping[str, Any]
 Files = Callable[[object], str]
 T = TypeVar("T")
-EMPTY: Table = MappingProxyType({})
+_EMPTY: Table = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -87,13 +87,12 @@ class Place:
 class Field:
     """A key of a table.
 
-    Parameters
-    ----------
-    value : how it is read; None: as text, one of `choices`, or tables.
-    tables : the classes that it may become, by their kinds.
-    choices : the words that it may be.
-    any_value : whether it may be something else than these words.
-    optional : whether it may be None: left out, or a table without keys.
+    Args:
+        value: how it is read; None: as text, one of `choices`, or tables.
+        tables: the classes that it may become, by their kinds.
+        choices: the words that it may be.
+        any_value: whether it may be something else than these words.
+        optional: whether it may be None: left out, or a table without keys.
     """
 
     name: str
@@ -187,13 +186,11 @@ def _field(name: str, hint: Any, default: Any) -> Field | None:
 def checked(record: Any, what: str | Mapping[str, str] = "{}") -> None:
     """Check the fields of a frozen dataclass in its `__post_init__`, and keep them as they are read from a file.
 
-    Parameters
-    ----------
-    what : what messages call a field, with {} for its name; or that by name.
+    Args:
+        what: what messages call a field, with {} for its name; or that by name.
 
-    Raises
-    ------
-    InputError : a value cannot be used.
+    Raises:
+        InputError: a value cannot be used.
     """
     for field in fields_of(type(record)):
         value = getattr(record, field.attribute)
@@ -217,16 +214,14 @@ def read(
 ) -> T:
     """An object of the keys in a table.
 
-    Parameters
-    ----------
-    given : what a file, options or Python says, by key.
-    unknown : the sentence on an unknown key of a table; default: it names the keys that the table has.
-    files : gives the path for the value of each key that names a file, or raises InputError; None: as it is. With it no
-        folder may be written.
+    Args:
+        given: what a file, options or Python says, by key.
+        unknown: the sentence on an unknown key of a table; default: it names the keys that the table has.
+        files: gives the path for the value of each key that names a file, or raises InputError; None: as it is. With it
+            no folder may be written.
 
-    Raises
-    ------
-    InputError : a key is unknown or missing, or a value cannot be used; in one sentence. A misspelt key goes first.
+    Raises:
+        InputError: a key is unknown or missing, or a value cannot be used; in one sentence. A misspelt key goes first.
     """
     _require_known(table, given, place, unknown or unknown_key)
     return _read(table, given, place, files)
@@ -250,12 +245,11 @@ def _require_known(table: type, given: Any, place: Place, unknown: Callable[...,
             raise InputError(unknown(place, key, given, table))
 
 
-def keys_in(table: type, given: Table = EMPTY) -> Iterator[tuple[Field | None, str]]:
+def keys_in(table: type, given: Table = _EMPTY) -> Iterator[tuple[Field | None, str]]:
     """The keys that a table has; no field for `kind`.
 
-    Parameters
-    ----------
-    given : the table, where the keys of another stand in it whose kind it says.
+    Args:
+        given: the table, where the keys of another stand in it whose kind it says.
     """
     if kind_of(table):
         yield None, "kind"
@@ -356,17 +350,19 @@ def _one_table(field: Field, given: Any, place: Place, files: Files | None) -> A
     return _read(chosen, given, place, files)
 
 
-def read_value(hint: Any, given: object) -> Any:
-    """A value of a type of `quantities`; ValueError, with the reason."""
-    return next(mark for mark in _flat(hint)[1] if isinstance(mark, Value)).read(given)
+def value_of(hint: Any, name: str, given: object) -> Any:
+    """A value of a type of `quantities`; InputError, which calls it by its name."""
+    try:
+        return next(mark for mark in _flat(hint)[1] if isinstance(mark, Value)).read(given)
+    except ValueError as reason:
+        raise InputError(f"{name} = {shown(given)}: {reason}") from None
 
 
 def written(record: Any, *, changed: bool = False) -> dict[str, Any]:
     """The keys of an object in SI, as they stand in a case file, without the empty ones.
 
-    Parameters
-    ----------
-    changed : whether what is at its default is left out, except the kinds of tables.
+    Args:
+        changed: whether what is at its default is left out, except the kinds of tables.
     """
     keys: dict[str, Any] = {"kind": kind_of(record)} if kind_of(record) else {}
     for field in fields_of(type(record)):

@@ -4,27 +4,25 @@ import os
 from collections.abc import Callable
 from threading import Thread
 
-PROCESSORS = os.cpu_count() or 1  # asked once: the answer takes as long as a small front
-MOST_THREADS = 4  # parts of a factorisation stay one thread's work, and memory is as fast as it is
+_PROCESSORS = os.cpu_count() or 1  # asked once: the answer takes as long as a small front
+_MOST_THREADS = 4  # parts of a factorisation stay one thread's work, and memory is as fast as it is
 
 
 def threads() -> int:
-    """Number of threads: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
+    """Number of threads: NUMBA_NUM_THREADS, by default one per processor, at most `_MOST_THREADS`."""
     asked = os.environ.get("NUMBA_NUM_THREADS", "")
-    return max(1, min(int(asked) if asked.isdigit() else PROCESSORS, PROCESSORS, MOST_THREADS))
+    return max(1, min(int(asked) if asked.isdigit() else _PROCESSORS, _PROCESSORS, _MOST_THREADS))
 
 
 def in_threads(work: Callable[[int, int], object], count: int, *, most: int | None = None) -> None:
     """Do `count` pieces of work, each in whichever thread is free.
 
-    Parameters
-    ----------
-    work : called with the number of a piece and that of the thread, from 0.
-    most : number of threads; by default `threads()`.
+    Args:
+        work: called with the number of a piece and that of the thread, from 0.
+        most: number of threads; by default `threads()`.
 
-    Raises
-    ------
-    BaseException : what a piece of work raised; of several one.
+    Raises:
+        BaseException: what a piece of work raised; of several one.
     """
     wanted = 1 if count <= 1 else min(threads() if most is None else most, count)
     if wanted == 1:

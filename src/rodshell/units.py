@@ -65,7 +65,7 @@ def _factors(*groups: str) -> dict[str, Decimal]:
 
 
 LONGEST = 80  # characters of a value in a message
-FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is probably in degrees, its unit forgotten
+_FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is probably in degrees, its unit forgotten
 _DEGREE = Decimal("3.14159265358979323846264338327950288") / 180
 
 _KINDS: dict[Kind, _Units] = {
@@ -163,15 +163,13 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\
 def parse_quantity(value: object, kind: Kind, key: str) -> float:
     """Convert a quantity to SI.
 
-    Parameters
-    ----------
-    value : number in SI, or text such as "30 mm", "1 g/cm3", "1.5e-3" (SI without a unit).
-    kind : the expected kind of quantity.
-    key : the user's name for the value, for the error message.
+    Args:
+        value: number in SI, or text such as "30 mm", "1 g/cm3", "1.5e-3" (SI without a unit).
+        kind: the expected kind of quantity.
+        key: the user's name for the value, for the error message.
 
-    Raises
-    ------
-    InputError : not a number, not finite, an unknown unit or a unit of another kind.
+    Raises:
+        InputError: not a number, not finite, an unknown unit or a unit of another kind.
     """
     try:
         return read_quantity(value, kind)
@@ -200,7 +198,7 @@ def read_quantity(value: object, kind: Kind, *, size: bool = False) -> float:
         raise ValueError(f"must be larger than zero; give {units.wanted}")
     if allowed := out_of_range(number, units.si, size=size):
         raise ValueError(f"must be {allowed}")
-    if kind == "angle" and abs(number) > FULL_TURN:
+    if kind == "angle" and abs(number) > _FULL_TURN:
         if not _unit_of(value):
             raise ValueError(f'a plain number is in radians, and this is more than a full turn; write "{number:g} deg"')
         number = fmod(number, tau)
@@ -210,9 +208,8 @@ def read_quantity(value: object, kind: Kind, *, size: bool = False) -> float:
 def out_of_range(number: float, unit: str, *, size: bool = False) -> str:
     """What a number in an SI unit may be, where it is something else (see `RANGES`): "at most 1e+06 m"; else "".
 
-    Parameters
-    ----------
-    size : whether it must be positive, so that it may also be too small.
+    Args:
+        size: whether it must be positive, so that it may also be too small.
     """
     least, most = RANGES.get(unit.replace(" ", ""), RANGES[""])
     low = least if size else -most
@@ -248,9 +245,8 @@ def _matched(value: object) -> re.Match[str] | None:
 def read_unit(text: str, kind: Kind) -> Decimal:
     """The SI value of one unit of this kind.
 
-    Raises
-    ------
-    ValueError : an unknown unit, or a unit of another kind.
+    Raises:
+        ValueError: an unknown unit, or a unit of another kind.
     """
     unit = re.sub(r"\s|\^|\*\*", "", text).replace("²", "2").replace("³", "3")
     units = _KINDS[kind]
@@ -331,6 +327,18 @@ def length_text(metres: float) -> str:
     """A length [m] as text, in mm or m: 83.3 mm, 20 m."""
     in_mm = metres < 0.9995
     return f"{float(f'{1e3 * metres if in_mm else metres:.3g}'):g} {'mm' if in_mm else 'm'}"
+
+
+DRAWN_IN = {"m": 1.0, "mm": 1e-3, "cm": 0.01, "in": 0.0254, "ft": 0.3048}  # units of files [m]
+BUILT = (2.0, 200.0)  # m: widths of shells that people walk under
+
+
+def as_built(width: float, unit: float) -> dict[str, float]:
+    """Units of a file by which a width [m] that was read in `unit` [m] would be that of a building; and that width."""
+    if BUILT[0] <= width <= BUILT[1]:
+        return {}
+    widths = {name: width / unit * length for name, length in DRAWN_IN.items()}
+    return {name: wide for name, wide in widths.items() if BUILT[0] <= wide <= BUILT[1]}
 
 
 PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))

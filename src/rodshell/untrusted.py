@@ -18,15 +18,14 @@ from rodshell.units import shown
 FACTOR = "RODSHELL_LIMITS"
 PATIENCE = 30.0  # s until a pipe must have given all its content
 TEXT = 20e6  # bytes of a text, such as a table of rods
-CHUNK = 1 << 20  # bytes
+_CHUNK = 1 << 20  # bytes
 
 
 def limit(usual: float) -> float:
     """A limit as it holds in this process: the usual one times RODSHELL_LIMITS.
 
-    Raises
-    ------
-    InputError : RODSHELL_LIMITS is not a number above 0.
+    Raises:
+        InputError: RODSHELL_LIMITS is not a number above 0.
     """
     text = os.environ.get(FACTOR, "1")
     try:
@@ -41,9 +40,8 @@ def limit(usual: float) -> float:
 def raised(usual: float, needed: float) -> str:
     """How the limit is raised so far that `needed` is allowed: the end of a sentence that refuses.
 
-    Parameters
-    ----------
-    needed : what was refused, in the same unit.
+    Args:
+        needed: what was refused, in the same unit.
     """
     return f"or set {FACTOR}={max(2, int(-(-needed // usual)))} to allow it"
 
@@ -51,14 +49,12 @@ def raised(usual: float, needed: float) -> str:
 def read_bytes(path: Path, most: float, *, smaller: str = "") -> bytes:
     """The content of a file, or of a pipe that somebody writes into.
 
-    Parameters
-    ----------
-    most : bytes that it may have, before RODSHELL_LIMITS.
-    smaller : what makes such a file smaller, for the message.
+    Args:
+        most: bytes that it may have, before RODSHELL_LIMITS.
+        smaller: what makes such a file smaller, for the message.
 
-    Raises
-    ------
-    InputError : it is missing, a folder, a device or too large, cannot be read, or a pipe that gives nothing.
+    Raises:
+        InputError: it is missing, a folder, a device or too large, cannot be read, or a pipe that gives nothing.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -93,7 +89,7 @@ def _parts(path: Path, descriptor: int, most: float, smaller: str) -> Iterator[b
         if is_pipe and not select([descriptor], (), (), max(0.0, end - monotonic()))[0]:
             raise InputError(f"{path} is a pipe that was not written to its end within {PATIENCE:g} s")
         try:
-            part = os.read(descriptor, CHUNK)
+            part = os.read(descriptor, _CHUNK)
         except BlockingIOError:
             continue
         except OSError as reason:
@@ -107,9 +103,8 @@ def _parts(path: Path, descriptor: int, most: float, smaller: str) -> Iterator[b
 def read_text(path: Path, most: float = TEXT, *, instead: str = "save it as UTF-8") -> str:
     """The content of a text file in UTF-8, with or without its byte order mark; see `read_bytes`.
 
-    Parameters
-    ----------
-    instead : what can be done where it is something else.
+    Args:
+        instead: what can be done where it is something else.
     """
     try:
         return read_bytes(path, most).decode("utf-8-sig")

@@ -14,37 +14,37 @@ from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from types import UnionType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar, get_args
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.units import NUMBER, as_float, out_of_range, shown
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
-
-    from rodshell.arrays import Floats
-
 MOST = 10**12  # of a count
 LARGEST = 1e18  # of the numbers in an array, whatever their unit: see `units.RANGES`
-Choice = TypeVar("Choice", bound=str)
-_Scalar = TypeVar("_Scalar", bound="np.generic")
+_Choice = TypeVar("_Choice", bound=str)
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+NAME = "[a-z0-9]{1,40}"  # of a support: it stands in names of states and files
+Ends = str  # the name of a support
 
 
 def instance(name: str, value: object, kind: type | UnionType, wanted: str = "") -> None:
     """Refuse a `value` that is not of a `kind`.
 
-    Parameters
-    ----------
-    kind : class or union of classes.
-    wanted : what the value must be, in words; default "a rodshell KIND".
+    Args:
+        kind: class or union of classes.
+        wanted: what the value must be, in words; default "a rodshell KIND".
     """
     if not isinstance(value, kind):
-        what = wanted or f"a rodshell {getattr(kind, '__name__', kind)}"
+        kinds = [each.__name__ for each in (get_args(kind) or (kind,))]
+        what = wanted or f"a rodshell {' or '.join(kinds)}"
         raise InputError(f"{name} must be {what}, not {described(value)}")
 
 
-def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
+def choice(name: str, value: object, choices: Sequence[_Choice]) -> _Choice:
     """Return `value` if it is one of the words in `choices`; the message suggests the closest of them."""
     for word in choices:
         if isinstance(value, str) and value == word:  # an array is compared with none
@@ -65,13 +65,12 @@ def either(words: Sequence[str]) -> str:
     return f"{', '.join(rest)} or {last}" if rest else last
 
 
-def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice, ...]:
+def choices_of(name: str, value: Any, choices: Sequence[_Choice]) -> tuple[_Choice, ...]:
     """Return `value` as a tuple of different words out of `choices`.
 
-    Parameters
-    ----------
-    value : one word, or a sequence of words, which may be empty.
-    choices : the words that are allowed.
+    Args:
+        value: one word, or a sequence of words, which may be empty.
+        choices: the words that are allowed.
     """
     words = [value] if isinstance(value, str) else list(value) if isinstance(value, Sequence) else None
     if words is None:
@@ -82,9 +81,8 @@ def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice
 def number(name: str, value: object, unit: str = "") -> float:
     """Return `value`, a finite number in the range of its SI unit (`units.RANGES`), as a float; the message names both.
 
-    Parameters
-    ----------
-    unit : "" for a plain number.
+    Args:
+        unit: "" for a plain number.
     """
     real = _real(name, value, unit)
     wanted = out_of_range(real, unit) if isfinite(real) else "finite"
@@ -138,10 +136,9 @@ def flag(name: str, value: object) -> bool:
 def listed(name: str, value: object, wanted: str) -> tuple[Any, ...]:
     """Return the items of a list, an array, a set, a generator or the like as a tuple.
 
-    Parameters
-    ----------
-    value : of the argument; text is not a list of its letters, a mapping not one of its keys.
-    wanted : what it must be, in words, such as "a list of rods".
+    Args:
+        value: of the argument; text is not a list of its letters, a mapping not one of its keys.
+        wanted: what it must be, in words, such as "a list of rods".
     """
     given: Any = value
     if not isinstance(value, list | tuple):  # most are, and the rest takes longer
@@ -177,11 +174,10 @@ def mapping(name: str, value: object, wanted: str) -> Mapping[Any, Any]:
 def numbers(name: str, value: object, wanted: str, count: int, unit: str = "") -> tuple[float, ...]:
     """Return `value` as a tuple of finite floats in the range of their SI unit; see `number`.
 
-    Parameters
-    ----------
-    value : a sequence or an array.
-    wanted : what it must be, in words, such as "two finite numbers x, y in m".
-    unit : of each; "" for plain numbers.
+    Args:
+        value: a sequence or an array.
+        wanted: what it must be, in words, such as "two finite numbers x, y in m".
+        unit: of each; "" for plain numbers.
     """
     single = not hasattr(value, "__len__") or isinstance(value, str | bytes | dict) or getattr(value, "ndim", 1) == 0
     given: Any = () if single else value
@@ -225,9 +221,8 @@ def is_auto(value: object) -> bool:
 def file_path(name: str, value: object) -> Path:
     """Return `value` as a path, with ~ resolved.
 
-    Raises
-    ------
-    InputError : it is neither text nor a path, no system could have such a path, or nobody knows that home folder.
+    Raises:
+        InputError: it is neither text nor a path, no system could have such a path, or nobody knows that home folder.
     """
     if not isinstance(value, str | PathLike):
         raise InputError(f"{name} must be the path of a file, not {described(value)}")
@@ -249,16 +244,13 @@ def file_path(name: str, value: object) -> Path:
     return path
 
 
-def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
+def finite(name: str, given: ArrayLike, *shape: int) -> Floats:
     """Return `given` as an array of finite numbers.
 
-    Parameters
-    ----------
-    given : numbers of the `shape`, or of one that can be broadcast to it.
-    shape : of the result; none for a single number.
+    Args:
+        given: numbers of the `shape`, or of one that can be broadcast to it.
+        shape: of the result; none for a single number.
     """
-    import numpy as np  # here, so that the command line's help need not wait for it
-
     try:
         array = np.asarray(given, dtype=float)
         if array.shape != shape:
@@ -273,16 +265,13 @@ def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
     return array
 
 
-def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None) -> "NDArray[_Scalar]":
+def array(name: str, given: ArrayLike, kind: type[_Scalar], *shape: int | None) -> NDArray[_Scalar]:
     """Return `given` as an array; whether its numbers are finite is not checked.
 
-    Parameters
-    ----------
-    given : an array or nested sequences.
-    shape : length along each axis, None for any.
+    Args:
+        given: an array or nested sequences.
+        shape: length along each axis, None for any.
     """
-    import numpy as np
-
     wanted, whole = ", ".join("n" if count is None else str(count) for count in shape), issubclass(kind, np.integer)
     try:
         result = np.asarray(given)
@@ -297,10 +286,8 @@ def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None
     return result
 
 
-def vector(name: str, given: "ArrayLike") -> "Floats":
+def vector(name: str, given: ArrayLike) -> Floats:
     """Return `given` as an array (3,) of finite numbers."""
-    import numpy as np
-
     try:
         shape = np.shape(given)
     except ValueError:  # rows of several lengths, or without end
@@ -310,7 +297,7 @@ def vector(name: str, given: "ArrayLike") -> "Floats":
     return finite(name, given, 3)
 
 
-def direction(name: str, given: "ArrayLike") -> "Floats":
+def direction(name: str, given: ArrayLike) -> Floats:
     """Return the unit vector (3,) along `given`."""
     array = vector(name, given)
     length = float((array @ array) ** 0.5)
@@ -346,12 +333,11 @@ def short(value: object) -> str:
 def keep(record: Any, check: Callable[..., object], unit: str, *names: str, what: str = "{}", **options: Any) -> None:
     """Check numbers of a frozen dataclass in its `__post_init__`, and keep them as Python's floats.
 
-    Parameters
-    ----------
-    record : the dataclass; a field with the default None may be None.
-    check : `number`, `positive` or `not_negative`.
-    what : what messages call a field, with {} for its name.
-    options : of `check`.
+    Args:
+        record: the dataclass; a field with the default None may be None.
+        check: `number`, `positive` or `not_negative`.
+        what: what messages call a field, with {} for its name.
+        options: of `check`.
     """
     optional = {field.name for field in fields(record) if field.default is None}
     for name in names:
@@ -368,7 +354,7 @@ def brief(record: Any) -> str:
     shown = []
     for field in fields(record):
         value = getattr(record, field.name)
-        if hasattr(value, "dtype") and hasattr(value, "shape"):  # NumPy is not imported: cases show records without it
+        if isinstance(value, np.ndarray):
             shown.append(f"{field.name}={value.shape}")
         elif field.default is MISSING or type(value) is not type(field.default) or value != field.default:
             shown.append(f"{field.name}={value!r}")

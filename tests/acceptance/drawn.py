@@ -299,11 +299,11 @@ def crease_rows(names: Sequence[str] = tuple(CREASED)) -> Iterator[Row]:
         target = cut_at(rs.Freeform.of(*creased(name)), seams)
         layout = rs.GridLayout.orthogonal(spacing=0.9, edge=0.225)
         form = find_patched_stages(target, seams, layout, ROD, ends=())
-        points, size = np.array([meeting.point for meeting in form.meetings]), target.size
+        points, size = np.array([meeting.point for meeting in form.seams.meetings]), target.size
         off = np.hypot(off_crease(name, points), points[:, 2] - CREASED[name](*points[:, :2].T))
         note = f"{len(points)} meetings, {len(form.patches)} patches"
         yield Row(f"{name}, creased", "rod ends off the crease", float(off.max()) / size, ALLOWED, "of the size", note)
-        apart = np.abs(form.draped[:, 2] - CREASED[name](*form.draped[:, :2].T))
+        apart = np.abs(form.on_target[:, 2] - CREASED[name](*form.on_target[:, :2].T))
         yield Row(f"{name}, creased", "patches off their surfaces", float(apart.max()) / size, 5e-4, "of the size")
 
 

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 import rodshell as rs
-from rodshell.checks import bending
+from rodshell.checks.bending import bending
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid, straight_rods
 from rodshell.output.files import export
 from rodshell.results import Archive

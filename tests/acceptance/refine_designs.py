@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import rodshell as rs
-from rodshell.formfinding import PatchForm
+from rodshell.formfinding import Stages
 from rodshell.formfinding.popup import Ends
 from rodshell.refining.refine import Refinement, refine
 from rodshell.refining.stiffness_families import Taper
@@ -53,7 +53,7 @@ CASES = [
 ]  # fmt: skip
 
 
-def stages_of(shell: str, ends: Ends, edge: float) -> PatchForm:
+def stages_of(shell: str, ends: Ends, edge: float) -> Stages:
     """A shell before refinement."""
     if shell == "126 rods":
         layout = rs.GridLayout.orthogonal(spacing=0.01, edge=0.0034)
@@ -66,7 +66,6 @@ def stages_of(shell: str, ends: Ends, edge: float) -> PatchForm:
         form = rs.Job.load(DATA / shell, changes).run(until="pop-up")
     else:
         form = rs.Job.load(shell, {"layout.edge": edge, "pop_up.ends": ends}).run(until="pop-up")
-    assert isinstance(form.stages, PatchForm)
     return form.stages
 
 
@@ -74,7 +73,7 @@ def largest_curvature(popped: rs.PopUp) -> float:
     """[1/m], of round rods."""
     (bends,) = [element for element in popped.equilibrium.elements if isinstance(element, IsotropicBend)]
     mesh = popped.shell.mesh
-    return float(np.max(bends.curvatures(popped.state)[: len(mesh.bends)] / mesh.voronoi_lengths))
+    return float(np.max(bends.strains(popped.state)[: len(mesh.bends), 0] / mesh.voronoi_lengths))
 
 
 def lowest_eigenvalue(popped: rs.PopUp) -> float:
@@ -90,7 +89,7 @@ def rows() -> Iterator[Row]:
 
 def rows_of(case: Case, found: Refinement) -> Iterator[Row]:
     name = f"{case.shell}, {case.ends}: {case.name}"
-    after = found.designs[-1].point
+    after = found.designs[-1]
     gap = 100 * found.gap_after.rms_relative
     note = f"before {100 * found.gap_before.rms_relative:.3f} %, {len(after.values)} variables"
     yield Row(name, "gap rms over the size", gap, case.gap, "%", note)

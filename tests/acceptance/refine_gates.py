@@ -14,8 +14,7 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.checks.deployment import Deployment, deploy
-from rodshell.formfinding import PatchForm, agreement, pop_up
-from rodshell.formfinding.patches import PatchedForm
+from rodshell.formfinding import Stages, agreement, pop_up
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.trim import Footprint
 from rodshell.layout import GridMesh, mesh_grid
@@ -123,7 +122,7 @@ def against_genetic(shell: str) -> Iterator[Row]:
     yield Row(f"{shell}: tails, refined", "pop-ups over genetic", share, 0.01, note=f"{history.runs} pop-ups")
 
 
-def rows_of(name: str, stages: PatchForm | PatchedForm) -> Iterator[Row]:
+def rows_of(name: str, stages: Stages) -> Iterator[Row]:
     """A taper for all rods: the shell is nearer, or it is said why not; what is accepted passes other checks, too."""
     found = refined(stages, [FAMILIES["taper"]], ends="pinned")
     before, after = found.gap_before.rms_relative, found.gap_after.rms_relative
@@ -138,25 +137,22 @@ def rows_of(name: str, stages: PatchForm | PatchedForm) -> Iterator[Row]:
         yield Row(f"{name}{piece}: taper", "gates missed by other code", float(len(faults)), 0, note=note)
 
 
-def refined_pieces(found: Refined) -> Iterator[tuple[str, PatchForm]]:
+def refined_pieces(found: Refined) -> Iterator[tuple[str, Stages]]:
     """The form, or those of its patches that were changed."""
     if not found.changed:
         return
-    if isinstance(found.after, PatchForm):
-        yield "", found.after
-        return
-    for name, piece in found.after.patches.items():
+    for piece in found.after.parts:
         if any(rod.profile is not None for rod in piece.footprint.rods):
-            yield f", patch {name}", piece
+            yield f", patch {piece.name}" if piece.name else "", piece
 
 
-def deployment(form: PatchForm) -> Deployment:
+def deployment(form: Stages) -> Deployment:
     """Followed backwards from the popped-up shell, as the checks do."""
     popped = form.popped["pinned"]
     return deploy(popped.shell, popped.equilibrium, stages=3)
 
 
-def missed(form: PatchForm, way: Deployment) -> list[str]:
+def missed(form: Stages, way: Deployment) -> list[str]:
     """Gates that a design fails when they are tried in another way."""
     size = form.target.size
     gap, faults = form.agreement["pinned"].rms_relative, list[str]()
@@ -186,7 +182,7 @@ def misfit(mesh: GridMesh) -> float:
     return max(float(np.linalg.norm(a - b)) for a, b in places)
 
 
-def with_errors(form: PatchForm, seed: int) -> float:
+def with_errors(form: Stages, seed: int) -> float:
     """Relative rms gap of a grid that is drilled and cut with errors, of rods as stiff as they come; or infinity."""
     random, mesh, popped = np.random.default_rng(seed), form.footprint.mesh, form.popped["pinned"]
     joints, stations = set(mesh.joint_pairs.ravel().tolist()), mesh.stations.copy()

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 import rodshell as rs
-from rodshell.formfinding import PatchForm
+from rodshell.formfinding import Stages
 from rodshell.formfinding.popup import Ends
 from rodshell.refining.refine import refine
 from tests.acceptance.rows import Row
@@ -21,11 +21,10 @@ def rows() -> Iterator[Row]:
         ends: Ends
         for ends in ("pinned", "clamped"):
             stages = rs.find_form(target, LAYOUT, rod, joint=joint, ends=ends).stages
-            assert isinstance(stages, PatchForm)
             yield from rows_of(f"{name}, {ends}", stages)
 
 
-def rows_of(name: str, stages: PatchForm) -> Iterator[Row]:
+def rows_of(name: str, stages: Stages) -> Iterator[Row]:
     unloaded, found = refine(stages, "taper"), refine(stages, "taper", under_weight=True)
     assert found.loaded is not None
     before, after = (100 * gap.rms_relative for gap in found.loaded)

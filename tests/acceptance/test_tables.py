@@ -14,6 +14,7 @@ from tests.acceptance import (
     drawn_scale,
     house,
     joints,
+    lattices,
     loads_shells,
     loads_stability,
     paper,
@@ -41,6 +42,10 @@ CHEAP: dict[str, tuple[Rows, ...]] = {
     ),
     "house": (house.tree_rows,),
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
+    "lattices": (
+        lattices.geodesic_rows, lattices.straight_rows, lattices.shell_rows, lattices.family_rows, lattices.flat_rows,
+        partial(lattices.gallery_rows, ("garden pavilion", "saddle")),
+    ),
     "loads": (
         loads_stability.benchmark_rows, loads_stability.closed_form_rows, loads_stability.vibration_rows,
         loads_shells.work_rows, loads_shells.cable_rows,

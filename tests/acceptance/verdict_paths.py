@@ -5,7 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 import rodshell as rs
-from rodshell.checks import Deployment, OtherShapes, check, deploy, other_shapes
+from rodshell.checks import check
+from rodshell.checks.deployment import Deployment, deploy
+from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.solve.equilibrium import find_stable
 from rodshell.solve.path import relax
 from rodshell.solve.problem import Problem, Supports

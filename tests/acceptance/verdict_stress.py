@@ -6,7 +6,9 @@ from functools import cache
 import numpy as np
 
 import rodshell as rs
-from rodshell.checks import Checks, bending_of, check, contact_of
+from rodshell.checks import Checks, check
+from rodshell.checks.bending import bending_of
+from rodshell.checks.contact import contact_of
 from tests.acceptance.rows import Row
 from tests.checks.stress_twin import distance, stresses, twisted_shells
 

@@ -115,6 +115,8 @@ def values() -> dict[str, Call]:
     load = rs.PointLoad(at=(0.0, 0.0), force=(0.0, 0.0, -1.0))
     calls = {
         "Archive": Call(rs.Archive, results=own["form"].results, states={}),
+        "Asymptotic": Call(rs.Asymptotic, spacing=0.1),
+        "Curves": Call(rs.Curves, lines=[[(-1.0, 0.0), (1.0, 0.1)], [(0.0, -1.0), (0.1, 1.0, )]], spacing=0.1),
         "Ball": Call(rs.Ball, mass=0.1),
         "Boundary": Call(rs.Boundary, points=np.zeros((4, 3)), tangents=np.eye(4, 3)),
         "Cables": Call(rs.Cables, rod=rod),
@@ -132,6 +134,7 @@ def values() -> dict[str, Call]:
         "Fall": Call(rs.Fall),
         "FlatGrid.of": Call(rs.FlatGrid.of, rods=own["cross"].rods),
         "Footprint": Call(rs.Footprint, mesh=own["footprint"].mesh),
+        "Geodesic": Call(rs.Geodesic, spacing=0.1),
         "GivenSection": Call(rs.GivenSection, EA=1.0, EI1=1.0, EI2=1.0, GJ=1.0),
         "Gravity": Call(rs.Gravity),
         "GravityForce": Call(rs.GravityForce, nodes=slice(None)),
@@ -179,6 +182,7 @@ def values() -> dict[str, Call]:
         "SharedDofs": Call(rs.SharedDofs),
         "Snow": Call(rs.Snow, value=500.0),
         "Spring": Call(rs.Spring, shear=1.0),
+        "Support": Call(rs.Support, name="posts"),
         "Stability": Call(rs.Stability),
         "Strength": Call(rs.Strength),
         "Temperature": Call(rs.Temperature, change=30.0, expansion=1e-5),

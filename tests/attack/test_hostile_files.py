@@ -26,7 +26,7 @@ from rodshell.targets import apart
 from rodshell.targets.curve_files import read_curves
 from rodshell.targets.field_fitting import cubic_spacing
 from rodshell.targets.mesh_files import read_mesh
-from rodshell.targets.nurbs_files import Nurbs
+from rodshell.targets.nurbs import Nurbs
 from rodshell.targets.samples import mesh_samples
 from rodshell.targets.trianglemesh import sound_mesh
 from tests.acceptance.targets_broken import WRITERS, dome
@@ -158,7 +158,7 @@ def test_materials_and_textures_are_not_opened(
     monkeypatch.setattr(
         "builtins.open", lambda file, *_, **__: opened.append(str(file)) or (_ for _ in ()).throw(OSError)
     )
-    read_mesh(path, 1.0)
+    read_mesh(path)
     assert not opened
 
 
@@ -206,7 +206,7 @@ def test_materials_do_not_split_a_mesh(tmp_path: Path) -> None:
     text = "\n".join(f"usemtl m{k}\n{line}" if line[0] == "f" else line for k, line in enumerate(lines))
     (tmp_path / "roof.obj").write_text(text)
     started = time.process_time()
-    assert len(read_mesh(tmp_path / "roof.obj", 1.0)[1]) == len(faces)
+    assert len(read_mesh(tmp_path / "roof.obj")[1]) == len(faces)
     assert time.process_time() - started < 2
 
 
@@ -445,5 +445,5 @@ def test_mutated_mesh_of_polygons_is_read_or_refused(kind: str, tmp_path: Path) 
             data[at : at + chance.choice((0, 1, 4, 30))] = chance.choice((bytes([chance.randrange(256)]), *WORDS))
         path.write_bytes(data)
         with suppress(rs.InputError):
-            vertices, faces, _ = read_mesh(path, 1.0)
+            vertices, faces, *_ = read_mesh(path)
             sound_mesh(vertices, faces, "it")

@@ -33,7 +33,7 @@ OPTIONS = (
     "--no-browser", "--schema", *(f"--{key}" for key in case_keys()),
 )  # fmt: skip
 BEGINS = (
-    *(f"{command}.run_and_deliver" for command in ("form", "check", "popup")),
+    *(f"{command}.run_and_deliver" for command in ("form", "refine", "check", "popup")),
     *(f"{command}.compile_before_first" for command in ("paper", "sweep", "optimise", "warmup")),
 )
 

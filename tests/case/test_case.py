@@ -69,6 +69,7 @@ def test_built_in_cases_have_the_papers_values(name: str, target: dict[str, obje
     case = load_case(name)
     assert written(case.target) == target
     assert written(case.layout) == {
+        "kind": "chebyshev",
         "rods": rods,
         "spacing": (0.03, 0.03),
         "length": 1.2,
@@ -390,20 +391,24 @@ def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
     from rodshell.joints import Ball, Pin
     from rodshell.layout import GridLayout
     from rodshell.rods.section import Circle, Material, Rod, Tube
+    from rodshell.rods.supports import SUPPORTS
 
     overrides = {"drape.anchor": "0.1,0", "drape.method": "gravity", "layout.rotate": 0.5}
-    _, layout, rod, *options = load_case("ellipsoid", overrides).build()
+    case = load_case("ellipsoid", overrides)
+    _, layout, rod, *options = case.build()
     assert layout == GridLayout.orthogonal(
         rods=(11, 15), spacing=0.03, length=1.2, edge=0.005, rotate=0.5, offset=(0.0, 0.0)
     )
     assert rod == Rod(Circle(0.001), Material(1e6, 1000.0, 0.5))
-    assert options == [Ball(), Gravity(), (0.1, 0.0), ("pinned", "clamped")]
+    assert options == [Gravity(), (0.1, 0.0)]
+    assert (case.joint, case.supports) == (Ball(), tuple(SUPPORTS.values()))
     tube = {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm", "pop_up.ends": "pinned"}
     tube |= {"joint.kind": "pin", "joint.eccentricity": "2 mm"}
-    built = load_case("hemisphere", tube).build()
+    case = load_case("hemisphere", tube)
+    built = case.build()
     assert built.rod.section == Tube(0.001, 0.0001)
-    assert built.ends == ("pinned",)
-    assert built.joint == Pin(eccentricity=0.002)
+    assert case.supports == (SUPPORTS["pinned"],)
+    assert case.joint == Pin(eccentricity=0.002)
     assert built.anchor is None
 
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import Deployment, check, curvatures, deploy
+from rodshell.checks import check
 from rodshell.checks import deployment as module
-from rodshell.checks.deployment import LOWEST
+from rodshell.checks.bending import bending
+from rodshell.checks.deployment import LOWEST, Deployment, deploy
 from rodshell.formfinding.popup import laid_below
 from rodshell.formfinding.trim import Boundary
 from rodshell.model import Shell
@@ -304,7 +305,7 @@ def test_the_bending_of_a_stage_is_that_of_its_shape() -> None:
     checks, mesh = check(dome().popped, ROD, stages=4), dome().footprint.mesh
     assert checks.deployment is not None
     for bent, shape in zip(checks.deployment_bending, checks.deployment.positions, strict=True):
-        np.testing.assert_allclose(bent.curvature, curvatures(mesh, shape), atol=1e-9)
+        np.testing.assert_allclose(bent.curvature, bending(mesh, shape, ROD).curvature, atol=1e-9)
 
 
 def test_no_stages_no_deployment() -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import reactions, self_weight
+from rodshell.checks.reactions import reactions
+from rodshell.checks.self_weight import self_weight
 from rodshell.solve.load_path import CLOSE
 from tests.checks.loaded_twin import LoadedTwin
 from tests.checks.shells import ROD, dome

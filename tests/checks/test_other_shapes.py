@@ -7,9 +7,9 @@ import pytest
 from scipy.linalg import eigh
 
 import rodshell as rs
-from rodshell.checks import OtherShape, OtherShapes, check, deploy, other_shapes
-from rodshell.checks.bending import rod_frames
-from rodshell.checks.other_shapes import _Search, spanned
+from rodshell.checks import check
+from rodshell.checks.deployment import OtherShape, deploy
+from rodshell.checks.other_shapes import OtherShapes, _Search, other_shapes, spanned
 from rodshell.joints import Joint
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports
@@ -144,7 +144,7 @@ def test_laths_popped_through_are_not_twisted_in_their_clamps() -> None:
     layout = rs.GridLayout(rods=(7, 7), spacing=(0.06, 0.06), length=0.6, edge=0.03)
     popped = rs.find_form(rs.Cap(0.4, 0.346), layout, lath, ends="clamped", joint=rs.Pin()).popped["clamped"]
     shell, found = popped.shell, popped.equilibrium
-    frames = rod_frames(shell)
+    frames = shell.frames
     assert frames is not None
     own, mirrored = (frames.strains(state)[:, 2] for state in (found.state, _Search(shell, found, None)._through()))
     at_clamps = slice(len(own) - len(shell.ghosts), None)

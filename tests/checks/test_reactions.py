@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import Reactions, reactions
-from rodshell.formfinding.popup import Ends, PopUp
+from rodshell.checks.reactions import Reactions, joint_loads, reactions
+from rodshell.figures.records import Ends
+from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import Boundary
 from tests.checks.shells import ROD, dome
 
@@ -87,3 +88,26 @@ def test_out_of_equilibrium_nothing_balances() -> None:
     problem = Problem(shell.shell.elements, shell.shell.stretch, Supports(shell.shell.held_ends()), 0.2)
     stopped = find_equilibrium(problem, bumped, shell.forces, most_iterations=0)
     assert reactions(shell.shell, stopped).force_imbalance > 1e-3
+
+
+def test_the_moment_of_an_energy_of_nodes_alone_is_refused_and_not_said_to_be_zero() -> None:
+    """A spring of 750 N m/rad between two rods that have turned by 0.1 rad: 75 N m about the joint, by its forces."""
+    grid = rs.straight_rods([[[-1.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [0.0, 1.0]]])
+    shell = rs.Shell.of(rs.mesh_grid(grid, edge=0.5), ROD)
+    around = shell.mesh.rod_nodes[shell.mesh.beside_crossings].reshape(-1, 4)
+
+    def law(x: np.ndarray) -> np.ndarray:
+        first, second = x[:, 1] - x[:, 0], x[:, 3] - x[:, 2]
+        lengths = np.sqrt((first * first).sum(axis=1) * (second * second).sum(axis=1))
+        return 375.0 * (np.arccos((first * second).sum(axis=1) / lengths) - np.pi / 2) ** 2
+
+    spring, state, turn = rs.LocalEnergy(around, law), shell.state(shell.mesh.flat), 0.1
+    second = shell.mesh.rod_nodes[shell.mesh.rod_start[1] :]
+    state[second, :2] = state[second, :2] @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    pulls = np.zeros_like(state)
+    spring.evaluate(state, pulls)
+    moment = np.cross(state[second], pulls[second]).sum(axis=0)
+    np.testing.assert_allclose(moment, [0.0, 0.0, 75.0], atol=1e-6)
+    with pytest.raises(rs.InputError, match="LocalEnergy between rods acts on nodes alone, so that the moments"):
+        joint_loads(replace(shell, between=(*shell.between, spring)), state)
+    np.testing.assert_allclose(joint_loads(shell, state).moments, 0.0)

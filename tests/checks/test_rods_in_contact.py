@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import Clearance, check, contact_of
+from rodshell.checks import check
 from rodshell.checks.contact import (
     APART,
-    _crossing_lines,
+    FLATTEST,
     _Edges,
     _Outline,
     contact,
-    contact_of_patches,
+    contact_of,
     nearest_points,
-    worst_contact,
 )
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import side_by_side as side_by_side_meshes
@@ -233,7 +232,7 @@ def test_the_work_grows_with_the_rods_not_with_their_square() -> None:
         rods += [FlatRod.v(f"V{k}", x, 0.0, 0.1 * size) for k, x in enumerate(offsets)]
         mesh = mesh_grid(FlatGrid.of(rods), 0.02)
         outline = _Outline(0.024, 0.024, False)
-        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], outline, None, _crossing_lines(rods, outline))
+        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], outline, None, mesh.grid.meetings(4 * outline.reach / FLATTEST))
         counts.append(len(edges.candidates()[0]) / len(mesh.edges))
     assert counts[2] < 1.2 * counts[1] < 1.5 * counts[0]
 
@@ -263,14 +262,24 @@ def test_rods_that_leave_no_room_for_joints_are_warned_of() -> None:
     assert check(dome().popped, round_rod(0.022), stages=0).tight == ()  # these touch: the verdict says so
 
 
-def test_rods_of_patches_are_named_with_their_patch() -> None:
-    near, far = (
-        Clearance(clearance=0.01, pairs=0, rods=("U1", "U2"), where=(0.0, 0.0, 0.0)),
-        Clearance(clearance=-0.01, pairs=2, rods=("V3", "V4"), where=(1.0, 0.0, 0.0)),
-    )
-    joined = worst_contact({"A": near, "B": far, "C": APART})
-    assert joined == far.changed(rods=("B-V3", "B-V4"))
-    assert worst_contact({"A": APART}) == APART
+def beside_each_other(first: list[FlatRod], second: list[FlatRod], *, gap: float = 0.2) -> rs.Shell:
+    """Patches A and B of these rods as one shell."""
+    meshes = {"A": mesh_grid(FlatGrid.of(first), 0.02), "B": mesh_grid(FlatGrid.of(second), 0.02)}
+    return rs.Shell.of(side_by_side_meshes(meshes, gap), round_rod(5e-3))
+
+
+def test_on_their_way_rods_of_two_patches_are_not_looked_at_and_those_of_each_are() -> None:
+    """Two strips that lie in each other, as flat grids below their boundaries do; then two rods of B alone."""
+    rods = [FlatRod.v(f"V{k}", 0.1 * k, 0.0, 0.3) for k in range(4)]
+    shell = beside_each_other(rods, rods)
+    state = np.vstack([grid.flat - [*grid.flat[0, :2], 0.0] for grid in shell.mesh.grids])
+    assert contact_of(shell, state, round_rod(5e-3)).pairs == 4
+    assert contact_of(shell, state, round_rod(5e-3), each_grid=True) == APART
+    last = shell.mesh.nodes_of(len(shell.mesh.grid.rods) - 1)
+    state[last] -= [0.095, 0.0, 0.0]
+    found = contact_of(shell, state, round_rod(5e-3), each_grid=True)
+    assert found.rods == ("B-V2", "B-V3")
+    assert found.clearance == pytest.approx(-5e-3)
 
 
 def test_a_section_without_an_outline_is_not_judged() -> None:
@@ -285,21 +294,18 @@ def test_a_section_without_an_outline_is_not_judged() -> None:
 def test_rods_of_two_patches_that_meet_at_a_seam_are_no_contact_and_others_are() -> None:
     """Two strips side by side whose U rods end together on the seam at y = 0.3, at angles; then one moved over."""
     rods = [FlatRod.v(f"V{k}", 0.1 * k, 0.0, 0.3) for k in range(4)]
-    meshes = {"A": mesh_grid(FlatGrid.of(rods), 0.02), "B": mesh_grid(FlatGrid.of(rods), 0.02)}
-    joined = side_by_side_meshes(meshes, 0.2).mesh
-    shells = [rs.Shell.of(mesh, round_rod(5e-3)) for mesh in meshes.values()]
-    flat = [mesh.flat.copy() for mesh in meshes.values()]
-    there = flat[1] + [0.0, 0.3, 0.0]
-    there[:, 2] = 0.4 * flat[1][:, 1]  # a ridge at the seam
-    met = contact_of_patches(joined, list(zip(shells, (flat[0], there), strict=True)), round_rod(5e-3))
+    shell, flat = beside_each_other(rods, rods), mesh_grid(FlatGrid.of(rods), 0.02).flat
+    there = flat + [0.0, 0.3, 0.0]
+    there[:, 2] = 0.4 * flat[:, 1]  # a ridge at the seam
+    met = contact_of(shell, np.vstack([flat, there]), round_rod(5e-3))
     assert met == APART
     moved = there + [0.03, -0.05, 0.0]  # past the seam, between the others
-    beside = contact_of_patches(joined, list(zip(shells, (flat[0], moved), strict=True)), round_rod(1.4e-2))
+    beside = contact_of(shell, np.vstack([flat, moved]), round_rod(1.4e-2))
     assert beside.clearance == pytest.approx(0.03 - 0.028, abs=1e-3)
     assert beside.rods is not None
     assert {name[0] for name in beside.rods} == {"A", "B"}
     through = there + [0.0, -0.05, -0.02]
-    crossing = contact_of_patches(joined, list(zip(shells, (flat[0], through), strict=True)), round_rod(5e-3))
+    crossing = contact_of(shell, np.vstack([flat, through]), round_rod(5e-3))
     assert crossing.pairs == 4
     assert crossing.clearance == pytest.approx(-0.01)
 
@@ -307,24 +313,19 @@ def test_rods_of_two_patches_that_meet_at_a_seam_are_no_contact_and_others_are()
 def test_rods_that_meet_at_both_their_ends_are_no_contact() -> None:
     """Of two patches each has one arch; they stand on the same points and lean apart."""
     rods = [FlatRod.u("U1", 0.0, 0.0, 0.5)]
-    meshes = {"A": mesh_grid(FlatGrid.of(rods), 0.01), "B": mesh_grid(FlatGrid.of(rods), 0.01)}
-    shells = [rs.Shell.of(mesh, round_rod(5e-3)) for mesh in meshes.values()]
-    arch = meshes["A"].flat.copy()
+    arch = mesh_grid(FlatGrid.of(rods), 0.02).flat.copy()
     height = 0.6 * arch[:, 0] * (0.5 - arch[:, 0]) / 0.5
     arch[:, 1:] = height[:, None] * [-1.0, 1.0]
     other = arch * [1.0, -1.0, 1.0]
-    joined = side_by_side_meshes(meshes, 0.2).mesh
-    assert contact_of_patches(joined, list(zip(shells, (arch, other), strict=True)), round_rod(5e-3)) == APART
+    assert contact_of(beside_each_other(rods, rods), np.vstack([arch, other]), round_rod(5e-3)) == APART
 
 
 def test_rods_of_patches_that_cross_only_where_their_flat_grids_lie_are_a_contact() -> None:
     """Patches are laid out side by side for drawing: that their lines cross there means nothing."""
     one, other = FlatRod.u("U1", 0.0, 0.0, 0.5), FlatRod.v("V1", 0.0, -0.25, 0.25)
-    meshes = {"A": mesh_grid(FlatGrid.of([one]), 0.01), "B": mesh_grid(FlatGrid.of([other]), 0.01)}
-    shells = [rs.Shell.of(mesh, round_rod(5e-3)) for mesh in meshes.values()]
-    joined = side_by_side_meshes(meshes, 0.01).mesh
-    over = [meshes["A"].flat, meshes["B"].flat + [0.492, 0.0, 0.002]]
-    found = contact_of_patches(joined, list(zip(shells, over, strict=True)), round_rod(5e-3))
+    shell = beside_each_other([one], [other], gap=0.01)
+    flat = [mesh_grid(FlatGrid.of([rod]), 0.02).flat for rod in (one, other)]
+    found = contact_of(shell, np.vstack([flat[0], flat[1] + [0.492, 0.0, 0.002]]), round_rod(5e-3))
     assert found.pairs == 1
     assert found.clearance == pytest.approx(-8e-3)
 
@@ -338,7 +339,7 @@ def test_fine_meshes_of_thick_rods_find_what_coarse_ones_do() -> None:
         places = np.column_stack([0.4 * np.sin(t), 0 * t, 0.4 * np.cos(t)])
         places[mesh.rod_slice(1), 1] = 0.05 + 0.1 * (t[mesh.rod_slice(1)] - 0.6) ** 2
         found.append(contact(mesh, places, round_rod(0.02)))
-        sizes.append(len(_Edges(mesh, places, outline, None, _crossing_lines(mesh.grid.rods, outline)).rods))
+        sizes.append(len(_Edges(mesh, places, outline, None, mesh.grid.meetings(4 * outline.reach / FLATTEST)).rods))
     assert sizes[1] < 3 * sizes[0]
     assert found[0].clearance == pytest.approx(0.01, abs=2e-4)
     assert found[1].clearance == pytest.approx(0.01, abs=2e-4)

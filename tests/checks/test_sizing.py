@@ -1,5 +1,6 @@
 """A rod that is not given: its material by name, its section by the bends of the target's net."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from rodshell.results.summary import summary_text
 from rodshell.results.verdict import verdict
 from rodshell.results.wording import percent
 from rodshell.rods.section import TRADE_SIZES, size_text
+from tests.acceptance.targets_broken import as_obj
+from tests.targets.meshes import sheet
 
 
 def roof(**keys: Any) -> Any:
@@ -490,6 +493,48 @@ def test_sizes_that_do_not_suit_each_other_are_refused_before_the_net(
     whole = {"layout.rods": "auto", "layout.length": "auto"}
     with pytest.raises(InputError, match=said):
         rs.Job.load(case, whole | keys).run()
+
+
+LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 0.01, "in": 0.0254, "ft": 0.3048}  # m
+
+
+@pytest.mark.parametrize("given", LENGTH)
+@pytest.mark.parametrize("drawn", LENGTH)
+def test_a_saddle_of_18_m_that_is_read_in_another_unit_is_told_with_its_own(
+    drawn: str, given: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Refused if rods or spacing are given; with both left open it is said before the net."""
+    monkeypatch.setattr("rodshell.run.find_stages", lambda *stages, **options: {}["drape"])
+    x, faces = sheet(lambda x, y: 3 + (x * x - y * y) / 60, 9.0, 12)
+    (tmp_path / "saddle.obj").write_bytes(as_obj(x / LENGTH[drawn], faces))
+    width = 18 * LENGTH[given] / LENGTH[drawn]
+    rods = {"rod.section": {"kind": "circle", "radius": "8 mm"}, "rod.material.preset": "gfrp"}
+    sized = ({"layout.spacing": "1 m"}, rods, rods | {"layout.spacing": "1 m"}) if width < 100 else ()
+    for keys in ({}, *sized):
+        said = list[str]()
+        with pytest.raises((InputError, KeyError)) as end:
+            rs.Job.load(tmp_path / "saddle.obj", {"target.unit": given} | keys).run(announce=said.append)
+        words = " ".join([*said, str(end.value)])
+        if width > 1e3:
+            assert f"give another unit, such as {drawn}" in words
+        elif width < (1 if keys else 2):
+            assert re.search(rf"check its unit.*18 m(, drawn)? in {drawn}\b", words)
+        elif not keys:
+            assert ("check its unit" in words) == (width > 200)
+        elif drawn == given:
+            assert isinstance(end.value, KeyError)
+
+
+def test_micro_structures_with_rods_to_match_are_not_spoken_of(tmp_path: Path) -> None:
+    """27 um wide, from a file in um, and as a hemisphere; with rods as slender as those of roofs."""
+    x, faces = sheet(lambda x, y: 3 + (x * x - y * y) / 40, 13.5, 12)
+    (tmp_path / "saddle.obj").write_bytes(as_obj(x, faces))
+    rods = {"layout.spacing": "2 um", "rod.material.preset": "petg"}
+    rods["rod.section"] = {"kind": "circle", "radius": "0.05 um"}
+    said = list[str]()
+    form = rs.Job.load(tmp_path / "saddle.obj", {"target.unit": "um"} | rods).run(announce=said.append, until="pop-up")
+    assert form.status == "converged"
+    assert not any("check its unit" in words for words in said)
 
 
 def test_sizes_are_compared_for_objects_and_tables_too(tmp_path: Path) -> None:

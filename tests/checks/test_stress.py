@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import bending, bending_of
-from rodshell.checks.bending import VON_MISES, largest_stress, torsion_stress
+from rodshell.checks.bending import VON_MISES, bending, bending_of, largest_stress, torsion_stress
 from rodshell.joints import Joint
 from tests.checks.shells import dome
 from tests.checks.stress_twin import largest, shear_field, stresses, twisted_shells

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import Bending, Checks, bending
+from rodshell.checks import Checks
+from rodshell.checks.bending import Bending, bending
 from rodshell.checks.check import staged
 from rodshell.checks.deployment import Deployment
 from rodshell.fabrication.fabricate import fabricate

@@ -41,7 +41,10 @@ CROSS = [
 class FakeArchive:
     def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
         verdict = {"level": level, "reasons": ["the rods touch"]}
-        self.results = Results.model_validate({"format": "rodshell-result", "status": status, "verdict": verdict})
+        popped = {"pop_up": {"pinned": {"status": status}}} if level == "unknown" else {}
+        self.results = Results.model_validate(
+            {"format": "rodshell-result", "status": status, "verdict": verdict, **popped}
+        )
         self.case_toml = case_toml
 
     def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
@@ -140,7 +143,8 @@ def test_form_asks_for_the_case_and_saves_its_full_input(
     case = load_case("hemisphere", {**overrides, "rod.material.youngs_modulus": 25e9})
     built = case.build()._asdict()
     target, layout, rod = (built.pop(name) for name in ("target", "layout", "rod"))
-    assert finder.calls == [((target, layout, rod), {**built, "warm_start": None, "same_drape": False})]
+    built |= {"joint": case.joint, "ends": case.supports, "warm_start": None, "same_drape": False}
+    assert finder.calls == [((target, layout, rod), built)]
     assert load_case("dome/case.toml") == case
     assert "agreement 0.01 mm" in capsys.readouterr().out
 
@@ -283,14 +287,15 @@ def test_a_file_that_comes_into_the_way_while_the_job_runs_sends_the_result_else
 @pytest.mark.parametrize(
     ("status", "level", "code"),
     [("converged", "good", 0), ("converged", "check", 0), ("converged", "unbuildable", 4), ("stalled", "check", 3),
-     ("stalled", "unbuildable", 3)],
+     ("stalled", "unbuildable", 3), ("converged", "unknown", 3)],
 )  # fmt: skip
 def test_the_exit_code_is_the_verdict_s_and_not_converged_wins(
     finder: FakeFinder, capsys: pytest.CaptureFixture[str], status: str, level: str, code: int
 ) -> None:
     finder.status, finder.level = status, level
     assert main(["form", "hemisphere", "--quiet"]) == code
-    said = {0: "", 3: "rodshell: NOT CONVERGED: stalled", 4: "rodshell: NOT BUILDABLE: the rods touch"}[code]
+    not_known = "NOT CONVERGED: stalled" if status == "stalled" else "NOT KNOWN: the rods touch"
+    said = {0: "", 3: f"rodshell: {not_known}", 4: "rodshell: NOT BUILDABLE: the rods touch"}[code]
     err = capsys.readouterr().err
     assert err.startswith(said)
     assert (err == "") == (code == 0)
@@ -633,11 +638,14 @@ def test_a_table_in_another_unit_than_its_own_is_refused(
     in_mm = [[3e4 * x for x in row] for row in CROSS]  # of 6 m
     table = write_table(Path("rods.csv"), in_mm)
     said = refused(capsys, "popup", table, "--unit", "m")
-    assert "rods.csv is 6e+03 m wide in this unit (6000 x 6000 units): give another unit, for 0.001 to 1000 m" in said
+    assert (
+        "rods.csv is 6e+03 m wide in this unit (6000 x 6000 units): give another unit, such as mm, for 1e-06 to 1000 m"
+        in said
+    )
     in_m = write_table(Path("small.csv"), [[1e-4 * x for x in row] for row in CROSS])
     assert "small.csv is 2e-08 m wide" in refused(capsys, "popup", in_m, "--unit", "mm")
     named = write_table(Path("named.csv"), [[1e7 * x for x in row] for row in CROSS], tuple(f"{c}_mm" for c in COLUMNS))
-    assert "check its columns, which are in mm, for 0.001 to 1000 m" in refused(capsys, "popup", named)
+    assert "check its columns, which are in mm, for 1e-06 to 1000 m" in refused(capsys, "popup", named)
     assert finder.calls == []
 
 

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 import rodshell as rs
 from rodshell.cli import main
-from rodshell.formfinding.patches import PatchedForm, find_patched_stages
+from rodshell.formfinding import Stages
+from rodshell.formfinding.patches import find_patched_stages
 from rodshell.formfinding.seams import transported_heading
 from rodshell.results import read
 from rodshell.targets.creased import Creased, cut_at
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.patch import Seam
-from tests.targets.meshes import CREASED, creased
+from tests.targets.meshes import CREASED, creased, creased_quads
 from tests.targets.test_creases import SEAMS, off_crease
 
 Floats = NDArray[np.float64]
@@ -24,7 +25,7 @@ ON_CREASE = 2e-4  # of the size, as issue 40 asks of rod ends
 
 
 @cache
-def laid(name: str) -> PatchedForm:
+def laid(name: str) -> Stages:
     """Draped in patches, not popped up."""
     seams = [Seam.of(line) for line in SEAMS[name]]
     target = cut_at(Freeform.of(*creased(name)), seams)
@@ -41,17 +42,17 @@ every = pytest.mark.parametrize(
 def test_rods_of_both_sides_end_on_the_crease(name: str) -> None:
     form = laid(name)
     assert form.status == "converged"
-    points = np.array([meeting.point for meeting in form.meetings])
+    points = np.array([meeting.point for meeting in form.seams.meetings])
     assert len(points) > 8
     assert off_crease(name, points).max() < ON_CREASE * form.target.size
     assert np.abs(points[:, 2] - CREASED[name](*points[:, :2].T)).max() < ON_CREASE * form.target.size
-    for meeting in form.meetings:
+    for meeting in form.seams.meetings:
         for end in meeting.ends:
             patch = form.patches[end.patch]
             rod = [rod.name for rod in patch.footprint.rods].index(end.rod)
             here = patch.trimmed.positions[patch.footprint.mesh.ends[rod, end.side]]
             np.testing.assert_array_equal(here, meeting.point)
-    assert max(form.moved.values()) < 5e-4 * form.target.size
+    assert max(form.seams.moved.values()) < 5e-4 * form.target.size
 
 
 @every
@@ -78,10 +79,11 @@ def test_mirrored_patches_get_mirrored_headings() -> None:
 
 
 @pytest.mark.slow
-def test_a_groined_shell_forms_in_four_patches_from_the_command_line(tmp_path, capsys) -> None:
-    """Its seams are those that the refusal without seams names."""
-    x, faces = creased("groin")
-    rows = [f"v {a:.6f} {b:.6f} {c:.6f}" for a, b, c in x] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+@pytest.mark.parametrize("mesh", [creased, creased_quads])
+def test_a_groined_shell_forms_in_four_patches_from_the_command_line(mesh, tmp_path, capsys) -> None:
+    """Its seams are those that the refusal without seams names; of triangles cut along the groin, and of quads."""
+    x, faces = mesh("groin")
+    rows = [f"v {a:.6f} {b:.6f} {c:.6f}" for a, b, c in x] + ["f " + " ".join(map(str, face + 1)) for face in faces]
     (tmp_path / "groin.obj").write_text("\n".join(rows))
     options = [
         "--unit",

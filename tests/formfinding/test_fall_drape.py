@@ -19,6 +19,7 @@ from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.results.manifest import read_manifest
 from rodshell.solve.equilibrium import Status
 from rodshell.solve.simulate import TimeSeries
+from rodshell.targets import Ellipsoid
 from tests.formfinding.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
 from tests.nets.sphere_net import sphere_net_end
 
@@ -168,6 +169,22 @@ def test_what_a_fall_that_is_not_at_rest_asks_for_brings_it_to_rest(key: str) ->
     assert found
     fall = Fall(drag=float(found[1])) if key == "drag" else Fall(drag=1.0, duration=float(found[1]))
     assert rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall).converged
+
+
+@pytest.mark.slow
+def test_a_grid_that_creeps_on_says_so_and_rests_with_the_friction_that_is_advised():
+    """Linkers on an ellipsoid: its kinetic energy stays what it was after 2 s, however long the fall."""
+    ellipsoid = Ellipsoid(0.2, 0.15, 0.12)
+
+    def fall(**given: float) -> Draped:
+        return rs.drape(coarse_layout(), PAPER_ROD, ellipsoid, joint=Linker(), method=Fall(height=0.05, **given))
+
+    creeping = fall(duration=4.0)
+    assert creeping.report.status is Status.MOVING
+    assert "its kinetic energy no longer falls" in creeping.report.reason
+    assert "(drape.friction)" in creeping.report.reason
+    assert creeping.warnings == (creeping.report.reason,)
+    assert fall(friction=0.1).converged
 
 
 @pytest.mark.parametrize("rate", [0.3, 2.0])

@@ -146,7 +146,7 @@ def test_seams_join_points_between_the_layers():
     target = rs.Ellipsoid(a=0.3, b=0.2, c=0.12)
     sewn = rs.find_form(target, layout(0.06), ROD, seams=[seam], joint=PIN, ends=("clamped",))
     assert sewn.status == "converged"
-    assert max(sewn.stages.moved.values()) < 1e-3 * R  # nets of one surface would miss each other by h/R
+    assert max(sewn.stages.seams.moved.values()) < 1e-3 * R  # nets of one surface would miss each other by h/R
     for meeting in sewn.meetings:
         for end in meeting.ends:
             part = sewn.stages.patches[end.patch].trimmed

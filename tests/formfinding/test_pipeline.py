@@ -13,9 +13,9 @@ import pytest
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.figures.records import json_text
-from rodshell.formfinding import bound_drape, pipeline
+from rodshell.formfinding import bound_drape, form_warnings, pipeline
 from rodshell.formfinding.finite_sections import section_rotation
-from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.results import read
 from rodshell.results.verdict import verdict
 from rodshell.solve.equilibrium import Status
@@ -177,7 +177,7 @@ def test_a_rod_that_runs_far_past_its_last_joint_is_warned_of(ending, tail, left
     grid = rs.FlatGrid.of([rs.FlatRod.u("U01", 0.0, 0.0, 1.1), *crossing], margin=0.015)
     layout = rs.GridLayout.orthogonal(spacing=0.1)
     trimmed = SimpleNamespace(mesh=SimpleNamespace(grid=grid), draped=SimpleNamespace(layout=layout))
-    found = pipeline._long_tails(trimmed)
+    found = form_warnings._long_tails(trimmed)
     assert len(found) == (tail is not None)
     if tail is not None:
         assert found[0].startswith(
@@ -326,7 +326,7 @@ def test_the_kept_case_asks_for_the_same_ends(ends, tmp_path):
     for form in (whole, sewn):
         (tmp_path / "case.toml").write_text(form.archive(options=rs.OutputOptions(stages=0)).case_toml)
         case = load_case(tmp_path / "case.toml")
-        assert case.build().ends == form.ends == tuple(form.popped) == ends
+        assert tuple(support.name for support in case.supports) == form.ends == tuple(form.popped) == ends
 
 
 @pytest.mark.slow

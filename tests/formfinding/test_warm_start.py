@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.layout.mesh import side_by_side
 from rodshell.layout.transfer import corresponding_rods, transferred_edges, transferred_nodes
 from rodshell.nets import net_refinement
 from rodshell.nets.chebyshev import chebyshev_net
-from rodshell.nets.compass import axes, march
+from rodshell.nets.compass import axes
 from rodshell.nets.net_refinement import march_near
 from tests.formfinding.altered import at_positions
+from tests.nets.whole_march import march
 
 SIZE = 0.2
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
@@ -202,6 +204,16 @@ def test_rods_without_a_counterpart_get_nothing(last):
     )
     assert len(alone)
     assert (carried[alone] == 0.0).all()
+
+
+def test_rods_of_grids_side_by_side_have_their_counterparts_in_the_same_grid(last):
+    """However the row lies, in which grids of other sizes move the others."""
+    mesh = last.footprint.mesh
+    few = rs.find_form(OVAL, layout_of(rods=(5, 4)), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
+    before, now = (side_by_side({"A": a, "B": b}, 0.1) for a, b in ((few, mesh), (mesh, few)))
+    first = corresponding_rods(few, mesh)
+    second = [(k + len(mesh.grid.rods), j + len(few.grid.rods)) for k, j in corresponding_rods(mesh, few)]
+    assert corresponding_rods(before, now) == [*first, *second]
 
 
 def test_a_net_searched_for_in_its_own_steps_needs_no_other_guess():

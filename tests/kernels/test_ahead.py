@@ -1,4 +1,4 @@
-"""Kernels compiled by Numba before the first job: each by the types of its row."""
+"""Kernels compiled by Numba before the first job: each by the types that it is declared with."""
 
 import importlib
 import os
@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 import rodshell
-from rodshell.kernels import COMPILED
-from rodshell.kernels.table import KERNELS
+from rodshell.kernels import COMPILED, KERNELS
 
 jit_only = pytest.mark.skipif(
     COMPILED is not None or bool(os.environ.get("NUMBA_DISABLE_JIT")), reason="kernels by Numba: RODSHELL_KERNELS=jit"
@@ -20,7 +19,8 @@ INLINED = {"spread", "subtract_product"}  # never compiled on their own
 
 LATER = """
 from importlib import import_module
-from rodshell.kernels.table import KERNELS, OF_SOME_JOBS
+from rodshell.kernels import KERNELS
+from rodshell.kernels.ahead import OF_SOME_JOBS
 from tests.kernels.jobs import JOBS
 list(JOBS["commands"]())
 for module, rows in KERNELS.items():
@@ -40,7 +40,7 @@ def test_a_form_of_a_ball_jointed_shell_compiles_no_kernel_of_other_jobs() -> No
 
 @pytest.mark.slow
 @jit_only
-def test_jobs_call_every_kernel_with_the_types_of_its_row() -> None:
+def test_jobs_call_every_kernel_with_the_types_that_it_is_declared_with() -> None:
     """With these alone: a second signature would be compiled again, and refused by a compiled kernel, except that this
     one takes arrays that are read only."""
     from numba.core.dispatcher import Dispatcher

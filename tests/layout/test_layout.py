@@ -412,7 +412,7 @@ def test_places_that_differ_by_round_off_are_one_node():
 
 def test_a_mesh_without_joints_may_be_cut():
     grid = FlatGrid.of([FlatRod.u("U", 0.0, 0.0, 1.0), FlatRod.v("V", 0.1, -1.0, 1.0)], margin=0.2)
-    part, nodes = cut_mesh(mesh_grid(grid, 0.1), grid)
+    part, nodes = cut_mesh(mesh_grid(grid, 0.1), grid.rods)
     assert len(part.grid.crossings) == 0
     assert len(nodes) == 32
 
@@ -427,7 +427,7 @@ def test_a_cut_mesh_keeps_stations_nodes_and_the_joints_far_from_ends(seed, coun
         s = mesh.stations[mesh.rod_slice(k)]
         first, last = sorted(rng.choice(len(s), 2, replace=False))
         rods.append(mesh.grid.rods[k].cut(float(s[first]), float(s[last])))
-    part, nodes = cut_mesh(mesh, FlatGrid.of(rods, margin=margin))
+    part, nodes = cut_mesh(mesh, rods, margin=margin)
     joined = FlatGrid.of(rods, margin=margin)
     np.testing.assert_array_equal(part.grid.crossings.rods, joined.crossings.rods)
     names = [rod.name for rod in mesh.grid.rods]
@@ -458,7 +458,7 @@ def test_a_cut_mesh_keeps_stations_nodes_and_the_joints_far_from_ends(seed, coun
 def test_of_three_rods_through_one_point_two_stay_joined_when_the_third_ends_near_it():
     mesh = mesh_grid(straight_rods(star((0.0, 0.0), 2.0, (0, 60, 120))), 0.1)
     rods = [mesh.grid.rods[0], mesh.grid.rods[1], mesh.grid.rods[2].cut(0.9, 2.0)]  # the point is at s = 1
-    part, nodes = cut_mesh(mesh, FlatGrid.of(rods, margin=0.15))
+    part, nodes = cut_mesh(mesh, rods, margin=0.15)
     assert part.grid.crossings.rods.tolist() == [[0, 1]]
     centre = mesh.joint_nodes[0]
     assert np.count_nonzero(nodes == centre) == 2  # the third rod has a node of its own there

@@ -44,7 +44,7 @@ def test_profiles_stay_with_their_rods_in_meshes_and_side_by_side():
     mesh = mesh_grid(FlatGrid.of(rods), 0.3).with_profiles((EIGHTFOLD, None))
     assert [rod.profile for rod in mesh.in_layers(0.1).grid.rods] == [EIGHTFOLD, None]
     assert mesh.grid.rods[0].cut(-0.5, 0.5).profile == EIGHTFOLD
-    both = side_by_side({"A": mesh, "B": mesh}, 1.0).mesh.grid.rods
+    both = side_by_side({"A": mesh, "B": mesh}, 1.0).grid.rods
     assert [rod.profile for rod in both] == [EIGHTFOLD, None, EIGHTFOLD, None]
 
 

@@ -36,11 +36,11 @@ def test_design_strengths_are_those_of_the_codes(
 
 
 def test_given_strengths_replace_those_of_a_preset_and_last_for_shorter_loads() -> None:
-    found = Limits.of(TIMBER, rs.Strength(permanent=8e6, short=12e6), characteristic=30e6)
+    found = Limits.of(TIMBER, rs.Strength(permanent=8e6, short=12e6))
     assert found.bending == {"permanent": 8e6, "long": 8e6, "medium": 8e6, "short": 12e6, "instantaneous": 12e6}
     assert found.erection == 12e6
-    assert Limits.of(TIMBER, rs.Strength(short=12e6), characteristic=30e6).bending.keys() == {"short", "instantaneous"}
-    assert set(Limits.of(TUBE, rs.Strength(), characteristic=9e6, of_preset=False).bending.values()) == {9e6}
+    assert Limits.of(TIMBER, rs.Strength(short=12e6)).bending.keys() == {"short", "instantaneous"}
+    assert set(Limits.of(TUBE, rs.Strength(), given=9e6).bending.values()) == {9e6}
     assert Limits.of(TUBE, rs.Strength()).bending == {}
 
 

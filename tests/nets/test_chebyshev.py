@@ -19,11 +19,11 @@ from scipy.optimize import brentq
 from rodshell.errors import InputError, NetLimitError
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net, geodesics
-from rodshell.nets.compass import march
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated, inside_nodes
 from rodshell.targets import Cap, Disc, Ellipsoid, HeightField, Hemisphere, Paraboloid, Rectangle, Target
 from tests.nets.goursat import goursat_ends
 from tests.nets.sphere_net import LIMIT, crossing_angle, sphere_net_end, sphere_net_rod
+from tests.nets.whole_march import march, parts
 
 Floats = NDArray[np.float64]
 
@@ -530,9 +530,9 @@ def test_an_end_that_one_march_alone_has_found_counts_in_the_error():
     coarse = Cuts(np.array([0, 1, 2]), np.array([[-1.0, 1.004]] * 3))
     ends = [[-1.001, 1.001], [-1.001, -0.1], [0.1, 1.001], [0.3, 0.34]]
     cuts, errors = extrapolated(coarse, Cuts(np.array([0, 1, 1, 3]), np.array(ends)), 5, step=0.02)
-    assert cuts.of_line(0) == [[pytest.approx(-1.001 - 0.001 / 3), pytest.approx(1.0)]]
-    assert cuts.of_line(1) == [[pytest.approx(-1.001 - 0.001 / 3), -0.1], [0.1, pytest.approx(1.0)]]
-    assert cuts.of_line(3) == [[0.3, 0.34]]
+    assert parts(cuts, 0) == [[pytest.approx(-1.001 - 0.001 / 3), pytest.approx(1.0)]]
+    assert parts(cuts, 1) == [[pytest.approx(-1.001 - 0.001 / 3), -0.1], [0.1, pytest.approx(1.0)]]
+    assert parts(cuts, 3) == [[0.3, 0.34]]
     # of line 1 half the gap that the coarse march does not see
     assert errors == pytest.approx([0.001, 0.1, 0.0, 0.02, 0.0])
 
@@ -540,7 +540,7 @@ def test_an_end_that_one_march_alone_has_found_counts_in_the_error():
 def test_ends_that_would_change_places_are_not_extrapolated():
     coarse, fine = (Cuts(np.array([0]), np.array([ends])) for ends in ([0.0, 0.002], [0.01, 0.0101]))
     cuts, errors = extrapolated(coarse, fine, 1, step=0.02)
-    assert cuts.of_line(0) == [[0.01, 0.0101]]
+    assert parts(cuts, 0) == [[0.01, 0.0101]]
     assert errors == pytest.approx([0.02])
 
 
@@ -556,7 +556,7 @@ def test_lines_are_cut_wherever_they_cross_the_base():
         -(s + 0.81) * (s + 0.42) * (s - 0.11) * (s - 0.93), -(s + 0.81) * (s + 0.02) * (s - 0.11) * (s - 0.73),
     ])  # fmt: skip
     (cuts,) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights, s), heights > 0)])
-    one, none, *both = map(cuts.of_line, range(4))
+    one, none, *both = (parts(cuts, line) for line in range(4))
     # a cubic is its own interpolant; the cubic misses a quartic by h^4 or so: 4e-5 measured, where its slope is small
     assert one == [[pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13)]]
     assert none == []
@@ -564,7 +564,7 @@ def test_lines_are_cut_wherever_they_cross_the_base():
         np.array([[[-0.81, -0.42], [0.11, 0.93]], [[-0.81, -0.02], [0.11, 0.73]]]), abs=1e-4
     )
     (mirrored,) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights[:, ::-1], s), heights[:, ::-1] > 0)])
-    assert np.array(mirrored.of_line(2)) == pytest.approx(np.array([[-0.93, -0.11], [0.42, 0.81]]), abs=1e-4)
+    assert np.array(parts(mirrored, 2)) == pytest.approx(np.array([[-0.93, -0.11], [0.42, 0.81]]), abs=1e-4)
 
 
 def test_a_piece_counts_where_any_of_it_is_deep_enough():
@@ -586,7 +586,7 @@ def test_a_line_that_stops_just_past_the_base_is_cut_from_within(beyond):
     line = lines_at(heights[None], s)
     line[0, : first - beyond] = line[0, last + 1 + beyond :] = np.nan
     (cuts,) = cut_lines(HEMISPHERE, [Lines(s, line, inside[None])])
-    assert cuts.of_line(0) == [[pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13)]]
+    assert parts(cuts, 0) == [[pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13)]]
 
 
 # Order
@@ -783,7 +783,7 @@ def test_geodesics_of_the_sphere_are_great_circles():
 
 def test_geodesics_of_an_ellipsoid_converge_to_second_order():
     start = ELLIPSOID.lift(np.array([[0.08, -0.04]]))
-    w = np.array(ELLIPSOID.weights)
+    w = np.array(ELLIPSOID.terms[0])
     normal = w * start[0] / np.linalg.norm(w * start[0])
     direction = np.cross(normal, [0.3, 0.8, 0.1])
     direction /= np.linalg.norm(direction)

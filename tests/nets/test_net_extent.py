@@ -10,9 +10,10 @@ import rodshell as rs
 from rodshell.geometry.curves import resampled
 from rodshell.nets import net_extent
 from rodshell.nets.apron import RINGS
-from rodshell.nets.compass import Net, axes, fill_quadrants, march
+from rodshell.nets.compass import Net, axes, fill_quadrants
 from rodshell.nets.net_ends import inside_nodes
 from rodshell.nets.net_extent import Covering, march_covering, wanted_nodes
+from tests.nets.whole_march import march
 from tests.targets.test_nets_on_files import TARGETS as FILES
 
 SIZE = 0.2

@@ -18,7 +18,7 @@ from rodshell.geometry.boxes import boxes_meet, length_beneath, lines_meet
 from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
-from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan, strips_drawing
+from rodshell.output.drawings.flat import flat_drawing, flat_plan, strips_drawing
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, bound, laid_out, room, tiled, title_block
 from rodshell.output.drawings.shell import SAME, bracing_drawing, elevations_drawing, erection_drawing, rod_curves
 from rodshell.output.files import export
@@ -247,7 +247,7 @@ def test_spread_keeps_the_order_and_the_gap_and_moves_least(places: list[float],
 
 def test_diagonals_are_those_of_the_largest_rectangle() -> None:
     plan = flat_plan(archive("dome"))
-    (a, b), (c, d) = diagonals(plan)
+    (a, b), (c, d) = plan.diagonals
     assert np.linalg.norm(b - a) == pytest.approx(np.linalg.norm(d - c))
     marks = {tuple(np.round(mark, 6)) for mark in plan.marks}
     assert {tuple(np.round(point, 6)) for point in (a, b, c, d)} <= marks
@@ -266,7 +266,7 @@ def test_diagonals_are_those_of_the_largest_rectangle() -> None:
 def test_each_grid_is_set_out_by_two_diagonals_with_their_lengths(name: str) -> None:
     """Each patch of a sewn shell has its own; along them every cell is there, so that none runs over an opening."""
     plan = flat_plan(formed(name))
-    found = diagonals(plan)
+    found = plan.diagonals
     assert len(found) == (4 if name == "sewn" else 2)
     for a, b in found:
         for point in a + np.linspace(0.01, 0.99, 99)[:, None] * (b - a):

@@ -13,7 +13,7 @@ import pytest
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import InputError, OutputError
-from rodshell.output.files import DEFAULT, KINDS, export, read_kinds, save
+from rodshell.output.files import DEFAULT, KINDS, export, save, wanted_kinds
 from rodshell.results import Results, read
 from tests.output.forms import archive, form, wished
 from tests.output.sample_archive import sample_archive, table_archive
@@ -97,10 +97,10 @@ def test_bad_requests_are_one_sentence(
 
 
 def test_kinds_are_read_in_any_case_and_checked() -> None:
-    assert read_kinds(" DXF,csv ") == ["dxf", "csv"]
+    assert wanted_kinds(" DXF,csv ") == ["dxf", "csv"]
     assert set(DEFAULT) == set(KINDS) - {"3dm"}
     with pytest.raises(InputError, match="report"):
-        read_kinds("html")
+        wanted_kinds("html")
 
 
 @pytest.mark.slow

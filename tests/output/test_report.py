@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import Deployment
+from rodshell.checks.deployment import Deployment
 from rodshell.figures.checks import Bending, WorstBent
 from rodshell.figures.form import Layout, Material, Target
 from rodshell.output.drawings.flat import flat_plan

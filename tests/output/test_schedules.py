@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rodshell.checks import JointLoads
+from rodshell.checks.reactions import JointLoads
 from rodshell.output.files import export
 from rodshell.output.grid import joints_of, rods_of
 from rodshell.results.wording import rounding_of

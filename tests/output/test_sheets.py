@@ -10,7 +10,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.errors import InputError
-from rodshell.formfinding.popup import ENDS, Ends
+from rodshell.figures.records import Ends
 from rodshell.joints import Joint, joint_parameters
 from rodshell.output.drawing import CAPITAL, LETTER, TEXT, Drawing
 from rodshell.output.drawings import drawing_set, sheet_set
@@ -24,6 +24,8 @@ from tests.acceptance.cases import ROD
 from tests.output.forms import archive, wished
 from tests.output.hostile import hostile_archive
 from tests.output.sample_archive import sample_archive, table_archive
+
+ENDS = ("pinned", "clamped")
 
 
 def sheets(made: Archive) -> list[Drawing]:

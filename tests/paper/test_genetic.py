@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import InputError
-from rodshell.formfinding import Footprint, PatchForm, find_stages
+from rodshell.formfinding import Footprint, Stages, find_stages
 from rodshell.paper import genetic, genetic_search
 from rodshell.paper.figure import CASES, Case
 from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored
@@ -30,7 +30,7 @@ LEANS = Case("d", LEANING, (5, 5), spacing=0.06, edge=0.03)
 
 
 @cache
-def direct(case: Case) -> PatchForm:
+def direct(case: Case) -> Stages:
     return find_stages(case.target, case.layout, PAPER_ROD, ends=("pinned",))
 
 

@@ -13,9 +13,9 @@ from rodshell.formfinding.popup import pop_up
 from rodshell.formfinding.trim import Footprint
 from rodshell.refining import refine as refine_module
 from rodshell.refining.gauss_newton import Step
-from rodshell.refining.objectives import Gap, Small
-from rodshell.refining.refine import Refinement, between, refine
-from rodshell.refining.stiffness_families import Taper
+from rodshell.refining.objectives import Gap
+from rodshell.refining.refine import Refinement, between, built, refine
+from rodshell.refining.structure import Point
 from rodshell.solve.equilibrium import find_equilibrium
 
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
@@ -49,7 +49,7 @@ def test_one_taper_for_all_rods_brings_the_shell_eight_times_nearer() -> None:
 
 def test_the_tapered_shell_is_as_stiff_as_before_and_no_thicker_than_that_takes() -> None:
     found = tapered()
-    mass = found.designs[0].point.structure.mass
+    mass = found.designs[0].structure.mass
     before, after = (
         float(form_.popped["pinned"].equilibrium.tangent.lowest_modes(1, mass=mass).values[0])
         for form_ in (found.before, found.after)
@@ -65,8 +65,8 @@ def test_cut_lengths_are_looked_for_on_both_sides(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(refine_module, "OPPOSITE", 0.0)
     one = refine(stages, "tails")  # type: ignore[arg-type]
     assert both.gap_after.rms < 0.97 * one.gap_after.rms
-    assert both.gap_after.rms_relative == pytest.approx(both.designs[-1].point.rms, rel=0.02)
-    assert both.designs[0].point.rms == pytest.approx(one.designs[0].point.rms)
+    assert both.gap_after.rms_relative == pytest.approx(both.designs[-1].rms, rel=0.02)
+    assert both.designs[0].rms == pytest.approx(one.designs[0].rms)
 
 
 def test_the_refined_grid_pops_up_from_its_draped_state_to_the_same_shape() -> None:
@@ -79,7 +79,7 @@ def test_the_refined_grid_pops_up_from_its_draped_state_to_the_same_shape() -> N
 
 def test_the_search_ends_where_no_neighbour_is_better() -> None:
     """Around the design the gap grows along every variable that is not at a bound, to the search's own precision."""
-    first, last = (design.point for design in (tapered().designs[0], tapered().designs[-1]))
+    first, last = tapered().designs[0], tapered().designs[-1]
     gradient = Gap().slopes(last).T @ Gap().residuals(last) / last.rms
     half = 0.5 * np.log(8.0)
     inside = np.abs(last.values) < half - 1e-9
@@ -89,17 +89,18 @@ def test_the_search_ends_where_no_neighbour_is_better() -> None:
 
 
 def test_objectives_compose_and_regularisation_keeps_variables_small() -> None:
-    stages = form().stages
-    soft = refine(stages, "taper", objectives=[Gap(), Small(np.ones(5), weight=0.003)])  # type: ignore[arg-type]
-    assert np.abs(soft.designs[-1].point.values).max() < 0.8 * np.abs(tapered().designs[-1].point.values).max()
+    class Small:
+        """Variables stay near the values that they have without effect."""
+
+        def residuals(self, here: Point) -> np.ndarray:
+            return np.asarray(0.003 * here.values / np.sqrt(len(here.values)))
+
+        def slopes(self, here: Point) -> np.ndarray:
+            return 0.003 * np.eye(len(here.values)) / np.sqrt(len(here.values))
+
+    soft = refine(form().stages, "taper", objectives=[Gap(), Small()])  # type: ignore[arg-type]
+    assert np.abs(soft.designs[-1].values).max() < 0.8 * np.abs(tapered().designs[-1].values).max()
     assert tapered().gap_after.rms < soft.gap_after.rms < tapered().gap_before.rms
-
-
-def test_the_largest_gap_is_smaller_in_a_higher_norm() -> None:
-    coarse = Taper(stations=3)
-    powers = [refine(form().stages, coarse, objectives=[Gap(power=power)]) for power in (2.0, 6.0)]  # type: ignore[arg-type]
-    assert powers[1].gap_after.max < 0.95 * powers[0].gap_after.max
-    assert powers[1].gap_after.rms > powers[0].gap_after.rms
 
 
 def test_progress_sees_every_evaluation_and_may_stop_the_search() -> None:
@@ -130,8 +131,6 @@ def test_what_cannot_be_refined_is_refused_in_a_sentence() -> None:
         refine(stages, "taper", ends="clamped")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="refined before"):
         refine(tapered().after, "taper")
-    with pytest.raises(InputError, match="larger than 1"):
-        Taper(ratio=0.5)
     with pytest.raises(InputError, match='ends = "clamped"'):
         refine(stages, "clamps")  # type: ignore[arg-type]
 
@@ -163,6 +162,6 @@ def test_a_design_between_two_has_a_gap_between_theirs() -> None:
     middle, made = between(found, first, last, 0.4)
     assert middle is not None
     assert made <= 10
-    assert last.point.rms < middle.point.rms < first.point.rms
-    np.testing.assert_allclose(middle.point.values, 0.4 * last.point.values)
-    assert middle.grid.mesh.grid.rods[0].profile is not None
+    assert last.rms < middle.rms < first.rms
+    np.testing.assert_allclose(middle.values, 0.4 * last.values)
+    assert built(found.variables, middle).mesh.grid.rods[0].profile is not None

@@ -12,7 +12,7 @@ import rodshell as rs
 from rodshell.case.stage_tables import FAMILIES as WORDS
 from rodshell.cli import main
 from rodshell.errors import OutOfTimeError
-from rodshell.formfinding.pipeline import Agreement, PatchForm
+from rodshell.formfinding.pipeline import Agreement, Stages
 from rodshell.formfinding.popup import PopUp
 from rodshell.output.viewer.scene import scene_of
 from rodshell.refining import acceptance
@@ -149,7 +149,7 @@ def test_the_offer_says_that_no_gain_was_found() -> None:
 def test_the_offer_is_of_the_designs_that_are_stable(stable: int, monkeypatch: pytest.MonkeyPatch) -> None:
     plain, popped_up, shares = rs.Job.load("hemisphere", PINNED).run(until="pop-up"), of_offer._popped_up, list[float]()
 
-    def first_ones(patch: PatchForm, share: float, like: PopUp) -> PopUp:
+    def first_ones(patch: Stages, share: float, like: PopUp) -> PopUp:
         shares.append(share)
         found = popped_up(patch, share, like)
         lost = replace(found.equilibrium.report, negative_modes=1)
@@ -198,6 +198,24 @@ def test_the_offer_for_patches_is_of_all_of_them() -> None:
     assert found is not None
     assert len(plain.patches) == 2
     assert found.after < found.before == plain.agreement["pinned"].rms_relative
+
+
+def test_a_refined_form_in_patches_is_one_shell_in_the_states_of_all() -> None:
+    seam = {"seams.lines": [[["0 mm", "-1 m"], ["0 mm", "1 m"]]]}
+    better = rs.refine(rs.Job.load("hemisphere", PINNED | seam).run(until="pop-up"), "double", ends="pinned")
+    assert better.refined is not None
+    assert better.refined.changed
+    popped = better.popped["pinned"]
+    assert popped.report.stable
+    assert popped.report.iterations <= 3  # it begins where the patches are
+    assert popped.footprint is better.footprint
+    assert popped.shell.mesh.grid.rods[0].profile is not None
+    assert better.agreement["pinned"].rms == better.refined.gap_after.rms < better.refined.gap_before.rms
+    for patch, grid in zip(better.patches, popped.alone, strict=True):
+        start = replace(patch.boundary, draped=patch.popped["pinned"].positions)
+        alone = rs.pop_up(patch.footprint, start, better.rod, ends="pinned")
+        assert alone.report.iterations <= 3  # it is there
+        np.testing.assert_allclose(grid.positions, alone.positions, rtol=0, atol=1e-12)
 
 
 def test_refine_pops_up_ends_that_the_form_did_not_have() -> None:
@@ -284,7 +302,7 @@ def test_a_design_that_passes_all_gates_but_is_not_nearer_than_the_form_is_not_t
     )
     gap, tried = before.agreement["pinned"].rms, list[float]()
 
-    def gates(form: PatchForm, **_: object) -> Gates:
+    def gates(form: Stages, **_: object) -> Gates:
         tried.append(form.agreement["pinned"].rms)
         return Gates({"tolerance": tried[-1] > gap}, "" if tried[-1] > gap else "tolerance: refused", 0)
 

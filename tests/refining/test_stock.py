@@ -8,11 +8,11 @@ import pytest
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.refining.refine import refine
-from rodshell.refining.stiffness_families import Sections
+from rodshell.refining.stiffness_families import RENARD
 from rodshell.refining.stock import nearest, repaired
 from tests.refining.test_refine import ROD, form
 
-SIZES = (1.6e-3, 1.8e-3, 2.0e-3, 2.2e-3, 2.5e-3)
+SIZES = [2e-3 * number for number in RENARD]
 
 
 def test_repair_finds_the_best_of_all_neighbours_of_a_linear_problem() -> None:
@@ -34,7 +34,7 @@ def test_variables_without_stock_keep_their_values() -> None:
 
 
 def test_each_rod_has_a_size_of_the_list_and_the_shell_is_nearer() -> None:
-    found = refine(form().stages, Sections(stock=SIZES))  # type: ignore[arg-type]
+    found = refine(form().stages, "sections")  # type: ignore[arg-type]
     assert found.gap_after.rms < 0.92 * found.gap_before.rms
     sizes = []
     for rod in found.after.footprint.rods:
@@ -47,8 +47,6 @@ def test_each_rod_has_a_size_of_the_list_and_the_shell_is_nearer() -> None:
 
 
 def test_what_is_no_stock_is_refused() -> None:
-    with pytest.raises(InputError, match="two positive sizes"):
-        refine(form().stages, Sections(stock=(2e-3,)))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="both decide the sections"):
         refine(form().stages, ("taper", "sections"))  # type: ignore[arg-type]
     given = rs.Rod(rs.GivenSection(EA=1.0, EI1=ROD.bend_stiffness, EI2=ROD.bend_stiffness, GJ=1e-3))

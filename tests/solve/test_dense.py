@@ -13,10 +13,8 @@ from rodshell.solve.dense import (
     OVERWRITTEN,
     add_rows,
     backward,
-    backward_rows,
     eliminate,
     forward,
-    forward_rows,
     padded,
     room,
     subtract_product,
@@ -73,16 +71,17 @@ def test_substitutions_solve_with_the_front(own, more):
     _, _, panel, pivots, _ = eliminated(own, more)
     size = own + more
     upper = np.triu(panel[:, :size], 1) + np.eye(own, size)
-    values, aside = room(padded(size))[: padded(size)], room(2 * own)
+    row, aside = room(padded(size))[None, : padded(size)], room(2 * own)
+    values = row[0]
     values[:] = 0.0
     values[:size] = right = np.random.default_rng(own).standard_normal(size)
-    forward(panel, values, aside)
+    forward(panel, row, 1, aside)
     solved = np.linalg.solve(upper[:, :own].T, right[:own])
     np.testing.assert_allclose(values[:own], solved, rtol=1e-11, atol=1e-13)
     np.testing.assert_allclose(values[own:size], right[own:] - upper[:, own:].T @ solved, rtol=1e-11, atol=1e-12)
     values[size:] = 0.0
     known = values[own:size].copy()
-    backward(panel, pivots, values, aside)
+    backward(panel, pivots, row, 1, aside)
     expected = np.linalg.solve(upper[:, :own], solved / pivots - upper[:, own:] @ known)
     np.testing.assert_allclose(values[:own], expected, rtol=1e-10, atol=1e-13)
     np.testing.assert_array_equal(values[own:size], known)
@@ -90,24 +89,25 @@ def test_substitutions_solve_with_the_front(own, more):
 
 @pytest.mark.parametrize("more", MORE)
 @pytest.mark.parametrize("own", OWN)
-def test_substitutions_side_by_side_have_the_bits_of_each_alone(own, more):
+@pytest.mark.parametrize("count", range(2, ROWS + 1))
+def test_substitutions_side_by_side_have_the_bits_of_each_alone(own, more, count):
     _, _, panel, pivots, _ = eliminated(own, more)
     stride, known = padded(own + more), slice(own + more, None)
-    rows = room(ROWS * stride)[: ROWS * stride].reshape(ROWS, stride)
+    rows = room(count * stride)[: count * stride].reshape(count, stride)
     rows[:] = np.random.default_rng(own).standard_normal(rows.shape)
     rows[:, known] = 0.0
-    alone, aside = [room(stride)[:stride] for _ in rows], room(ROWS * own)
+    alone, aside = [room(stride)[None, :stride] for _ in rows], room(ROWS * own)
     for values, row in zip(alone, rows, strict=True):
         values[:] = row
-        forward(panel, values, aside)
-    forward_rows(panel, rows, aside)
-    np.testing.assert_array_equal(rows, alone)
+        forward(panel, values, 1, aside)
+    forward(panel, rows, count, aside)
+    np.testing.assert_array_equal(rows, np.vstack(alone))
     rows[:, known] = 0.0
     for values in alone:
-        values[known] = 0.0
-        backward(panel, pivots, values, aside)
-    backward_rows(panel, pivots, rows, aside)
-    np.testing.assert_array_equal(rows, alone)
+        values[:, known] = 0.0
+        backward(panel, pivots, values, 1, aside)
+    backward(panel, pivots, rows, count, aside)
+    np.testing.assert_array_equal(rows, np.vstack(alone))
 
 
 @pytest.mark.parametrize("bad", [0.0, -0.0, np.nan, np.inf, 1e-310])

@@ -87,7 +87,7 @@ def brought_together(edges, shortening, *, clamped=False, twist=False, inextensi
         return Problem(shell.elements, shell.stretch, supports, 1.0, inextensible=inextensible)
 
     start = shell.state(arch, OUTWARD if clamped else None)
-    found = follow(problem, start, np.zeros(edges), first_step=first)
+    found = follow(problem, start, np.zeros(edges), first_step=first).whole
     return shell, found
 
 
@@ -457,7 +457,7 @@ def pulled_apart(distance, *, inextensible):
         moving = Supports(supports, shell.ends, goals)
         return Problem(shell.elements, shell.stretch, moving, 1.0, inextensible=inextensible)
 
-    return shell, follow(problem, arch, np.zeros(20), first_step=0.25), tried
+    return shell, follow(problem, arch, np.zeros(20), first_step=0.25).whole, tried
 
 
 def test_a_path_that_can_be_followed_ends_at_its_goal():

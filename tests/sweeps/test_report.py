@@ -67,6 +67,38 @@ def test_points_of_a_search_open_their_report_or_the_studio_and_the_front_is_tha
     assert None not in others
 
 
+GROUPS = """() => {
+  const colour = document.getElementById("colour");
+  colour.value = "layout";
+  colour.dispatchEvent(new Event("change"));
+  return document.getElementById("plane").data.map(trace => [trace.name, trace.x.length]);
+}"""
+
+
+@pytest.mark.slow
+@needs_browser
+def test_designs_are_coloured_by_their_lattice(tmp_path: Path):
+    from playwright.sync_api import sync_playwright
+
+    lattices = [{"kind": "geodesic"}, {"kind": "geodesic", "families": 3}]
+    base = {"target": {"kind": "cap", "radius": 2.0, "base": 1.6}, "layout": {"spacing": 0.4}, "joint": {"kind": "pin"}}
+    lath = {"section": {"kind": "rectangle", "width": 0.002, "height": 0.02}, "material": {"preset": "gfrp"}}
+    job = rs.Job.load(base | {"rod": lath, "pop_up": {"ends": "pinned"}})
+    axes = {"layout": lattices, "rod.section.height": [0.01, 0.02]}
+    columns = ["flat_state.lies_flat"]
+    plan = {"base": job, "axes": axes, "columns": columns, "run": {"until": "pop-up"}}
+    rs.sweep(plan, tmp_path / "out", report=True)
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page()
+        page.goto((tmp_path / "out" / "report.html").as_uri())
+        page.wait_for_selector("#plane .points")
+        assert page.evaluate(GROUPS) == [[json.dumps(lattice), 2] for lattice in lattices]
+        browser.close()
+    flat = [row["flat_state.lies_flat"] for row in rs.read_sweep(tmp_path / "out", columns).to_pylist()]
+    assert flat == [True, False, False, False]
+
+
 def test_the_studio_is_started_with_the_file_that_the_designs_need(tmp_path: Path):
     (tmp_path / "a.obj").write_text("v 0 0 0\n")
     (tmp_path / "my roof.toml").write_text('[target]\nkind = "mesh"\nfile = "a.obj"\n')

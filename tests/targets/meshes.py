@@ -122,6 +122,13 @@ CREASED: dict[str, Callable[[Floats, Floats], Floats]] = {  # half width 5
 }
 
 
+def creased_quads(name: str, count: int = 30) -> tuple[Floats, Ints]:
+    """One of `CREASED` over a square lattice: points, and the corners (m, 4) of its cells."""
+    x, y = np.meshgrid(*2 * [np.linspace(-5, 5, count + 1)], indexing="ij")
+    points, faces = lattice(x, y, CREASED[name](x, y))
+    return points, np.column_stack([faces[: len(faces) // 2], faces[len(faces) // 2 :, 2]])
+
+
 def bend(y: Floats) -> Floats:
     """x of the crease of the "valley"."""
     return np.asarray(0.8 - 0.06 * y**2)

@@ -10,7 +10,8 @@ import rodshell as rs
 from rodshell.targets.creased import Creased, cut_at
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.patch import Seam
-from tests.targets.meshes import CREASED, Mesh, bend, creased, sheet, strewn
+from rodshell.targets.polygons import Polygons
+from tests.targets.meshes import CREASED, Mesh, bend, creased, creased_quads, sheet, strewn
 
 Floats = NDArray[np.float64]
 
@@ -154,3 +155,14 @@ def test_normals_at_the_rim_are_as_good_as_within(shape: str) -> None:
     off = np.linalg.norm(surface.normals - true, axis=1)
     rim = np.abs(surface.vertices[:, :2]).max(axis=1) > 5 - 1e-9
     assert np.sqrt(np.mean(off[rim] ** 2)) < {"sheet": 3e-3, "strewn": 8e-3}[shape]
+
+
+def test_a_groin_of_quads_is_creased_where_that_of_triangles_is() -> None:
+    x, quads = creased_quads("groin")
+    faces = Polygons(x, quads.ravel(), np.full(len(quads), 4)).triangles("it")
+    found, known = cut((x, faces), SEAMS["groin"]), cut(creased("groin"), SEAMS["groin"])
+    for seam, other in zip(found.seams, known.seams, strict=True):
+        inside = seam.points[np.abs(seam.points).max(axis=1) < 5]
+        assert np.abs(other.distance(inside)).max() < 2e-5 * known.size
+    assert len(found.pieces) == len(known.pieces) == 4
+    assert found.deviation.max < 5e-4 * found.size  # at the crown faces cross the faded crease

@@ -52,7 +52,7 @@ def test_points_lie_where_they_say_in_unequal_steps_scaled_and_centred(tmp_path)
     x, y = np.array([100.0, 101.0, 103.0, 104.0, 108.0]), np.array([0.0, 1.0, 3.0, 4.0])
     table = np.array([(a, b, a - 10 * b) for a in x for b in y])
     (tmp_path / "roof.csv").write_text(rows(table))
-    vertices, _, notes = read_heights(tmp_path / "roof.csv", (16.0, 8.0), 2.0)
+    vertices, _, notes, *_ = read_heights(tmp_path / "roof.csv", (16.0, 8.0), 2.0)
     assert notes == ()
     expected = np.array([(2 * (a - 104), 2 * (b - 2), 2 * (a - 10 * b)) for b in y[::-1] for a in x])
     np.testing.assert_allclose(vertices, expected, atol=1e-14)
@@ -149,7 +149,7 @@ def test_an_image_of_8_bits_is_told_and_one_of_16_bits_is_taken_as_it_is(mode, w
     Image.fromarray(np.repeat(stored[:, :, None], 3, axis=2) if mode == "RGB" else stored).save(tmp_path / "roof.png")
     heights, step = read_image(tmp_path / "roof.png")
     assert (step is not None) == coarse
-    vertices, _, notes = read_heights(tmp_path / "roof.png", SIZE, 3.0)
+    vertices, _, notes, *_ = read_heights(tmp_path / "roof.png", SIZE, 3.0)
     np.testing.assert_allclose(vertices[:, 2], 3 * heights.ravel(), rtol=1e-15)
     if coarse:
         assert step == pytest.approx(LEVEL, rel=1e-3)

@@ -188,8 +188,41 @@ def test_how_far_the_shell_ends_from_what_is_drawn_is_said(dome):
     (words,) = bounded(dome, circle).warnings
     assert "the shell ends up to 5.89 mm from the boundary that is drawn" in words
     (words,) = bounded(dome, lifted(dome, along(polygon(4, 4.0), 3)) + [0.0, 0.0, 0.1]).warnings
-    assert "the shell ends up to 96 mm from the boundary that is drawn" in words
+    assert "the shell ends up to 99.6 mm from the boundary that is drawn" in words  # .1 m / sqrt(1 + (.1 * .943)^2)
     assert bounded(dome, lifted(dome, 4.0 * ring(1.0, 200)[:, :2])).warnings == ()
+
+
+@pytest.mark.parametrize("z", [3.0, np.sqrt(1 - 0.95**2)])
+@pytest.mark.parametrize("count", [30, 60])
+def test_a_plan_on_a_steep_dome_is_compared_in_plan(ball, z, count):
+    """At 72 degrees: along the surface the sagitta is 3.2 times as large."""
+    sagitta = 0.95 * (1 - np.cos(np.pi / count))
+    drawn = bounded(ball, 0.95 * ring(1.0, count) + [0.0, 0.0, z])
+    cubic = 0.95 * 3 / 128 * (2 * np.pi / count) ** 4  # by which cubics through the points miss the circle
+    assert drawn.rims[-1].off == pytest.approx(sagitta, rel=1e-3, abs=1.1 * cubic)
+    assert f"up to {1e3 * drawn.rims[-1].off:.3g} mm from the boundary that is drawn" in drawn.warnings[-1]
+
+
+@pytest.fixture(scope="module")
+def hypar() -> Freeform:
+    return Freeform.of(*sheet(lambda x, y: 0.25 * x * y, 6.0, 61))
+
+
+@pytest.mark.parametrize("sides", [3, 4, 7])
+def test_a_polygon_on_a_hypar_is_where_it_is_drawn(hypar, sides):
+    """In plan, and in space at its corners, whose chords lie up to a metre from the surface."""
+    plan = polygon(sides, 4.0)
+    for curve in (np.pad(plan, ((0, 0), (0, 1))), np.column_stack([plan, 0.25 * plan[:, 0] * plan[:, 1]])):
+        assert bounded(hypar, curve).rims[-1].off < 1e-4  # so near is the smooth surface to the hypar at its edge
+
+
+@pytest.mark.parametrize("above", [0.0, 0.02, 0.2])
+def test_a_curve_in_space_is_compared_with_the_edge_in_space(hypar, above):
+    """z = 2 sin(2 a) + above over a circle: straight below its crests the edge is nearest, elsewhere it is nearer."""
+    plan = 4.0 * ring(1.0, 400)[:, :2]
+    drawn = bounded(hypar, np.column_stack([plan, 0.25 * plan[:, 0] * plan[:, 1] + above]))
+    sagitta = 4.0 * (1 - np.cos(np.pi / 400)) * np.sqrt(2)  # at most, where the surface is as steep as 45 degrees
+    assert drawn.rims[-1].off == pytest.approx(above, rel=1e-3, abs=sagitta)
 
 
 def test_a_boundary_in_another_unit_than_its_surface_is_refused_with_both_sizes(dome):

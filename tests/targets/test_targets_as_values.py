@@ -9,11 +9,11 @@ import pytest
 import rodshell as rs
 from rodshell.geometry.curves import closed_loops
 from rodshell.layout import Crossings
-from rodshell.nets.compass import march
 from rodshell.targets.heightfield import Formula, parse_formula
 from rodshell.targets.patch import Patch, Seam
 from rodshell.targets.rim import EllipseDomain
 from tests.nets.sphere_net import sphere_net_end, sphere_net_rod
+from tests.nets.whole_march import march
 from tests.targets.meshes import sheet
 
 VERTICES, FACES = sheet(lambda x, y: 0.1 - x**2 - y**2, 0.2, 12)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -11,6 +12,7 @@ from rodshell.case.load_tables import BracingKinds, CombinationRows, LoadRows, N
 from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import (
     DrapeTable,
+    LayoutKinds,
     LayoutTable,
     PopUpTable,
     RefineTable,
@@ -19,23 +21,23 @@ from rodshell.case.stage_tables import (
 from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
 from rodshell.fabrication.settings import Fabrication
+from rodshell.loads.combinations import Loads
 from rodshell.loads.settings import LockedJoints, Stability, Strength
 from rodshell.output.settings import CheckOptions, DrawingStyle
 from rodshell.progress import Progress, silent
+from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.joints import Ball, JointKind
+from rodshell.rods.materials import Material
+from rodshell.rods.section import Rod
+from rodshell.rods.supports import Support, supports_of
 from rodshell.schema import read, undescribed, written
 from rodshell.units import length_text, shown
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
     from rodshell.formfinding.methods import Method
-    from rodshell.formfinding.popup import Ends
-    from rodshell.joints import Joint
-    from rodshell.layout import GridLayout
-    from rodshell.loads.combinations import Loads
+    from rodshell.layout import Layout
     from rodshell.output.options import OutputOptions
-    from rodshell.rods.materials import Material
-    from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
 HEADER = "# The full input of a rodshell job, in SI units. To run it again: rodshell form case.toml\n"
@@ -46,19 +48,15 @@ UNDESCRIBED = "not_described"
 class Built(NamedTuple):
     """A case as library objects.
 
-    Parameters
-    ----------
-    anchor : x, y where the axes cross [m]; None: the default, or one that is searched for.
-    ends : end conditions of the pop-up.
+    Args:
+        anchor: x, y where the axes cross [m]; None: the default, or one that is searched for.
     """
 
     target: "Target"
-    layout: "GridLayout"
-    rod: "Rod"
-    joint: "Joint"
+    layout: "Layout"
+    rod: Rod
     method: "Method"
     anchor: tuple[float, float] | None
-    ends: "tuple[Ends, ...]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +64,7 @@ class Case:
     """Everything that decides one job, complete and in SI. Make one with `load_case`."""
 
     target: TargetKinds | HeldTarget = field(default_factory=Hemisphere)
-    layout: LayoutTable = field(default_factory=LayoutTable)
+    layout: LayoutKinds = field(default_factory=LayoutTable)
     rod: RodTable = field(default_factory=RodTable)
     joint: JointKind = field(default_factory=Ball)
     drape: DrapeTable = field(default_factory=DrapeTable)
@@ -94,9 +92,8 @@ class Case:
     def to_toml(self) -> str:
         """The full input as a case file with SI numbers: loading it from anywhere gives the same case.
 
-        Raises
-        ------
-        InputError : it holds an object that no case file can describe.
+        Raises:
+            InputError: it holds an object that no case file can describe.
         """
         notes = []
         for name, held in self.held_objects.items():
@@ -123,8 +120,7 @@ class Case:
 
     def absolute(self) -> Self:
         """The same case, whose files are named from the root."""
-        paths = {key: getattr(self.target, key, None) for key in ("file", "boundary")}
-        rooted: dict[str, Any] = {key: str(Path(path).absolute()) for key, path in paths.items() if path is not None}
+        rooted: dict[str, Any] = {key: str(Path(path).absolute()) for key, path in self._paths.items()}
         return replace(self, target=replace(self.target, **rooted)) if rooted else self
 
     @property
@@ -136,30 +132,48 @@ class Case:
     @property
     def files(self) -> set[str]:
         """The files that the target is read from."""
-        paths = (getattr(self.target, key, None) for key in ("file", "boundary"))
-        return {path for path in paths if path is not None}
+        return set(self._paths.values())
 
-    def rod_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Rod":
+    @property
+    def _paths(self) -> dict[str, str]:
+        """The same by their keys."""
+        paths = {key: getattr(self.target, key, None) for key in ("file", "boundary")}
+        return {key: path for key, path in paths.items() if path is not None}
+
+    def rod_on(
+        self,
+        target: "Target",
+        layout: "Layout",
+        *,
+        anchor: tuple[float, float] | None = None,
+        progress: Progress = silent,
+    ) -> Rod:
         """The rod; material and section that were left to the target are chosen by the bends of its net."""
         if self.rod.held is not None:
             rod: Rod = self.rod.held.value
             return rod
-        return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.permanent_strength)
+        fit = partial(self.fit_on, target, layout, anchor=anchor, progress=progress)
+        return self.rod.build(fit, strength=self.permanent_strength)
 
-    def permanent_strength(self, material: "Material") -> float | None:
+    def permanent_strength(self, material: Material) -> float | None:
         """What rods of a material withstand permanently [Pa]: as given, or by the building code of a preset."""
-        from rodshell.rods.design_strength import permanent_strength
-
         given = self.strength.permanent or self.checks.strength
         return given or permanent_strength(material, self.strength.service_class)
 
-    def fit_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Fit":
+    def fit_on(
+        self,
+        target: "Target",
+        layout: "Layout",
+        *,
+        anchor: tuple[float, float] | None = None,
+        progress: Progress = silent,
+    ) -> "Fit":
         """What a rod that is left to the target has to fit."""
         from rodshell.checks.sizing import Fit
 
-        return Fit.on(target, layout, anchor=anchor, joint=self.joint)
+        return Fit.on(target, layout, anchor=anchor, joint=self.joint, progress=progress)
 
-    def with_rod(self, rod: "Rod") -> "Case":
+    def with_rod(self, rod: Rod) -> "Case":
         """The same case with this rod spelled out."""
         if self.rod.held is not None or not self.rod.left_open:
             return self
@@ -176,31 +190,35 @@ class Case:
 
     def headed(self, rotate: float) -> "Case":
         """The same case with its heading [rad]."""
+        if not isinstance(self.layout, LayoutTable):
+            return replace(self, layout=replace(self.layout, rotate=rotate))
         held = self.layout.held
         turned = None if held is None else replace(held, value=replace(held.value, rotate=rotate))
         return replace(self, layout=replace(self.layout, rotate=rotate, held=turned))
 
     @property
-    def ends(self) -> "tuple[Ends, ...]":
-        """End conditions of the pop-up."""
-        if self.pop_up.held is not None:
-            return ()
-        return ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
+    def supports(self) -> tuple[Support, ...]:
+        """On which the grid is popped up."""
+        return supports_of(self.pop_up.ends) if self.pop_up.held is None else self.pop_up.held.value
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """The names of the supports."""
+        return tuple(support.name for support in self.supports)
 
     def build(self, target: "Target | None" = None, progress: Progress = silent) -> Built:
         """The objects.
 
-        Parameters
-        ----------
-        target : the target, where it was built before.
-        progress : called before the net by whose bends the rod is chosen.
+        Args:
+            target: the target, where it was built before.
+            progress: called while a file is read and fitted, and by the net by whose bends the rod is chosen.
 
-        Raises
-        ------
-        InputError : values that are fine alone do not fit together, the formula or the file cannot be used; with seams,
-            also keys that a form in patches does not have.
+        Raises:
+            InputError: values that are fine alone do not fit together, the formula or the file cannot be used; with
+                seams, also keys that a form in patches does not have.
         """
         from rodshell.checks.sizing import require_likely_sizes
+        from rodshell.layout import GridLayout
         from rodshell.targets.creased import cut_at
         from rodshell.targets.patch import Seam
 
@@ -212,32 +230,36 @@ class Case:
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if self.drape.anchor == "auto" else self.drape.anchor
-        joint, method = self.joint, built(self.drape)
-        target = cut_at(target or built(self.target), [Seam.of(line) for line in self.seams.lines])
-        layout = built(self.layout, target).with_edges(method.edges_a_span)
+        method: Method = built(self.drape)
+        seams = [Seam.of(line) for line in self.seams.lines]
+        target = cut_at(target or built(self.target, progress), seams, progress)
+        layout: Layout = built(self.layout, target)
+        if isinstance(layout, GridLayout):
+            layout = layout.with_edges(method.edges_a_span)
         spacings = [row.layout.spacing for row in self.seams.patches if row.layout.spacing is not None]
-        shortest = min(map(min, (layout.spacing, *spacings)))
+        shortest = min([layout.least_spacing, *map(min, spacings)])
         self._require_stock(shortest)
         self._require_allowance(target)
         loads = self.built_loads()
         if loads is not None and loads.locked_joints is not None:
-            loads.locked_joints.require_pins(joint)
+            loads.locked_joints.require_pins(self.joint)
         if self.refine.under not in ("nothing", "weight", *self.combination_names):
             known = ", ".join(("nothing", "weight", *self.combination_names))
             raise InputError(
                 f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
             )
+        section = self.rod.given_section
+        require_likely_sizes(2 * target.size, shortest, section, getattr(self.target, "unit", None))
         if self.rod.left_open:
             progress("preparing", "net for the size of the rods", 0.0)
-        rod = self.rod_on(target, layout, anchor=anchor)
-        require_likely_sizes(rod, 2 * target.size, shortest)
-        self.require_strength(rod, joint)
-        return Built(target, layout, rod, joint, method, anchor, self.ends)
+        rod = self.rod_on(target, layout, anchor=anchor, progress=progress)
+        self.require_strength(rod)
+        return Built(target, layout, rod, method, anchor)
 
-    def require_strength(self, rod: "Rod", joint: "Joint") -> None:
+    def require_strength(self, rod: Rod) -> None:
         """InputError where what is said of the strength does not suit the rod, such as bolts as wide as it."""
         options = self.output_options()
-        options.require_known_stress(rod, joint)
+        options.require_known_stress(rod, self.joint)
         if self.strength != Strength():
             from rodshell.loads.strength import net_section
 
@@ -266,6 +288,11 @@ class Case:
     def _require_keys_of_patches(self) -> None:
         """InputError where a key is set that a form in patches does not have."""
         patches = "each patch of a target cut by seams has its own"
+        if not isinstance(self.layout, LayoutTable):
+            raise InputError(
+                f'layout.kind = {shown(self.layout.kind)}: a target cut by seams needs "chebyshev": set it, or leave '
+                "the seams out"
+            )
         for key, value, default, instead in (
             ("layout.rods", self.layout.rods, "auto", f'{patches}: use "auto"'),
             ("layout.length", self.layout.length, "auto", f'{patches}: use "auto"'),
@@ -282,17 +309,14 @@ class Case:
         """Names of the combinations of loads."""
         return tuple(row.name for row in self.combinations)
 
-    def built_loads(self) -> "Loads | None":
+    def built_loads(self) -> Loads | None:
         """What the shell is to be checked under; None where the case has no loads.
 
-        Raises
-        ------
-        InputError : two loads or two combinations of one name, and what `Loads` refuses.
+        Raises:
+            InputError: two loads or two combinations of one name, and what `Loads` refuses.
         """
         if not self.loads and not self.combinations:
             return None
-        from rodshell.loads.combinations import Loads
-
         for tables, rows in (("loads", self.loads), ("combinations", self.combinations)):
             names = [row.name for row in rows]
             for name in names:
@@ -311,9 +335,8 @@ class Case:
     def output_options(self) -> "OutputOptions":
         """Options of checks, fabrication and drawings.
 
-        Raises
-        ------
-        InputError : a value cannot be used.
+        Raises:
+            InputError: a value cannot be used.
         """
         from rodshell.output.options import OutputOptions
 

@@ -17,13 +17,13 @@ from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import PopUpTable
 from rodshell.case.target_tables import HeldTarget
 from rodshell.formfinding import Bound, Fall, Method
-from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Joint
-from rodshell.layout import GridLayout
+from rodshell.layout import GridLayout, Layout
 from rodshell.output.options import OutputOptions
 from rodshell.rods.joints import JointKind
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import BOTH, PINNED, SUPPORTS, Support
 from rodshell.schema import kind_of, read, written
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
@@ -37,7 +37,7 @@ NOT_POPPED_UP = "the grid was not popped up; a case file always asks for a pop-u
 
 def case_of(
     target: Target,
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     joint: Joint,
@@ -45,7 +45,7 @@ def case_of(
     anchor: Point | Auto | None,
     rotate: float | Auto | None,
     objective: Objective,
-    ends: Sequence[Ends],
+    ends: Sequence[Support],
     seams: Iterable[ArrayLike],
     patches: Mapping[str, PatchLayout],
     options: OutputOptions,
@@ -53,10 +53,10 @@ def case_of(
     """The case of a target, a layout and a rod; arguments as of `rodshell.Job`, each of its kind."""
     heading, shape = layout.rotate if rotate is None else rotate, target.parameters()
     given: dict[str, Any] = {
-        "layout": _layout_keys(layout, heading),
+        "layout": _layout_keys(layout, heading) if isinstance(layout, GridLayout) else written(layout),
         "rod": rod.parameters(),
         "drape": _drape_keys(method, anchor, objective),
-        "pop_up": {"ends": ends[0] if len(ends) == 1 else "both"},
+        "pop_up": {"ends": ends[0].name if len(ends) == 1 and ends[0].name in SUPPORTS else BOTH},
         "seams": {
             "lines": [Seam.of(line).points.tolist() for line in seams],
             "patches": [{"name": name, **written(patch)} for name, patch in patches.items()],
@@ -67,10 +67,10 @@ def case_of(
         given["target"] = _target_keys(shape)
     case = read(Case, given)
     held = {
-        "layout": _held_layout(layout, heading),
+        **({"layout": _held_layout(layout, heading)} if isinstance(layout, GridLayout) else {}),
         "rod": None if case.rod.build() == rod else Held(rod, f"the rod {rod}"),
         "drape": _held_method(case.drape.build(), method),
-        "pop_up": None if ends else Held((), "a grid that is not popped up", writable=True, note=NOT_POPPED_UP),
+        "pop_up": _held_supports(ends),
     }
     tables = {name: replace(getattr(case, name), held=found) for name, found in held.items()}
     if unknown:
@@ -82,7 +82,7 @@ def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint) -> Case:
     """The case of rods that a table gives by where their ends lie flat and in the end."""
     target = HeldTarget(kind="table", held=Held(ends, f"a table of {len(ends.final)} rods"))
     table = RodTable() if rod is None else read(RodTable, rod.parameters())
-    return Case(target=target, rod=table, joint=_of_a_kind(joint), pop_up=PopUpTable(ends="pinned"))
+    return Case(target=target, rod=table, joint=_of_a_kind(joint), pop_up=read(PopUpTable, {"ends": PINNED.name}))
 
 
 def _of_a_kind(joint: Joint) -> JointKind:
@@ -114,6 +114,14 @@ def _held_layout(layout: GridLayout, rotate: float | Auto) -> Held | None:
         return None
     turned = layout if rotate == "auto" else replace(layout, rotate=rotate)
     return Held(turned, "a layout with lines at unequal spacing")
+
+
+def _held_supports(supports: Sequence[Support]) -> Held | None:
+    """Supports that no key names."""
+    if not supports:
+        return Held((), "a grid that is not popped up", writable=True, note=NOT_POPPED_UP)
+    others = [support.name for support in supports if support.name not in SUPPORTS]
+    return Held(tuple(supports), f"the support {' and the support '.join(others)}") if others else None
 
 
 def _drape_keys(method: Method, anchor: Point | Auto | None, objective: Objective) -> dict[str, Any]:

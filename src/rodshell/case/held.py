@@ -8,10 +8,9 @@ from typing import Any
 class Held:
     """An object of which a table was made whose keys do not describe it: a Python function as a target, say.
 
-    Parameters
-    ----------
-    by_value : whether two such objects are the same that are equal; else only one object is the same as itself.
-    writable : whether a case file that leaves out what the keys do not describe gives the same form.
+    Args:
+        by_value: whether two such objects are the same that are equal; else only one object is the same as itself.
+        writable: whether a case file that leaves out what the keys do not describe gives the same form.
     """
 
     value: Any

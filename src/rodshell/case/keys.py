@@ -16,6 +16,7 @@ from rodshell.validation import either
 
 BY_KIND: dict[str, str] = {
     "target": "hemisphere",
+    "layout": "chebyshev",
     "rod.section": "auto",
     "joint": "ball",
     "bracing": "none",
@@ -28,13 +29,12 @@ BY_KIND: dict[str, str] = {
 class CaseKey:
     """One key of the case file.
 
-    Parameters
-    ----------
-    path : dotted, such as "target.radius".
-    kinds : of the table that has the key, where not every kind has it.
-    choices : the words that it may take, where it is a choice.
-    any_value : whether it may take values other than these words.
-    reads_file : whether it names a file.
+    Args:
+        path: dotted, such as "target.radius".
+        kinds: of the table that has the key, where not every kind has it.
+        choices: the words that it may take, where it is a choice.
+        any_value: whether it may take values other than these words.
+        reads_file: whether it names a file.
     """
 
     path: str

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rodshell.case.case import Case
-from rodshell.case.load import BY_SUFFIX, FILE_KEYS
+from rodshell.case.load import BY_SUFFIX, named_files
 from rodshell.errors import InputError
 from rodshell.schema import written
 from rodshell.units import shown
@@ -21,7 +21,7 @@ LARGEST_UPLOAD = 50e6  # bytes of a file that the studio reads
 UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
 SURFACES = {suffix: kind for suffix, kind in BY_SUFFIX.items() if suffix != ".gltf"}  # a .gltf names further files
 OUTLINES = (".dxf", ".obj", ".3dm")  # closed curves that end a surface
-UPLOADS = tuple(dict.fromkeys((*SURFACES, *OUTLINES)))
+_UPLOADS = tuple(dict.fromkeys((*SURFACES, *OUTLINES)))
 
 
 def studio_link(case: Case, *, address: str = ADDRESS) -> str:
@@ -30,14 +30,12 @@ def studio_link(case: Case, *, address: str = ADDRESS) -> str:
     CODE is the case as JSON, compressed (raw deflate) and written in base64 for URLs without padding. It holds no
     files: a case that names some opens in a studio that was started with them, and is refused by others in a sentence.
 
-    Parameters
-    ----------
-    address : of the studio, as it prints it.
+    Args:
+        address: of the studio, as it prints it.
 
-    Raises
-    ------
-    InputError : not a case; one that is too large; one that holds an object that no case file can describe, or that is
-        about a table of rods.
+    Raises:
+        InputError: not a case; one that is too large; one that holds an object that no case file can describe, or that
+            is about a table of rods.
     """
     instance("case", case, Case, "the case of a job: job.case")
     text = json.dumps(page_case(case)[0], separators=(",", ":"))
@@ -59,9 +57,8 @@ def require_small(size: int) -> None:
 def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
     """What differs from a case without keys, in tables as in a case file; files as uploads, with their paths by name.
 
-    Raises
-    ------
-    InputError : as of `studio_link`; also a file of a kind that the studio does not read.
+    Raises:
+        InputError: as of `studio_link`; also a file of a kind that the studio does not read.
     """
     if case.of_table:
         raise InputError("the studio finds forms on a target: it does not open a table of rods")
@@ -71,25 +68,21 @@ def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
     rooted = case.absolute()
     tables: dict[str, Any] = {"target": {"kind": rooted.target.kind}} | written(rooted, changed=True)
     paths = dict[str, Path]()
-    for table, keys in FILE_KEYS.items():
-        for key in keys:
-            if (path := tables.get(table, {}).get(key)) is not None:
-                name = upload_name(path)
-                paths[name] = Path(path)
-                tables[table][key] = UPLOAD + name
+    for table, key in named_files(tables):
+        name = upload_name(table[key])
+        paths[name] = Path(table[key])
+        table[key] = UPLOAD + name
     return tables, paths
 
 
 def upload_name(name: str) -> str:
     """A plain file name for an upload.
 
-    Parameters
-    ----------
-    name : as the browser gave it.
+    Args:
+        name: as the browser gave it.
 
-    Raises
-    ------
-    InputError : not the name of a file that the studio reads.
+    Raises:
+        InputError: not the name of a file that the studio reads.
     """
     plain = re.sub(r"[^\w.() -]", "_", name.replace("\\", "/").rpartition("/")[2]).strip(". ")
     plain = plain.encode("utf-8", "replace")[-100:].decode("utf-8", "ignore").strip(". ")  # of bytes, as systems count
@@ -98,6 +91,6 @@ def upload_name(name: str) -> str:
         raise InputError(
             f"{shown(name)} may name further files, which are not uploaded: save it as .glb, a single file"
         )
-    if suffix not in UPLOADS or not Path(plain).stem:
-        raise InputError(f"{shown(name)}: the studio reads {', '.join(UPLOADS)}")
+    if suffix not in _UPLOADS or not Path(plain).stem:
+        raise InputError(f"{shown(name)}: the studio reads {', '.join(_UPLOADS)}")
     return plain

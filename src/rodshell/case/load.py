@@ -26,21 +26,21 @@ from rodshell.case.keys import (
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
 from rodshell.quantities import Polylines, Unit
-from rodshell.schema import read, read_value, written
+from rodshell.schema import read, value_of, written
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import file_path, instance
 
-Raw = dict[str, Any]
+_Raw = dict[str, Any]
 
 
-def _paper(rods: tuple[int, int]) -> Raw:
+def _paper(rods: tuple[int, int]) -> _Raw:
     """A grid of the paper [HQK section 3.1] with so many rods along x and y."""
     grid = {"rods": rods, "spacing": 0.03, "length": 1.2, "edge": 0.005}
     return {"layout": grid, "rod": {"section": {"radius": 0.001}, "material": {"youngs_modulus": 1e6}}}
 
 
-BUILT_IN: dict[str, Raw] = {
+BUILT_IN: dict[str, _Raw] = {
     "hemisphere": _paper((17, 17)),
     "paraboloid": _paper((15, 15)),
     "ellipsoid": _paper((11, 15)),
@@ -63,8 +63,8 @@ BY_SUFFIX |= dict.fromkeys((".3dm", ".step", ".stp"), "nurbs")
 BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff"), "heights")
 """Kinds of targets by the file that holds them: the file alone is a case."""
 
-CASE_FILE = ".toml"
-FILES = f"a case ({CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
+_CASE_FILE = ".toml"
+FILES = f"a case ({_CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
 FILE_KEYS = file_keys()
 
 TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
@@ -74,7 +74,7 @@ RENAMED: dict[str, str] = {}
 """Keys that were called otherwise in the last version, old -> new: still read, with a warning, for this version."""
 
 
-UNDESCRIBED_BEFORE = (
+_UNDESCRIBED_BEFORE = (
     re.compile(r"# no case file can give (.+) again"),
     re.compile(r"# the target was (.+): no case file can give it again"),
 )
@@ -82,13 +82,13 @@ UNDESCRIBED_BEFORE = (
 
 TEXT = 2e6  # bytes of a case; tomllib takes about 1 us and 50 bytes for each
 DEEPEST = 10  # tables and lists within each other: points of a line of a load in a row take seven
-LONGEST_KEY = 200  # characters
-MOST_KEYS = 1000  # of one table
-TOO_DEEP = f"tables or lists are within each other more than {DEEPEST} deep: a case has none such"
-MANY_DOTS = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}""")
+_LONGEST_KEY = 200  # characters
+_MOST_KEYS = 1000  # of one table
+_TOO_DEEP = f"tables or lists are within each other more than {DEEPEST} deep: a case has none such"
+_MANY_DOTS = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}""")
 """A dotted key of more than twenty tables, for which tomllib takes memory by the square of their number."""
 
-NOT_A_WORD = "the keys of a case are words such as target.radius, not {}"
+_NOT_A_WORD = "the keys of a case are words such as target.radius, not {}"
 
 
 class RenamedKeyWarning(FutureWarning):
@@ -99,25 +99,23 @@ def load_case(
     source: "str | PathLike[str] | Mapping[str, object] | None",
     overrides: Mapping[str, object] | None = None,
     *,
-    otherwise: Mapping[str, Raw] | None = None,
+    otherwise: Mapping[str, _Raw] | None = None,
     files: Callable[[object], str] | None = None,
 ) -> Case:
     """The case of this name, in this file or with this content, with some keys changed.
 
-    Parameters
-    ----------
-    source : one of `BUILT_IN`; the path of a TOML file, or of a surface (`BY_SUFFIX`); the text of a TOML file; its
-        content as a mapping, in which dots may stand for tables in tables; None: an empty case.
-    overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
-        keeps those keys of its table that it has too.
-    otherwise : tables that stand in for those that the case does not have.
-    files : for a case of somebody who may not name any file: gives the path for the value of each key that names one,
-        or raises InputError.
+    Args:
+        source: one of `BUILT_IN`; the path of a TOML file, or of a surface (`BY_SUFFIX`); the text of a TOML file; its
+            content as a mapping, in which dots may stand for tables in tables; None: an empty case.
+        overrides: values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
+            keeps those keys of its table that it has too.
+        otherwise: tables that stand in for those that the case does not have.
+        files: for a case of somebody who may not name any file: gives the path for the value of each key that names
+            one, or raises InputError.
 
-    Raises
-    ------
-    InputError : no such case or file, not TOML, an unknown key, a value that cannot be used, the case of an object that
-        no case file can describe; in one sentence.
+    Raises:
+        InputError: no such case or file, not TOML, an unknown key, a value that cannot be used, the case of an object
+            that no case file can describe; in one sentence.
     """
     overrides = dict(_plain(overrides or {}))
     raw = _raw_of(source)
@@ -131,6 +129,8 @@ def load_case(
         layout = raw.get("layout", {})
         for key in ("rods", "length") if {"seams.lines", "seams.file"} & overrides.keys() else ():
             layout.pop(key, None)  # of the whole; what seams cut has them from its patches
+        for key in ("spacing", "edge") if overrides.get("layout.kind") == "curves" else ():
+            layout.pop(key, None)  # those of the paper's grid; the lines have their own
         if overrides.get("drape.method") == "paper":
             layout.pop("edge", None)  # 5 mm as the paper states; its falls had longer ones, as any fall has (E21)
     return _validated(raw, overrides, files)
@@ -144,9 +144,8 @@ def is_described(path: Path) -> bool:
 def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
     """The same case with some keys changed, as `load_case` does.
 
-    Raises
-    ------
-    InputError : as of `load_case`; also a key of a table that was made from an object which keys do not describe.
+    Raises:
+        InputError: as of `load_case`; also a key of a table that was made from an object which keys do not describe.
     """
     held = case.held_objects
     if case.of_table:
@@ -179,7 +178,7 @@ def flattened(changes: Mapping[str, object]) -> dict[str, object]:
     def leaves(prefix: str, table: Mapping[str, object]) -> Iterator[tuple[str, object]]:
         for name, value in table.items():
             if not isinstance(name, str):
-                raise InputError(NOT_A_WORD.format(shown(name)))
+                raise InputError(_NOT_A_WORD.format(shown(name)))
             path = prefix + name.replace("__", ".")
             if isinstance(value, Mapping) and path in case_tables():
                 yield from leaves(f"{path}.", value)
@@ -189,7 +188,7 @@ def flattened(changes: Mapping[str, object]) -> dict[str, object]:
     return dict(leaves("", changes))
 
 
-def _validated(raw: Raw, overrides: dict[str, object], files: Callable[[object], str] | None = None) -> Case:
+def _validated(raw: _Raw, overrides: dict[str, object], files: Callable[[object], str] | None = None) -> Case:
     """The case of tables as they were read, with some keys changed."""
     _rename(raw, overrides)
     _read_loads(raw, overrides)
@@ -216,10 +215,11 @@ def _validated(raw: Raw, overrides: dict[str, object], files: Callable[[object],
         _table(raw, table)[key] = value
     raw["bracing"] = {key: value for key, value in raw["bracing"].items() if value is not None and value != {}}
     _read_seams(raw["seams"], files)
+    _read_drawn_rods(raw["layout"], files)
     return read(Case, raw, unknown=partial(unknown_key, raw), files=files)
 
 
-def _rename(raw: Raw, overrides: dict[str, object]) -> None:
+def _rename(raw: _Raw, overrides: dict[str, object]) -> None:
     """Give keys that stand under their old names their new ones, with a warning each."""
     for old, new in RENAMED.items():
         old_table, _, old_name = old.rpartition(".")
@@ -235,11 +235,11 @@ def _rename(raw: Raw, overrides: dict[str, object]) -> None:
                 del raw[old_table]
 
 
-LOAD_TABLES = ("loads", "combinations", "bracing", "locked_joints", "stability", "strength")
+_LOAD_TABLES = ("loads", "combinations", "bracing", "locked_joints", "stability", "strength")
 """What a file of loads may have; it replaces all of these that the case has."""
 
 
-def _read_loads(raw: Raw, overrides: dict[str, object]) -> None:
+def _read_loads(raw: _Raw, overrides: dict[str, object]) -> None:
     """Put the tables of a file of loads, that an override names, in the place of the case's."""
     name = overrides.get("loads")
     if not isinstance(name, str | PathLike):
@@ -250,24 +250,24 @@ def _read_loads(raw: Raw, overrides: dict[str, object]) -> None:
     del overrides["loads"]
     given = _read(path)
     for key in given:
-        if key not in LOAD_TABLES:
-            raise InputError(f"{name} has {shown(key)}, which no file of loads has: it has {', '.join(LOAD_TABLES)}")
+        if key not in _LOAD_TABLES:
+            raise InputError(f"{name} has {shown(key)}, which no file of loads has: it has {', '.join(_LOAD_TABLES)}")
     if "loads" not in given:
         raise InputError(f"{name} has no loads: {wanted}")
-    for key in LOAD_TABLES:
+    for key in _LOAD_TABLES:
         raw.pop(key, None)
     raw |= given
 
 
-def _read_seams(table: Raw, files: Callable[[object], str] | None) -> None:
+def _read_seams(table: _Raw, files: Callable[[object], str] | None) -> None:
     """Put the lines of the file of seams into the case, which then needs the file no longer."""
     name = table.get("file")
     if name is None:
         return
     from rodshell.targets.curve_files import read_lines  # here, as most cases have no such file
 
-    unit = _value_of(Unit, "seams.unit", table.pop("unit", 1.0))
-    given = _value_of(Polylines, "seams.lines", table.get("lines", ()))
+    unit = value_of(Unit, "seams.unit", table.pop("unit", 1.0))
+    given = value_of(Polylines, "seams.lines", table.get("lines", ()))
     try:
         drawn = read_lines(file_path("the file", name if files is None else files(name)), unit)
     except InputError as reason:
@@ -276,14 +276,25 @@ def _read_seams(table: Raw, files: Callable[[object], str] | None) -> None:
     table["lines"] = [*given, *(line[:, :2].tolist() for line in drawn)]
 
 
-def _value_of(hint: Any, key: str, given: object) -> Any:
+def _read_drawn_rods(table: _Raw, files: Callable[[object], str] | None) -> None:
+    """Put the lines of a file of drawn rods into the case, which then needs the file no longer."""
+    name = table.get("file")
+    if name is None or table.get("kind") != "curves":
+        return
+    from rodshell.case.drawn_rods import read_drawn_rods  # here, as most cases have no such file
+
+    if "lines" in table or "names" in table:
+        raise InputError("layout.lines and layout.names are those of layout.file: leave out one or the other")
+    unit = value_of(Unit, "layout.unit", table.pop("unit", 1.0))
     try:
-        return read_value(hint, given)
-    except ValueError as reason:
-        raise InputError(f"{key} = {shown(given)}: {reason}") from None
+        drawn = read_drawn_rods(file_path("the file", name if files is None else files(name)), unit)
+    except InputError as reason:
+        raise InputError(f"layout.file = {shown(name)}: {reason}") from None
+    del table["file"]
+    table |= {"lines": list(drawn.values()), "names": list(drawn)}
 
 
-def _found_table(raw: Raw, path: str) -> Raw:
+def _found_table(raw: _Raw, path: str) -> _Raw:
     """The table at a dotted path; empty where there is none."""
     inner: Any = raw
     for name in path.split("."):
@@ -291,7 +302,7 @@ def _found_table(raw: Raw, path: str) -> Raw:
     return inner if isinstance(inner, dict) else {}
 
 
-def _table(raw: Raw, path: str) -> Any:
+def _table(raw: _Raw, path: str) -> Any:
     """The table at a dotted path, made where it is missing."""
     inner: Any = raw
     for name in path.split(".") if path else ():
@@ -299,7 +310,7 @@ def _table(raw: Raw, path: str) -> Any:
     return inner
 
 
-def _drop_for_another_kind(raw: Raw, overrides: Mapping[str, object]) -> None:
+def _drop_for_another_kind(raw: _Raw, overrides: Mapping[str, object]) -> None:
     """Where an override sets another kind (or domain), drop what was given for the old one alone."""
     for path in BY_KIND:
         kind, table = overrides.get(f"{path}.kind"), _table(raw, path)
@@ -322,7 +333,7 @@ def _drop_for_another_kind(raw: Raw, overrides: Mapping[str, object]) -> None:
             target.pop(name, None)
 
 
-def _raw_of(source: "str | PathLike[str] | Mapping[str, object] | None") -> Raw:
+def _raw_of(source: "str | PathLike[str] | Mapping[str, object] | None") -> _Raw:
     """The tables of a source, their keys as they stand there."""
     if source is None:
         return {}
@@ -356,16 +367,16 @@ def _is_path(text: str) -> bool:
         return False
 
 
-def _read(path: Path) -> Raw:
+def _read(path: Path) -> _Raw:
     """The tables of a case file."""
     wrong_type = _unknown_type(path)
     return _parsed(str(path), read_text(path, TEXT, instead=wrong_type or "save it as UTF-8"), wrong_type)
 
 
-def _parsed(name: str, text: str, wrong_type: str = "") -> Raw:
-    raw: Raw = _plain(toml_of(name, text, wrong_type))
+def _parsed(name: str, text: str, wrong_type: str = "") -> _Raw:
+    raw: _Raw = _plain(toml_of(name, text, wrong_type))
     if not raw:
-        for comment in UNDESCRIBED_BEFORE:
+        for comment in _UNDESCRIBED_BEFORE:
             if found := comment.fullmatch(text.strip()):
                 return {UNDESCRIBED: found[1]}
     return raw
@@ -374,18 +385,16 @@ def _parsed(name: str, text: str, wrong_type: str = "") -> Raw:
 def toml_of(name: str, text: str, wrong_type: str = "") -> dict[str, Any]:
     """The tables of a text; `tomllib` is given none that it would take minutes or gigabytes for.
 
-    Parameters
-    ----------
-    name : of the text, for messages.
-    wrong_type : what is wrong with a file of this name, if anything.
+    Args:
+        name: of the text, for messages.
+        wrong_type: what is wrong with a file of this name, if anything.
 
-    Raises
-    ------
-    InputError : it is too large, or no TOML.
+    Raises:
+        InputError: it is too large, or no TOML.
     """
     if len(text) > limit(TEXT):
         raise InputError(f"{name} has more than {limit(TEXT) / 1e6:g} MB: shorten it, {raised(TEXT, len(text))}")
-    if MANY_DOTS.search(text):
+    if _MANY_DOTS.search(text):
         raise InputError(f"{name} has a key of more than twenty tables: the keys of a case have three at most")
     try:
         return tomllib.loads(text)
@@ -394,40 +403,39 @@ def toml_of(name: str, text: str, wrong_type: str = "") -> dict[str, Any]:
     except ValueError:  # of Python's int
         raise InputError(f"{name} has an integer of thousands of digits: write numbers such as 0.2 or 1e6") from None
     except RecursionError:
-        raise InputError(TOO_DEEP) from None
+        raise InputError(_TOO_DEEP) from None
 
 
 def _plain(value: Any, depth: int = 0) -> Any:
     """A value as TOML gives it, NumPy's arrays as lists.
 
-    Raises
-    ------
-    InputError : tables and lists within each other, or keys, beyond what any case has: they would cost minutes.
+    Raises:
+        InputError: tables and lists within each other, or keys, beyond what any case has: they would cost minutes.
     """
     if depth > DEEPEST:
-        raise InputError(TOO_DEEP)
+        raise InputError(_TOO_DEEP)
     if hasattr(value, "dtype") and not isinstance(value, type):
         value = value.tolist()
     if isinstance(value, Iterator):
-        value = tuple(islice(value, MOST_KEYS + 1))
+        value = tuple(islice(value, _MOST_KEYS + 1))
     if isinstance(value, list | tuple):
         items = (_plain(item, depth + 1) for item in value)
         return tuple(items) if isinstance(value, tuple) else [*items]
     if not isinstance(value, Mapping):
         return value
-    if len(value) > MOST_KEYS:
-        raise InputError(f"a table has {len(value)} keys; at most {MOST_KEYS} are read: leave some out")
-    if long := next((key for key in value if isinstance(key, str) and len(key) > LONGEST_KEY), None):
+    if len(value) > _MOST_KEYS:
+        raise InputError(f"a table has {len(value)} keys; at most {_MOST_KEYS} are read: leave some out")
+    if long := next((key for key in value if isinstance(key, str) and len(key) > _LONGEST_KEY), None):
         raise InputError(f"unknown key {shown(long)}: it has {len(long)} characters")
     return {key: _plain(item, depth + 1) for key, item in value.items()}
 
 
-def _nested(mapping: Mapping[str, object]) -> Raw:
+def _nested(mapping: Mapping[str, object]) -> _Raw:
     """A mapping as TOML gives it: tables in tables, where a key may also have dots."""
-    raw: Raw = {}
+    raw: _Raw = {}
     for path, value in mapping.items():
         if not isinstance(path, str):
-            raise InputError(NOT_A_WORD.format(shown(path)))
+            raise InputError(_NOT_A_WORD.format(shown(path)))
         table, _, name = path.rpartition(".")
         inner = _table(raw, table) if table else raw
         if not isinstance(inner, dict):
@@ -441,26 +449,29 @@ def _nested(mapping: Mapping[str, object]) -> Raw:
 
 def _unknown_type(path: Path) -> str:
     """What is wrong with a file that holds no case, if its name does not say that it does."""
-    if path.suffix.lower() in ("", CASE_FILE):
+    if path.suffix.lower() in ("", _CASE_FILE):
         return ""
     return f"unknown file type {path.suffix}; use {FILES}"
 
 
 def _wanted_in(folder: Path) -> str:
     """The first file in a folder that could be meant, a case before a surface; without one, what could be."""
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (CASE_FILE, *BY_SUFFIX))
-    files.sort(key=lambda path: path.suffix.lower() != CASE_FILE)
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (_CASE_FILE, *BY_SUFFIX))
+    files.sort(key=lambda path: path.suffix.lower() != _CASE_FILE)
     return f"a file in it, such as {files[0]}" if files else FILES
 
 
-def _from_its_folder(path: Path, raw: Raw) -> Raw:
+def _from_its_folder(path: Path, raw: _Raw) -> _Raw:
     """Files that a case names lie in its own folder, unless they are given from the root; of a shell's pipe, here."""
     folder = Path() if path.parent.parts[:2] in (("/", "dev"), ("/", "proc")) else path.parent
+    for table, key in named_files(raw):
+        table[key] = str(folder / table[key])
+    return raw
+
+
+def named_files(raw: _Raw) -> Iterator[tuple[_Raw, str]]:
+    """Where the tables of a case name files to be read: the table and its key."""
     for name, keys in FILE_KEYS.items():
         table = raw.get(name)
-        if not isinstance(table, dict):
-            continue
-        for key in keys:
-            if isinstance(table.get(key), str):
-                table[key] = str(folder / table[key])
-    return raw
+        if isinstance(table, dict):
+            yield from ((table, key) for key in keys if isinstance(table.get(key), str))

@@ -8,21 +8,14 @@ from rodshell.loads.kinds import Load
 from rodshell.loads.settings import Bracing
 from rodshell.quantities import Name, Share, Value
 from rodshell.rods.design_strength import Duration
-from rodshell.schema import Inline, Rows, read_value
-from rodshell.units import shown
+from rodshell.schema import Inline, Rows, value_of
 
 
 def _factors(value: object) -> dict[str, float]:
     """A factor for each load: { own = 1.35, snow = 1.5 }."""
     if not isinstance(value, Mapping) or not value:
         raise ValueError("give a factor for each of its loads, such as { own = 1.35, snow = 1.5 }")
-    found = {}
-    for name, factor in value.items():
-        try:
-            found[str(name)] = float(read_value(Share, factor))
-        except ValueError as reason:
-            raise ValueError(f"{name} = {shown(factor)}: {reason}") from None
-    return found
+    return {str(name): float(value_of(Share, str(name), factor)) for name, factor in value.items()}
 
 
 @dataclass(frozen=True, kw_only=True)

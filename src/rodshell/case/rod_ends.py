@@ -1,7 +1,5 @@
 """Rods given by where their ends lie flat and where they go: read from a table, or from an earlier result."""
 
-import csv
-from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -10,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.case.csv_rows import csv_rows
 from rodshell.errors import InputError
 from rodshell.figures.form import Stiffness
 from rodshell.layout import FlatGrid, Profile, straight_rods
 from rodshell.units import length_text, parse_quantity, read_unit, shown
-from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import instance, positive
 
 COLUMNS = (
@@ -30,15 +28,13 @@ LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further i
 class RodEnds:
     """Rods by both their ends, flat and popped up; two tables are equal that have the same numbers.
 
-    Parameters
-    ----------
-    grid : m rods in the plane.
-    final : (m, 2, 3), where the start and the end of each rod go [m].
-    edge : longest edge of their mesh [m]; None: a sixth of the usual distance between joints.
+    Args:
+        grid: m rods in the plane.
+        final: (m, 2, 3), where the start and the end of each rod go [m].
+        edge: longest edge of their mesh [m]; None: a sixth of the usual distance between joints.
 
-    Raises
-    ------
-    InputError : `final` does not fit `grid`, or a rod would be stretched.
+    Raises:
+        InputError: `final` does not fit `grid`, or a rod would be stretched.
     """
 
     grid: FlatGrid
@@ -81,10 +77,9 @@ class RodEnds:
 class ResultRods:
     """The rods of an earlier result.
 
-    Parameters
-    ----------
-    ends : where they lie flat and popped up.
-    rod, joint : what they are and what joins them, as in a case file; empty where the result does not say.
+    Args:
+        ends: where they lie flat and popped up.
+        rod, joint: what they are and what joins them, as in a case file; empty where the result does not say.
     """
 
     ends: RodEnds
@@ -98,28 +93,15 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     A table whose columns end in _mm, as those of schedule/rods.csv do, says its unit itself. Cells are parted by
     commas, semicolons or tabs; unless by commas, a comma is a decimal point.
 
-    Raises
-    ------
-    InputError : no such file, no rods, a missing column, a cell without a finite number, an id used twice;
-        no unit, or another than the columns'; rods that span less than 1 mm or more than 1 km.
+    Raises:
+        InputError: no such file, no rods, a missing column, a cell without a finite number, an id used twice;
+            no unit, or another than the columns'; rods that span less than 1 mm or more than 1 km.
     """
     try:
         scale = None if unit is None else float(read_unit(unit, "length"))
     except ValueError as reason:
         raise InputError(f"unit = {shown(unit)}: {reason}") from None
-    lines = read_text(path, instead="give a CSV table").splitlines()
-    if len(lines) > limit(MOST_RODS):
-        raise InputError(
-            f"{path} has {len(lines)} lines, and at most {limit(MOST_RODS):.0f} are read: give one for each rod, "
-            f"{raised(MOST_RODS, len(lines))}"
-        )
-    delimiter = max(",;\t", key=lines[0].count) if lines else ","
-    reader = csv.reader(lines, delimiter=delimiter)
-    try:
-        table = [(reader.line_num, cells) for cells in reader]
-    except csv.Error as reason:
-        raise InputError(f"{path} line {reader.line_num} is not a row of a CSV table: {reason}") from None
-    header = [name.strip() for name in table[0][1]] if table else []
+    header, rows = csv_rows(path, MOST_RODS)
     columns = _columns(path, header)
     if columns != COLUMNS:
         if scale not in (None, MILLIMETRE):
@@ -128,15 +110,15 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     if scale is None:
         raise InputError("unit is missing: give the unit of the table's coordinates, such as m (--unit m)")
     names, numbers = list[str](), list[list[float]]()
-    for where, row in _rows(path, table[1:], header, delimiter):
+    for where, row in rows:
         numbers.append([parse_quantity(row[column], "number", f"{where}, {column}") for column in columns])
         names.append(row.get("id", "").strip())
     if not numbers:
         raise InputError(f"{path} has no rods: give one row for each rod under the header")
-    from rodshell.targets.mesh_files import require_size  # here, as most cases have no such table
+    from rodshell.targets.mesh_files import ANOTHER_UNIT, require_size  # here, as most cases have no such table
 
     values = np.array(numbers)
-    instead = "give another unit" if columns == COLUMNS else "check its columns, which are in mm"
+    instead = ANOTHER_UNIT if columns == COLUMNS else "check its columns, which are in mm"
     for ends in (values[:, :4].reshape(-1, 2), values[:, 4:].reshape(-1, 3)):
         require_size(path, np.ptp(ends, axis=0), scale, instead=instead)
     values *= scale
@@ -159,21 +141,6 @@ def _columns(path: Path, header: list[str]) -> tuple[str, ...]:
     return COLUMNS
 
 
-def _rows(
-    path: Path, lines: list[tuple[int, list[str]]], header: list[str], delimiter: str
-) -> Iterator[tuple[str, dict[str, str]]]:
-    """Each row that is not blank, by column, and how to name it in a message."""
-    for number, cells in lines:
-        where = f"{path} line {number}"
-        if not any(cell.strip() for cell in cells):
-            continue
-        if len(cells) != len(header):
-            raise InputError(f"{where} has {len(cells)} cells, the header {len(header)}: give one for each")
-        if delimiter != ",":
-            cells = [cell if name == "id" else cell.replace(",", ".") for name, cell in zip(header, cells, strict=True)]
-        yield where, dict(zip(header, cells, strict=True))
-
-
 def _labels(path: Path, names: list[str]) -> list[str] | None:
     if not any(names):
         return None
@@ -189,14 +156,14 @@ def _labels(path: Path, names: list[str]) -> list[str] | None:
 def read_result(folder: Path) -> ResultRods:
     """The rods of an earlier result: their flat ends, where its shell has them, what they are and their joints.
 
-    Raises
-    ------
-    OutputError : the folder holds no result that can be read.
-    InputError : the result has no rods, or no shell in space; its rods lie in two layers, or have linkers of their own.
+    Raises:
+        OutputError: the folder holds no result that can be read.
+        InputError: the result has no rods, or no shell in space; its rods lie in two layers, or have linkers of their
+            own.
     """
     from rodshell.output.grid import rods_of
     from rodshell.results.archive import read
-    from rodshell.results.states import SHELLS
+    from rodshell.results.states import shells_among
 
     archive = read(folder)
     results = archive.results
@@ -220,7 +187,7 @@ def read_result(folder: Path) -> ResultRods:
         )
     try:
         rods = rods_of(archive)
-        shell = archive.states[next(name for name in SHELLS if name in archive.states)]
+        shell = archive.states[shells_among(archive.states)[0]]
         flat = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
         final = np.array([shell[rod.nodes[[0, -1]]] for rod in rods]).reshape(-1, 2, 3)
     except (StopIteration, KeyError, IndexError, TypeError, ValueError):

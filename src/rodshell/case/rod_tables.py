@@ -12,7 +12,7 @@ from rodshell.rods.section import Circle, GivenSection, Rod, Section, Sized, Tub
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
-UNSIZED = 1.0  # m, in place of a radius that is still to be found
+_UNSIZED = 1.0  # m, in place of a radius that is still to be found
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,13 @@ class RodTable(Holding):
         material = self.material is None and section.kind != "given"
         return (*(["material"] if material else []), *(["section"] if sized else []))
 
+    @property
+    def given_section(self) -> Section | GivenSection | None:
+        """The section; None where its size is left to the target."""
+        if self.held is not None:
+            return self.held.value.section  # type: ignore[no-any-return]
+        return None if "section" in self.left_open else self._section
+
     def build(
         self, fit: "Callable[[], Fit] | None" = None, *, strength: "Callable[[Material], float | None] | None" = None
     ) -> Rod:
@@ -73,9 +80,8 @@ class RodTable(Holding):
         fit : what material and section have to fit; called where one is left open.
         strength : the permanent one of a material [Pa]; default: a preset's.
 
-        Raises
-        ------
-        InputError : something is left open, and there is nothing to fit.
+        Raises:
+            InputError: something is left open, and there is nothing to fit.
         """
         if not self.left_open:
             return Rod(self._section, self.material)
@@ -90,11 +96,11 @@ class RodTable(Holding):
 
     @property
     def _section(self) -> Section | GivenSection:
-        """The section; one whose radius is still to be found has `UNSIZED`."""
+        """The section; one whose radius is still to be found has `_UNSIZED`."""
         section = self.section
         if isinstance(section, Sized | GivenSection):
             return section
-        radius = UNSIZED if isinstance(section.radius, str) else section.radius
+        radius = _UNSIZED if isinstance(section.radius, str) else section.radius
         return Tube(radius, section.thickness) if isinstance(section, OpenTube) else Circle(radius)
 
     @property

@@ -3,10 +3,11 @@
 from dataclasses import dataclass, fields
 from math import pi
 from pathlib import PureWindowsPath
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from rodshell.case.held import Holding
 from rodshell.errors import InputError
+from rodshell.layout.lattices import Asymptotic, Curves, Geodesic
 from rodshell.quantities import (
     Acceleration,
     Angle,
@@ -30,6 +31,7 @@ from rodshell.quantities import (
     Unit,
     words,
 )
+from rodshell.rods.supports import BOTH, AskedName, SupportName
 from rodshell.schema import Inline, Rows, written
 from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import rounded_down, shown
@@ -43,6 +45,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class LayoutTable(Holding):
+    """An inextensible net of straight rods: a lattice of equal spacing in the flat grid."""
+
     rods: Annotated[Counts, 'numbers of rods along x and y: 17x17, or "auto": all that touch'] = "auto"
     spacing: Annotated[LengthsOrAuto, 'distance between neighbouring rods: one length, or u,v, or "auto"'] = "auto"
     length: Annotated[LengthOrAuto, 'length of every rod before trimming, or "auto"'] = "auto"
@@ -52,6 +56,8 @@ class LayoutTable(Holding):
     crossing: Annotated[Angle, "angle between both families on the target, at the anchor"] = pi / 2
     left_out: Annotated[Names, "names of rods that are not built, such as U01, V03"] = ()
 
+    kind: ClassVar[str] = "chebyshev"
+
     def build(self, target: "Target | None" = None) -> "GridLayout":
         """The layout; a spacing "auto" stands for some 17 rods each way over the target."""
         from rodshell.layout import GridLayout
@@ -60,7 +66,26 @@ class LayoutTable(Holding):
         if spacing == "auto":
             spacing = (rounded_down((target.size if target else 0.2) / 8),) * 2
         rotate = 0.0 if self.rotate == "auto" else self.rotate
-        return GridLayout.orthogonal(**(written(self) | {"spacing": spacing, "rotate": rotate}))
+        keys = {name: value for name, value in written(self).items() if name != "kind"}
+        return GridLayout.orthogonal(**(keys | {"spacing": spacing, "rotate": rotate}))
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawnCurves(Curves):
+    """Curves, of which a file may give the lines; a case that was read has them itself."""
+
+    file: Annotated[FileToRead | None, "CSV table (rod,x,y or rod,x,y,z), OBJ, DXF or 3dm file with a curve a rod"] = (
+        None
+    )
+    unit: Annotated[Unit, "unit of that file, such as mm; a 3dm file states its own"] = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.unit != 1.0:
+            raise InputError("layout.unit is the unit of layout.file, which is missing: leave it out, or give the file")
+
+
+LayoutKinds = LayoutTable | Geodesic | Asymptotic | DrawnCurves
 
 
 FALLING = ("height", "coupling", "C1", "C2", "time_step", "duration", "friction", "drag", "frames")
@@ -99,9 +124,10 @@ class DrapeTable(Holding):
                 f"drape.frames = {shown(self.frames)}: frames are kept in the result's folder: give a name in it such "
                 'as "frames"'
             )
-        defaults = {each.name: each.default for each in fields(self)}
+        defaults: dict[str, tuple[object, ...]] = {each.name: (each.default,) for each in fields(self)}
+        defaults["drag"] = (None, 0.0)  # until November 2026, which cases of results hold
         for name in [*IDLE[self.method], *(("C1", "C2") if self.coupling == "shared" else ())]:
-            if getattr(self, name) != defaults[name]:
+            if getattr(self, name) not in defaults[name]:
                 raise InputError(f"drape.{name} = {shown(getattr(self, name))}: {self._why_idle(name)}")
 
     def _why_idle(self, name: str) -> str:
@@ -130,9 +156,7 @@ class DrapeTable(Holding):
 
 @dataclass(frozen=True, kw_only=True)
 class PopUpTable(Holding):
-    ends: Annotated[
-        Literal["pinned", "clamped", "both"], "supports: free to turn, with fixed direction, or one form with each"
-    ] = "both"
+    ends: Annotated[AskedName, "supports: free to turn, with fixed direction, or one form with each"] = BOTH
 
 
 FAMILIES = ("taper", "double", "sections", "tails", "clamps", "supports", "holes", "offsets")
@@ -141,9 +165,7 @@ FAMILIES = ("taper", "double", "sections", "tails", "clamps", "supports", "holes
 @dataclass(frozen=True, kw_only=True)
 class RefineTable:
     vary: Annotated[Annotated[tuple[str, ...], words(FAMILIES)], ", ".join(FAMILIES)] = ()
-    ends: Annotated[
-        Literal["pinned", "clamped"] | None, "supports of the refined shell; default: the first of pop_up.ends"
-    ] = None
+    ends: Annotated[SupportName | None, "supports of the refined shell; default: the first of pop_up.ends"] = None
     ratio: Annotated[Ratio, "of the largest EI to the smallest along a taper"] = 8.0
     per: Annotated[
         Literal["shell", "family", "rod"], "one taper for the shell, one for each family, or for each rod"
@@ -193,9 +215,8 @@ class SeamsTable:
     def patch_layouts(self) -> dict[str, PatchLayout]:
         """What patches have of their own, by name.
 
-        Raises
-        ------
-        InputError : two tables for one patch.
+        Raises:
+            InputError: two tables for one patch.
         """
         names = [patch.name for patch in self.patches]
         for name in names:

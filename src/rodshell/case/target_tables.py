@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from rodshell.case.held import Holding
 from rodshell.errors import InputError
+from rodshell.progress import Progress, silent
 from rodshell.quantities import Angles, Coordinate, Factor, FileToRead, Length, Point3, Size, Unit
 from rodshell.schema import written
 
@@ -18,8 +19,8 @@ class TargetTable(Holding):
 
     kind: ClassVar[str]
 
-    def build(self) -> "Target":
-        """The target."""
+    def build(self, progress: Progress = silent) -> "Target":
+        """The target; `progress` is called while a file is read and its field fitted."""
         from rodshell import targets
 
         keys = written(self)
@@ -79,7 +80,7 @@ class HeightField(TargetTable):
                 raise InputError(f'{path}.size is missing: give width and depth, such as ["400 mm", "300 mm"]')
         return given
 
-    def build(self) -> "Target":
+    def build(self, progress: Progress = silent) -> "Target":
         from rodshell import targets
 
         if self.radius is not None:
@@ -117,10 +118,10 @@ class Surface(Placed):
         Literal["z", "y"] | None, "axis of the file that points upwards; default: y of glTF, z of others"
     ] = None  # fmt: skip
 
-    def build(self) -> "Target":
+    def build(self, progress: Progress = silent) -> "Target":
         from rodshell.targets import surface_from
 
-        return surface_from(self.file, unit=self.unit, name=self.object, **self.options())
+        return surface_from(self.file, unit=self.unit, name=self.object, progress=progress, **self.options())
 
 
 class Mesh(Surface):
@@ -137,10 +138,10 @@ class Heights(Placed):
     size: Annotated[Size, "width along x and depth along y of a rectangle"]
     height: Annotated[Length | None, "height of a CSV's unit; of an image: of white"] = None
 
-    def build(self) -> "Target":
+    def build(self, progress: Progress = silent) -> "Target":
         from rodshell.targets import heights_from
 
-        return heights_from(self.file, size=self.size, height=self.height, **self.options())
+        return heights_from(self.file, size=self.size, height=self.height, progress=progress, **self.options())
 
 
 @dataclass(frozen=True, kw_only=True)

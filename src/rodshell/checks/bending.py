@@ -31,18 +31,19 @@ from math import sqrt
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, State
 from rodshell.checks.reactions import joint_loads
 from rodshell.errors import InputError
+from rodshell.figures.form import Bent
 from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.joints.relative_rotation import RelativeRotation
+from rodshell.joints.relative_rotation import is_elastic
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.model.shell import last_edges
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+from rodshell.rods.section import GivenSection, Rod
 from rodshell.validation import brief
 
 VON_MISES = sqrt(3.0)
@@ -56,16 +57,9 @@ def fibre_distance(rod: Rod) -> float | None:
     Where the section is not round it is that of its farthest point: the stress is then an upper bound. None for a
     given section without fibre distances.
     """
-    section = rod.section
-    if isinstance(section, GivenSection):
-        return None if section.fibre_distances is None else float(np.hypot(*section.fibre_distances))
-    if isinstance(section, Circle | Tube):
-        return section.outer_radius
-    if isinstance(section, Ellipse):
-        return max(section.a, section.b)
-    if isinstance(section, RectangularSection):
-        return 0.5 * float(np.hypot(section.width, section.height))
-    raise InputError(f"the outermost fibre of a section of kind {type(section).__name__} is not known")
+    if (half := rod.section.half_widths) is None:
+        return None
+    return float(np.hypot(*half)) if rod.section.boxed else max(half)
 
 
 def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
@@ -73,38 +67,26 @@ def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
 
     Exact for each shape; for a given section that of the corner of the box that its fibre distances span.
 
-    Parameters
-    ----------
-    kappa1, kappa2 : (n,) curvatures towards m1 and m2 [1/m].
+    Args:
+        kappa1, kappa2: (n,) curvatures towards m1 and m2 [1/m].
 
-    Raises
-    ------
-    InputError : a given section has no fibre distances.
+    Raises:
+        InputError: a given section has no fibre distances.
     """
-    section = rod.section
-    if isinstance(section, Ellipse):
-        return np.hypot(section.a * kappa1, section.b * kappa2)
-    if isinstance(section, Circle | Tube):
-        return np.asarray(section.outer_radius * np.hypot(kappa1, kappa2))
-    if isinstance(section, RectangularSection):
-        x, y = 0.5 * section.width, 0.5 * section.height
-    elif section.fibre_distances is None:
+    if (half := rod.section.half_widths) is None:
         raise InputError("the strain of a given section without fibre_distances is not known: give them")
-    else:
-        x, y = section.fibre_distances
-    return np.asarray(x * np.abs(kappa1) + y * np.abs(kappa2))
+    across, within = half[0] * np.abs(kappa1), half[1] * np.abs(kappa2)
+    return np.asarray(across + within if rod.section.boxed else np.hypot(across, within))
 
 
 def torsion_stress(rod: Rod, twist_rate: Floats) -> Floats:
     """Largest shear stress of torsion over the section [Pa].
 
-    Parameters
-    ----------
-    twist_rate : (n,) twist per length [rad/m].
+    Args:
+        twist_rate: (n,) twist per length [rad/m].
 
-    Raises
-    ------
-    InputError : a given section has no torsion modulus.
+    Raises:
+        InputError: a given section has no torsion modulus.
     """
     return np.asarray(_outline(rod)[2].max() * np.abs(twist_rate))
 
@@ -114,23 +96,21 @@ def largest_stress(
 ) -> Floats:
     """Largest s over the section [Pa], as the module defines it.
 
-    Parameters
-    ----------
-    kappa1, kappa2 : (n,) curvatures towards m1 and m2 [1/m].
-    axial : (n,) strain of the axis [-].
-    twist_rate : (n,) twist per length [rad/m].
-    weight : w, of the shear stress against the normal stress [-].
+    Args:
+        kappa1, kappa2: (n,) curvatures towards m1 and m2 [1/m].
+        axial: (n,) strain of the axis [-].
+        twist_rate: (n,) twist per length [rad/m].
+        weight: w, of the shear stress against the normal stress [-].
 
-    Raises
-    ------
-    InputError : the stress of a given section needs a value that is missing.
+    Raises:
+        InputError: the stress of a given section needs a value that is missing.
     """
     modulus = fibre_modulus(rod)
     bent, drawn, twist = fibre_strain(rod, kappa1, kappa2), np.abs(axial), np.abs(twist_rate)
     result = np.asarray(modulus * (bent + drawn))
     if not twist.any():
         return result
-    if isinstance(rod.section, Circle | Tube):
+    if rod.section.round:
         kappa1, kappa2 = np.hypot(kappa1, kappa2), np.zeros_like(kappa2)
     across, within = np.abs(kappa1), np.abs(kappa2)
     for x, y, shear in zip(*_outline(rod), strict=True):  # in the quarter of equal signs, the worst of four
@@ -142,9 +122,8 @@ def largest_stress(
 def fibre_modulus(rod: Rod) -> float:
     """Young's modulus of the outermost fibres [Pa].
 
-    Raises
-    ------
-    InputError : a given section without fibre_modulus or fibre_distances.
+    Raises:
+        InputError: a given section without fibre_modulus or fibre_distances.
     """
     if isinstance(rod.section, GivenSection):
         require_known_stress(rod, twisted=False)
@@ -154,26 +133,14 @@ def fibre_modulus(rod: Rod) -> float:
     return rod.material.youngs_modulus
 
 
-def stress_is_known(rod: Rod, *, twisted: bool) -> bool:
-    """Whether the stress of a rod is known, with that of torsion if it is `twisted`.
-
-    Parameters
-    ----------
-    twisted : the rods can be twisted.
-    """
-    return not _missing(rod, twisted)
-
-
 def require_known_stress(rod: Rod, *, twisted: bool) -> None:
     """Refuse a given section whose stress is not known.
 
-    Parameters
-    ----------
-    twisted : whether the rods can be twisted: by joints, or because their two bending stiffnesses differ.
+    Args:
+        twisted: whether the rods can be twisted: by joints, or because their two bending stiffnesses differ.
 
-    Raises
-    ------
-    InputError : values are missing that the stress needs.
+    Raises:
+        InputError: values are missing that the stress needs.
     """
     if missing := _missing(rod, twisted):
         needed = " and ".join([", ".join(missing[:-1]), missing[-1]] if missing[1:] else missing)
@@ -202,14 +169,13 @@ def _outline(rod: Rod) -> tuple[Floats, Floats, Floats]:
         # where the largest shear stress acts is not known: at the farthest fibre is the worst case
         return np.array(farthest[:1]), np.array(farthest[1:]), np.array([section.GJ / section.torsion_modulus])
     assert rod.material is not None
-    if isinstance(section, Circle | Tube):
-        x, y, lever = np.array([section.outer_radius]), np.zeros(1), np.array([section.outer_radius])
-    elif isinstance(section, Ellipse):
-        a, b, at = section.a, section.b, np.linspace(0.0, 0.5 * np.pi, POINTS)
+    a, b = section.half_widths
+    if section.boxed:
+        x, y, lever = _rectangle(2 * a, 2 * b)
+    else:
+        at = np.linspace(0.0, 0.5 * np.pi, 1 if section.round else POINTS)
         x, y = a * np.cos(at), b * np.sin(at)
         lever = 2 * a * b / (a**2 + b**2) * np.hypot(b * np.cos(at), a * np.sin(at))
-    else:
-        x, y, lever = _rectangle(section.width, section.height)
     return x, y, rod.material.shear_modulus * lever
 
 
@@ -233,17 +199,16 @@ def _rectangle(width: float, height: float) -> tuple[Floats, Floats, Floats]:
 class Bending:
     """Bending, twist and stress at every node of every rod: arrays (k,) in the order of the mesh's `rod_nodes`.
 
-    Parameters
-    ----------
-    curvature : [1/m].
-    axial_strain : [-], mean of the edges on both sides.
-    stress : the largest over the section of bending, stretch and torsion together [Pa], see
-        `checks.bending`; None where the section's fibres are not known.
-    strain : of the outermost fibre, bending and axial; None as the stress.
-    normal_curvature, geodesic_curvature : parts of the curvature out of the shell and within it [1/m]; None where
-        no rods cross.
-    twist_rate : twist per length [rad/m]; zero where nothing twists the rods.
-    torsion_stress : largest shear stress of torsion over the section [Pa]; None as the stress.
+    Args:
+        curvature: [1/m].
+        axial_strain: [-], mean of the edges on both sides.
+        stress: the largest over the section of bending, stretch and torsion together [Pa], see
+            `checks.bending`; None where the section's fibres are not known.
+        strain: of the outermost fibre, bending and axial; None as the stress.
+        normal_curvature, geodesic_curvature: parts of the curvature out of the shell and within it [1/m]; None where
+            no rods cross.
+        twist_rate: twist per length [rad/m]; zero where nothing twists the rods.
+        torsion_stress: largest shear stress of torsion over the section [Pa]; None as the stress.
     """
 
     curvature: Floats
@@ -263,36 +228,25 @@ class Bending:
         return None if self.strain is None else np.asarray(self.strain - np.abs(self.axial_strain))
 
 
-PARTS = {
-    "max_bending_strain": "bending_strain",
-    "normal_curvature": "normal_curvature",
-    "geodesic_curvature": "geodesic_curvature",
-    "twist_rate": "twist_rate",
-    "torsion_stress": "torsion_stress",
-}
-
-
 def worst(shapes: Sequence[Bending], where: slice = slice(None)) -> dict[str, float | None]:
-    """The figures of a `Bent`, each the largest over a part of the rods' nodes in any of the shapes."""
+    """The figures of a `Bent`, each the largest over a part of the rods' nodes in any of the shapes; how much of a
+    strength that uses is counted elsewhere."""
     sharp = max(float(shape.curvature[where].max()) for shape in shapes)
     figures: dict[str, float | None] = {"min_radius": 1 / sharp if sharp > 0 else None}
-    for key, name in {"max_strain": "strain", "max_stress": "stress", **PARTS}.items():
+    for key in Bent.model_fields.keys() - {"min_radius", "utilisation"}:
+        name = key.removeprefix("max_")
         parts = [part[where] for shape in shapes if (part := getattr(shape, name)) is not None]
         figures[key] = max((float(np.abs(part).max()) for part in parts), default=None)
     return figures
 
 
 def bending_of(
-    shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = VON_MISES, edge_strains: Floats | None = None
+    shell: Shell, state: State, rod: Rod, *, shear_weight: float = VON_MISES, edge_strains: Floats | None = None
 ) -> Bending:
     """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis.
 
-    Parameters
-    ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
-    rod : the section and material of every rod.
-    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
-    edge_strains : (e,) axial strains that stress the edges; default: against their rest lengths.
+    Args:
+        edge_strains: (e,) axial strains that stress the edges; default: against their rest lengths.
     """
     mesh, positions = shell.mesh, shell.positions(state)
     normals = shell_normals(mesh, positions)
@@ -300,12 +254,13 @@ def bending_of(
         mesh, positions = mesh.apart, state[: shell.node_count]
     clamps = unit(state[shell.ghosts] - state[shell.ends]) if len(shell.ghosts) else None
     components, twist, by_joints = None, None, _bent_by_joints(shell, state, rod)
-    if frames := rod_frames(shell):
-        strains = _on_entries(shell, frames.strains(state))
+    if frames := shell.frames:
+        at_rest = np.column_stack([frames.natural_curvature, frames.natural_twist])
+        strains = _on_entries(shell, frames.strains(state) - at_rest)
         twist = strains[:, 2]
-        if len(set(rod.bend_stiffnesses)) > 1:
+        if len(set(rod.bend_stiffnesses)) > 1 or at_rest.any():
             components = strains[:, :2]
-        elif not isinstance(rod.section, Circle | Tube):
+        elif not rod.section.round:
             directors = _mean_of_edges(mesh, edge_directors(shell, frames, state))
             components = np.column_stack(_parts(*_turns(mesh, positions, clamps), directors))
     return bending(
@@ -318,8 +273,7 @@ def bending_of(
 def _bent_by_joints(shell: Shell, state: Floats, rod: Rod) -> Floats | None:
     """(k, 3) by how much more each rod bends on the sharper side of its joints than at their nodes, along the joints'
     normals [1/m]; None where no joint resists shear."""
-    joints = (element for element in shell.between if isinstance(element, RelativeRotation))
-    if not any(element.stiffness[:, 0, 0].any() for element in joints):
+    if not any(element.stiffness[:, 0, 0].any() for element in filter(is_elastic, shell.between)):
         return None
     mesh, loads = shell.mesh, joint_loads(shell, state)
     moments = np.zeros((len(mesh.rod_nodes), 3))
@@ -338,17 +292,17 @@ def bending(
 ) -> Bending:  # fmt: skip
     """Bending of the rods of `mesh` with nodes at `positions` (n, 3) [m].
 
-    Parameters
-    ----------
-    clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
-    components : (k, 2) curvatures towards m1 and m2 [1/m]; without, the stress of a section that is not round is an
-        upper bound, as if it bent towards its farthest point.
-    twist_rate : (k,) twist per length [rad/m]; without, none.
-    normals : (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without `components`.
-    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
-    edge_strains : (e,) as of `bending_of`.
-    by_joints : (k, 3) along the normals of joints, how much sharper than their nodes bend the sides of them that bend
-        most [1/m]; None: joints pass no moments about their normals.
+    Args:
+        clamps: (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
+        components: (k, 2) curvatures towards m1 and m2 [1/m]; without, the stress of a section that is not round is an
+            upper bound, as if it bent towards its farthest point.
+        twist_rate: (k,) twist per length [rad/m]; without, none.
+        normals: (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without
+            `components`.
+        shear_weight: of the shear stress against the normal stress, see the module.
+        edge_strains: (e,) as of `bending_of`.
+        by_joints: (k, 3) along the normals of joints, how much sharper than their nodes bend the sides of them that
+            bend most [1/m]; None: joints pass no moments about their normals.
     """
     turns, tangents = _turns(mesh, positions, clamps)
     if by_joints is not None:
@@ -357,14 +311,17 @@ def bending(
             within = np.copysign(np.sqrt(dot(by_joints, by_joints)), components[:, 1])
             components = np.column_stack([components[:, 0], components[:, 1] + within])
     curvature = np.linalg.norm(turns, axis=1)
-    axial = axial_strains(mesh, positions) if edge_strains is None else _mean_of_edges(mesh, edge_strains)
+    if edge_strains is None:
+        lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
+        edge_strains = lengths / mesh.edge_lengths - 1.0
+    axial = _mean_of_edges(mesh, edge_strains)
     twist = np.zeros(len(curvature)) if twist_rate is None else twist_rate
     stress = strain = sheared = normal = geodesic = None
     if components is not None:
         normal, geodesic = components.T
     elif normals is not None:
         normal, geodesic = _parts(turns, tangents, normals)
-    fibre, known = fibre_distance(rod), stress_is_known(rod, twisted=bool(twist.any()))
+    fibre, known = fibre_distance(rod), not _missing(rod, twisted=bool(twist.any()))
     # the strain of a fibre k times as far is that of a bend k times as sharp
     sharp, bends, sheared_by = curvature, components, twist
     if (local := varied_at_nodes(mesh, rod)) is not None:
@@ -382,19 +339,8 @@ def bending(
     return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared)
 
 
-def rod_frames(shell: Shell) -> BendTwist | None:
-    """The elements that carry the rods' material frames; None where no twist angles are carried."""
-    return next((element for element in shell.within if isinstance(element, BendTwist)), None)
-
-
-def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
-    """(e, 3) first material director m1 of each edge in a `state` (N, 3).
-
-    Parameters
-    ----------
-    frames : the shell's bending and twist, whose frames are transported to the state.
-    state : (N, 3) node positions [m] and twist angles [rad].
-    """
+def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
+    """(e, 3) first material director m1 of each edge in a `state` (N, 3), to which `frames` are transported."""
     m1 = frames.refreshed(state).material_directors(state)
     result = np.zeros((len(shell.mesh.edges) + len(shell.ghosts), 3))  # of ghost edges, too
     for side in range(2):
@@ -403,38 +349,11 @@ def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
 
 
 def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
-    """(k, 3) normal of the shell at each entry of `rod_nodes`; None where some rod crosses no other.
-
-    Parameters
-    ----------
-    positions : (n, 3) of its nodes [m].
-    """
+    """(k, 3) normal of a shell with nodes at `positions` (n, 3) [m] at each entry of `rod_nodes`; None where some rod
+    crosses no other."""
     if (mesh.grid.joint_counts() == 0).any():
         return None
     return node_normals(mesh, positions)[mesh.rod_nodes]
-
-
-def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
-    """(k,) curvature [1/m] at each entry of `rod_nodes`.
-
-    Parameters
-    ----------
-    positions : (n, 3) of its nodes [m].
-    clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
-    """
-    return np.asarray(np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1))
-
-
-def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:
-    """(k,) axial strain at each entry of `rod_nodes`: the mean over its edges, which at an end is one.
-
-    Parameters
-    ----------
-    mesh : the rods, with their rest lengths.
-    positions : (n, 3) of its nodes [m].
-    """
-    lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
-    return _mean_of_edges(mesh, lengths / mesh.edge_lengths - 1.0)
 
 
 def _mean_of_edges(mesh: GridMesh, values: Floats) -> Floats:

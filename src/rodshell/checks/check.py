@@ -1,6 +1,6 @@
-"""All checks of a shell, and the checks of several patches merged into those of one shell."""
+"""All checks of a shell."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from math import inf
@@ -9,23 +9,24 @@ from typing import Any
 import numpy as np
 
 from rodshell.checks.bending import VON_MISES, Bending, bending, bending_of, shell_normals, worst
-from rodshell.checks.contact import contact, contact_of, worst_contact
-from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
-from rodshell.checks.other_shapes import OtherShapes, other_shapes, searched
+from rodshell.checks.contact import contact, contact_of
+from rodshell.checks.deployment import Deployment, deploy_grids, reached_by_turning
+from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import self_weight, weakest
+from rodshell.checks.self_weight import self_weight
 from rodshell.errors import OutOfTimeError
 from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, Stage
 from rodshell.figures.findings import Said, said
+from rodshell.figures.records import Ends
 from rodshell.formfinding import PopUp
-from rodshell.formfinding.popup import ENDS, Ends
-from rodshell.model.shell import UP
+from rodshell.joints.crossings import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.quantities import MOST_STAGES
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import PINNED, SUPPORTS, finals_first
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.load_path import MOST_FACTORIZATIONS
-from rodshell.units import length_text, stress_text
+from rodshell.units import length_text, shown, stress_text
 from rodshell.validation import brief, choice, instance, mapping, positive, whole
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
@@ -35,9 +36,8 @@ WORTH = 0.01  # of the stress: less torsion is not worth a word
 class ShellChecks:
     """The checks of the shell with one kind of ends.
 
-    Parameters
-    ----------
-    self_weight, other_shapes : None where a time limit came before them, or the shell is not stable.
+    Args:
+        self_weight, other_shapes: None where a time limit came before them, or the shell is not stable.
     """
 
     bending: Bending
@@ -54,14 +54,13 @@ class ShellChecks:
 class Checks:
     """What was checked of the shells that converged.
 
-    Parameters
-    ----------
-    deployment : from flat, with pinned ends, or None; `deployment_bending` the bending of its stages, the flat grid
-        first.
-    self_weight : by end condition, what share of its own weight the shell carries.
-    contact : by end condition; `deployment_contact` of the deployment's stages.
-    other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
-    stopped, missing : when the time limit came, or "", and which checks were not reached.
+    Args:
+        deployment: from flat, with pinned ends, or None; `deployment_bending` the bending of its stages, the flat grid
+            first.
+        self_weight: by end condition, what share of its own weight the shell carries.
+        contact: by end condition; `deployment_contact` of the deployment's stages.
+        other_shapes: by end condition, of shells that are stable; empty where they were not looked for.
+        stopped, missing: when the time limit came, or "", and which checks were not reached.
     """
 
     bending: dict[Ends, Bending]
@@ -84,23 +83,15 @@ class Checks:
     def __getitem__(self, ends: Ends) -> ShellChecks:
         """The checks of the shell with these ends.
 
-        Raises
-        ------
-        KeyError : there is no such shell, or it did not converge.
+        Raises:
+            KeyError: there is no such shell, or it did not converge.
         """
         if ends not in self.bending:
             known = " and ".join(map(str, self.bending)) or "none"
             raise KeyError(
                 f"no shell with {ends} ends was checked: it was not asked for or did not converge; checked: {known}"
             )
-        return ShellChecks(
-            self.bending[ends],
-            self.reactions[ends],
-            self.joints[ends],
-            self.contact[ends],
-            self.self_weight.get(ends),
-            self.other_shapes.get(ends),
-        )
+        return ShellChecks(**{each.name: getattr(self, each.name).get(ends) for each in fields(ShellChecks)})
 
     @property
     def clamped_from_flat(self) -> bool | None:
@@ -117,9 +108,7 @@ class Checks:
     def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
-        turned: tuple[Said, ...] = ()
-        if self.clamped_from_flat is False:
-            turned = (said("turned", "clamped"),)
+        turned = (said("turned", finals_first(self.bending)[0]),) if self.clamped_from_flat is False else ()
         return (*self._late, *way, *turned, *self.tight)
 
     @property
@@ -177,23 +166,20 @@ def check(
 ) -> Checks:  # fmt: skip
     """Check every shell that converged.
 
-    Parameters
-    ----------
-    popped : the shells of one footprint by their end condition.
-    rod : of which they are made.
-    stages : of the deployment from flat of the pinned shell; 0: none.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.bending`.
-    progress : called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and what
-        was found until then is returned.
+    Args:
+        popped: the shells of one footprint by their end condition.
+        stages: of the deployment from flat of the pinned shell; 0: none.
+        shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
+        progress: called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and
+            what was found until then is returned.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind.
+    Raises:
+        InputError: a value is of the wrong kind.
     """
-    by_ends = 'shells by their ends, such as {"pinned": rodshell.pop_up(...)}'
+    by_ends = f"shells by their ends, such as {{{shown(PINNED.name)}: rodshell.pop_up(...)}}"
     for ends, shape in mapping("popped", popped, by_ends).items():
-        choice("the ends of popped", ends, ENDS)
         instance(f"the shell with {ends} ends", shape, PopUp, "what rodshell.pop_up returned")
+        choice("the ends of popped", ends, tuple(dict.fromkeys((*SUPPORTS, shape.ends))))
     instance("rod", rod, Rod)
     whole("stages", stages, 0, MOST_STAGES)
     shear_weight = positive("shear_weight", shear_weight)
@@ -210,7 +196,8 @@ def check(
     )
     if checks.deployment is None:
         return checks
-    mesh, flat, shells = done["pinned"].footprint.mesh, checks.deployment.positions[0], checks.deployment.shells
+    (mesh, *_), way = [shape.footprint.mesh for shape in done.values()], checks.deployment
+    flat, shells = way.positions[0], way.shells
     directors = np.tile(UP, (len(mesh.edges), 1))
     bent = (
         bending(mesh, flat, rod, normals=shell_normals(mesh, flat)),
@@ -221,8 +208,8 @@ def check(
         deployment=staged(checks.deployment, bent),
         deployment_bending=bent,
         deployment_contact=(
-            contact(mesh, flat[mesh.rod_nodes], rod, directors=directors),
-            *(contact_of(*stage, rod) for stage in shells),
+            contact(mesh, flat[mesh.rod_nodes], rod, directors=directors, each_grid=True),
+            *(contact_of(*stage, rod, each_grid=True) for stage in shells),
         ),
     )
 
@@ -246,21 +233,26 @@ def _long_checks(
     popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], stages: int, progress: Progress
 ) -> dict[str, Any]:
     """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
-    follow = "pinned" in done and stages > 0
+    upright = _deployable(done) if stages > 0 else None
+    clamped = next((ends for ends, shape in done.items() if shape.support.holds_directions), None)
     deployment, turned, stopped = None, None, ""
     weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
     missing = [f"self-weight with {ends} ends" for ends in done]
-    missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
+    missing += [*(["the deployment from flat"] if upright else []), "other stable shapes"]
     try:
         for ends, shape in done.items():
-            weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
+            weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=partial(_weighing, ends, progress))
             missing.pop(0)
-        if follow:
-            deployment = _deployed(popped["pinned"], stages, progress)
-            missing[0] = "whether the clamped shell is reached from flat"
-            if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
+        if upright is not None:
+            deployment = deploy_grids(
+                popped[upright],
+                stages=stages,
+                progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
+            )
+            missing[0] = f"whether the {clamped} shell is reached from flat"
+            if deployment.reached_from_flat and clamped and done[clamped].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
-                turned = reached_by_turning(popped["pinned"], popped["clamped"])
+                turned = reached_by_turning(popped[upright], popped[clamped])
             missing.pop(0)
         weighing = sum(weight.factorizations or 0 for weight in weighed.values())
         for ends, search in _other_shapes(popped, done, deployment, weighing, progress):
@@ -277,6 +269,12 @@ def _long_checks(
     }
 
 
+def _deployable(shapes: Mapping[Ends, PopUp]) -> Ends | None:
+    """The first shell whose ends are held in place and free to turn, which can be followed from flat."""
+    held = (ends for ends, shape in shapes.items() if not (shape.support.holds_directions or shape.shell.yields))
+    return next(held, None)
+
+
 def _other_shapes(
     popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], deployment: Deployment | None, weighing: int,
     progress: Progress,
@@ -286,161 +284,23 @@ def _other_shapes(
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
     work = weighing + sum(shape.report.factorizations for shape in popped.values())
-    left = (work + (deployment.factorizations or 0 if deployment else 0)) // 2
+    grids = max((len(shape.footprint.mesh.grids) for shape in done.values()), default=1)
+    followed = (deployment.factorizations or 0 if deployment else 0) // grids  # of each alone: its share of one of all
+    left = (work + followed) // 2
     stable = {ends: shape for ends, shape in done.items() if shape.report.stable}
     for number, (ends, shape) in enumerate(stable.items()):
         most = 2 * left // 3 if number == 0 else left
         left -= most
-        yield (
-            ends,
-            other_shapes(
-                shape.shell,
-                shape.equilibrium,
-                most_factorizations=most,
-                deployment=deployment if ends == "pinned" else None,
-                progress=partial(_starting, ends, progress),
-            ),
-        )
+        way = deployment if deployment and ends == deployment.ends else None
+        report = partial(_starting, ends, progress)
+        found = other_shapes(shape.shell, shape.equilibrium, most_factorizations=most, deployment=way, progress=report)
+        yield ends, found
 
 
 def _starting(ends: Ends, progress: Progress, start: int) -> None:
     progress("other shapes", f"{ends} ends, start {start}", 0.0)
 
 
-def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
-    def report(count: int, factor: float) -> None:
-        done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
-        progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
-
-    return report
-
-
-def _deployed(last: PopUp, stages: int, progress: Progress) -> Deployment:
-    return deploy(
-        last.shell,
-        last.equilibrium,
-        stages=stages,
-        progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
-    )
-
-
-@dataclass(frozen=True)
-class MergedChecks(Checks):
-    """The checks of all patches together; `patches` holds those of each by its name."""
-
-    patches: Mapping[str, Checks] = field(kw_only=True)
-
-    @property
-    def warnings(self) -> tuple[Said, ...]:
-        words = [
-            Said(f"patch {name}: {word}", word.finding)
-            for name, checks in self.patches.items()
-            for word in checks.warnings
-            if word not in (checks.out_of_time, *checks.tight)
-        ]
-        return (*self._late, *words, *self.tight)
-
-
-def merged_checks(patches: Mapping[str, Checks], contacts: Mapping[Ends, Clearance]) -> MergedChecks:
-    """Checks of patches that share no rod: the results that all of them have, one patch after the other.
-
-    The deployment has the stages that every patch was followed through. Each patch carries its own weight by itself,
-    its seams being held as supports are: the smallest factor counts.
-
-    Parameters
-    ----------
-    patches : checks of each patch by its name, in the order of their meshes.
-    contacts : of all final shapes together, by end condition; during the deployment each patch is looked at by itself.
-    """
-    parts = list(patches.values())
-    ends = [end for end in parts[0].bending if all(end in part.bending for part in parts)]
-
-    def stacked(table: str) -> dict[Ends, Any]:
-        return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
-
-    def known(table: str) -> list[Ends]:
-        return [end for end in ends if all(end in getattr(part, table) for part in parts)]
-
-    deployed = all(part.deployment is not None for part in parts)
-    return MergedChecks(
-        bending=stacked("bending"),
-        reactions={end: Reactions.merged([part.reactions[end] for part in parts]) for end in ends},
-        joints=stacked("joints"),
-        self_weight={end: weakest([part.self_weight[end] for part in parts]) for end in known("self_weight")},
-        contact={end: contacts[end] for end in ends},
-        other_shapes={end: _searched([part.other_shapes[end] for part in parts]) for end in known("other_shapes")},
-        stopped=next((part.stopped for part in parts if part.stopped), ""),
-        # the last patch lacks the most
-        missing=tuple(dict.fromkeys(word for part in reversed(parts) for word in part.missing)),
-        patches=patches,
-        **(_merged_deployment(patches) if deployed else {}),
-    )
-
-
-def _merged_deployment(patches: Mapping[str, Checks]) -> dict[str, Any]:
-    """What the checks of the deployment say, by field, at the shares that all patches reached."""
-    parts = list(patches.values())
-    ways = [part.deployment for part in parts if part.deployment is not None]
-    shares = [share for share in ways[0].share.tolist() if all(share in way.share for way in ways)]
-    rows = [[way.share.tolist().index(share) for share in shares] for way in ways]
-    contacts = {
-        name: [part.deployment_contact[row] for row in of_patch]
-        for (name, part), of_patch in zip(patches.items(), rows, strict=True)
-    }
-    bent = tuple(
-        _stacked([part.deployment_bending[of_patch[k]] for part, of_patch in zip(parts, rows, strict=True)])
-        for k in range(len(shares))
-    )
-    return {
-        "deployment": staged(_merged_stages(ways, rows), bent),
-        "deployment_bending": bent,
-        "deployment_contact": tuple(
-            worst_contact({name: stages[k] for name, stages in contacts.items()}) for k in range(len(shares))
-        ),
-    }
-
-
-def _merged_stages(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
-    """The deployments of several patches at the shares that all reached, their `rows`."""
-    lost = [way.lost_at for way in ways if way.lost_at is not None]
-    elsewhere = [way.elsewhere for way in ways if way.elsewhere is not None]
-    snaps = sorted({snap for way in ways for snap in zip(way.snaps, way.snapped_by, strict=True)})
-    turned = [way.clamped.reached_from_flat if way.clamped else None for way in ways]
-    return Deployment(
-        ends="pinned",
-        share=ways[0].share[rows[0]],
-        positions=np.concatenate([way.positions[row] for way, row in zip(ways, rows, strict=True)], axis=1),
-        snaps=tuple(snap for snap, _ in snaps),
-        snapped_by=tuple(moved for _, moved in snaps),
-        lost_at=max(lost, default=None),
-        gap=max((way.gap for way in ways if way.gap is not None), key=lambda gap: gap.left, default=None),
-        reached_from_flat=_all([way.reached_from_flat for way in ways]),
-        elsewhere=max(elsewhere, key=lambda shape: shape.distance or 0.0, default=None),
-        guided=max((way.guided for way in ways if way.guided is not None), default=None),
-        clamped=ClampedDeployment(reached_from_flat=_all(turned)),
-        factorizations=sum(way.factorizations or 0 for way in ways),
-    )
-
-
-def _all(answers: Sequence[bool | None]) -> bool | None:
-    """Whether all are true; None where that is not known."""
-    return False if False in answers else None if None in answers else True
-
-
-def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:
-    """The searches of several patches as one: each found the other shapes of its own shell."""
-    return searched(
-        sum(part.tried or 0 for part in parts),
-        max(part.largest_kick or 0.0 for part in parts),
-        [shape for part in parts for shape in part.found],
-        sum(part.factorizations or 0 for part in parts),
-        through=any(part.popped_through for part in parts),
-    )
-
-
-def _stacked(parts: Sequence[Any]) -> Any:
-    """Records of arrays, joined array by array; None where one part has none."""
-    columns = [[getattr(part, field.name) for part in parts] for field in fields(parts[0])]
-    return type(parts[0])(
-        *(None if any(array is None for array in column) else np.concatenate(column) for column in columns)
-    )
+def _weighing(ends: Ends, progress: Progress, count: int, factor: float) -> None:
+    done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
+    progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)

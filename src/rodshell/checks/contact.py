@@ -1,7 +1,7 @@
 """Contact: rods that touch or run into each other where they should not, and how near the others come.
 
 Each edge of a rod is a prism of the rod's section; edges much shorter than the rod is thick are taken together. Pairs
-of edges that can be near are found by cells about their middles. Two prisms are apart by the widest gap between them,
+of edges that can be near are found by a tree of their middles. Two prisms are apart by the widest gap between them,
 seen along any of a few directions: from one axis to the other where these are nearest, along both axes and across both,
 and along the sides of both sections. A gap along any direction keeps them apart, so that no contact is missed; it is
 the distance of round rods that run side by side, and otherwise a lower bound of it.
@@ -14,24 +14,23 @@ touch itself only farther along its line than half around its section. Sections 
 material frames say, and without these upright on the shell.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from rodshell.arrays import Bools, Floats, Ints
-from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
+from rodshell.arrays import Bools, Floats, Ints, State
+from rodshell.checks.bending import edge_directors, shell_normals
 from rodshell.figures.checks import Clearance
 from rodshell.geometry.frames import adapted, cross, dot, unit
-from rodshell.geometry.near_pairs import near_pairs
-from rodshell.layout import FlatGrid, GridMesh
-from rodshell.layout.flatgrid import Crossings, FlatRod
+from rodshell.joints.crossings import UP
+from rodshell.layout import GridMesh
+from rodshell.layout.flatgrid import Crossings
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
-from rodshell.model.shell import UP
-from rodshell.rods.section import Circle, Ellipse, RectangularSection, Rod, Tube
+from rodshell.rods.section import Rod
 
 FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
 SHORT = 0.5  # of a section's reach: edges are taken together up to this length, which leaves 0.2 % of it as sag
@@ -43,63 +42,27 @@ APART = Clearance(clearance=None, pairs=0, rods=None, where=None)
 """No two rods come nearer than a rod's breadth, or the section's outline is not known."""
 
 
-def contact_of(shell: Shell, state: Floats, rod: Rod) -> Clearance:
-    """Contact of a shell of equal rods in a `state` (N, 3).
-
-    Parameters
-    ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
-    rod : the section of every rod.
-    """
-    frames = rod_frames(shell)
+def contact_of(shell: Shell, state: State, rod: Rod, *, each_grid: bool = False) -> Clearance:
+    """Contact of a shell of equal rods in a `state` (N, 3); see `contact`."""
+    frames = shell.frames
     directors = None if frames is None else edge_directors(shell, frames, state)
-    return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
-
-
-def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], rod: Rod) -> Clearance:
-    """Contact of shells of equal rods, each in its state, among each other too.
-
-    Parameters
-    ----------
-    mesh : all their meshes as one, in the order of the patches.
-    """
-    outline = _Outline.of(rod, mesh)
-    if outline is None:
-        return APART
-    sizes = np.cumsum([0, *(len(shell.mesh.grid.rods) for shell, _ in patches)])
-    parts = [_crossing_lines(mesh.grid.rods[a:b], outline) for a, b in pairwise(sizes)]
-    positions = np.concatenate([state[shell.node_blocks] for shell, state in patches])
-    ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
-    together = near_pairs(ends, outline.near)
-    patch = np.repeat(np.arange(len(patches)), 2 * np.diff(sizes))
-    together = together[patch[together[:, 0]] != patch[together[:, 1]]]
-    stations = np.array([(rod.start, rod.end) for rod in mesh.grid.rods]).ravel()
-    crossings = Crossings(
-        np.concatenate([*(crossings.rods + by for crossings, by in zip(parts, sizes, strict=False)), together // 2]),
-        np.concatenate([*(crossings.at for crossings in parts), stations[together]]),
-    )
-    frames = [(shell, rod_frames(shell), state) for shell, state in patches]
-    turned = [edge_directors(shell, frame, state) for shell, frame, state in frames if frame is not None]
-    directors = np.concatenate(turned) if len(turned) == len(patches) else None
-    return contact(mesh, positions, rod, directors=directors, crossings=crossings)
+    return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors, each_grid=each_grid)
 
 
 def contact(
-    mesh: GridMesh, positions: Floats, rod: Rod, *, directors: Floats | None = None, crossings: Crossings | None = None
+    mesh: GridMesh, positions: Floats, rod: Rod, *, directors: Floats | None = None, each_grid: bool = False
 ) -> Clearance:
     """Contact of the rods of `mesh`.
 
-    Parameters
-    ----------
-    positions : (k, 3) of each entry of `rod_nodes` [m].
-    directors : (e, 3) first material director of each edge; without, the normal of the shell.
-    crossings : where rods meet by design; without, wherever their lines cross in the flat grid.
+    Args:
+        positions: (k, 3) of each entry of `rod_nodes` [m].
+        directors: (e, 3) first material director of each edge; without, the normal of the shell.
+        each_grid: of grids side by side rods of two of them are not looked at, as where each is still on its own way.
     """
     outline = _Outline.of(rod, mesh)
     if outline is None:
         return APART
-    by_design = _crossing_lines(mesh.grid.rods, outline) if crossings is None else crossings
-    edges = _Edges(mesh, positions, outline, directors, by_design)
+    edges = _Edges(mesh, positions, outline, directors, _by_design(mesh, positions, outline), each_grid)
     first, second, p, q, limit = edges.near()
     gap = edges.gaps(first, second, q - p)
     counted = gap <= limit
@@ -111,17 +74,6 @@ def contact(
     x, y, z = (0.5 * (p + q)[worst]).tolist()
     touching = len(np.unique(rods[counted & (gap <= 0)], axis=0))
     return Clearance(clearance=float(gap[worst]), pairs=touching, rods=(a, b), where=(x, y, z))
-
-
-def worst_contact(parts: Mapping[str, Clearance]) -> Clearance:
-    """Of several shells, by their names, each checked by itself: the worst, with the names of rods among all."""
-    known = [(name, shape) for name, shape in parts.items() if shape.clearance is not None]
-    if not known:
-        return APART
-    name, worst = min(known, key=lambda pair: pair[1].clearance or 0.0)
-    assert worst.rods is not None
-    rods = (f"{name}-{worst.rods[0]}", f"{name}-{worst.rods[1]}")
-    return worst.changed(rods=rods, pairs=sum(shape.pairs or 0 for shape in parts.values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,17 +88,9 @@ class _Outline:
 
     @staticmethod
     def of(rod: Rod, mesh: GridMesh) -> "_Outline | None":
-        section = rod.section
-        if isinstance(section, Circle | Tube):
-            unchanged = _Outline(section.outer_radius, section.outer_radius, False)
-        elif isinstance(section, Ellipse):
-            unchanged = _Outline(section.a, section.b, False)
-        elif isinstance(section, RectangularSection):
-            unchanged = _Outline(0.5 * section.width, 0.5 * section.height, True)
-        elif section.fibre_distances is not None:
-            unchanged = _Outline(*section.fibre_distances, True)
-        else:
+        if (half := rod.section.half_widths) is None:
             return None
+        unchanged = _Outline(*half, rod.section.boxed)
         if (local := varied_at_nodes(mesh, rod)) is None:
             return unchanged
         depths = np.column_stack([local.depth1, local.depth2])
@@ -176,18 +120,31 @@ class _Outline:
         return parts[0] + parts[1] if self.box else np.hypot(*parts)
 
 
-def _crossing_lines(rods: Sequence[FlatRod], outline: _Outline) -> Crossings:
-    """Where lines of rods cross in the flat grid, joined or not, or would if the rods were a little longer."""
-    return FlatGrid.of(rods, margin=-4 * outline.reach / FLATTEST).crossings
+def _by_design(mesh: GridMesh, positions: Floats, outline: _Outline) -> Crossings:
+    """Where rods meet by design: where their lines cross in a flat grid, and where those of two grids end together."""
+    beyond = 4 * outline.reach / FLATTEST
+    grids = [grid.grid.meetings(beyond) for grid in mesh.grids]
+    if len(grids) == 1:
+        return grids[0]
+    firsts = np.cumsum([0, *(len(grid.grid.rods) for grid in mesh.grids)])
+    ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
+    together = cKDTree(ends).query_pairs(outline.near, output_type="ndarray")
+    of_ends = np.repeat(mesh.grid_of_rods, 2)
+    together = together[of_ends[together[:, 0]] != of_ends[together[:, 1]]]
+    return Crossings(
+        np.concatenate([*(found.rods + by for found, by in zip(grids, firsts, strict=False)), together // 2]),
+        np.concatenate([*(found.at for found in grids), mesh.grid.ends.ravel()[together]]),
+    )
 
 
 class _Edges:
     """All edges of a shape as prisms."""
 
     def __init__(
-        self, mesh: GridMesh, positions: Floats, outline: _Outline, directors: Floats | None, crossings: Crossings
-    ) -> None:
-        self.mesh, self.outline = mesh, outline
+        self, mesh: GridMesh, positions: Floats, outline: _Outline, directors: Floats | None, crossings: Crossings,
+        each_grid: bool = False,
+    ) -> None:  # fmt: skip
+        self.mesh, self.outline, self._each_grid = mesh, outline, each_grid
         rods = np.sort(crossings.rods, axis=1)
         swapped = (rods != crossings.rods)[:, :1]
         self.crossings = Crossings(rods, np.where(swapped, crossings.at[:, ::-1], crossings.at))
@@ -225,7 +182,7 @@ class _Edges:
         they count as near [m]; crossing rods, and parts of one rod, only when they touch away from there."""
         reach = self.outline.reach
         radius = np.linalg.norm(self.stop - self.start, axis=1).max() + 2 * reach + self.outline.near
-        found = near_pairs(0.5 * (self.start + self.stop), float(radius))
+        found = cKDTree(0.5 * (self.start + self.stop)).query_pairs(radius, output_type="ndarray")
         first, second = found[:, 0], found[:, 1]  # the first comes first in the order of the rods
         rods = self.rods[first], self.rods[second]
         same_rod = rods[0] == rods[1]
@@ -237,6 +194,8 @@ class _Edges:
         for pairs, crossings in self._met(*rods):
             meeting[pairs] = True
             cut[pairs] |= self._overlap(first[pairs], second[pairs], crossings)
+        if self._each_grid:
+            cut |= self.mesh.grid_of_rods[rods[0]] != self.mesh.grid_of_rods[rods[1]]
         kept = ~cut
         limit = np.where(meeting, -2 * SLACK * reach, np.where(same_rod, 0.0, self.outline.near))
         return first[kept], second[kept], limit[kept]
@@ -320,10 +279,9 @@ def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[
 
     Where segments are parallel over a stretch, one pair of points of that stretch.
 
-    Parameters
-    ----------
-    a, a_end : (p, 3) ends of the first segment of each pair.
-    b, b_end : (p, 3) ends of the second segment of each pair, in the same unit.
+    Args:
+        a, a_end: (p, 3) ends of the first segment of each pair.
+        b, b_end: (p, 3) ends of the second segment of each pair, in the same unit.
     """
     u, v, w = a_end - a, b_end - b, a - b
     uu, vv, uv, uw, vw = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)

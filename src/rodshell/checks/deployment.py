@@ -27,7 +27,9 @@ from rodshell.formfinding.popup import end_directions, laid_below, turned
 from rodshell.model import Shell
 from rodshell.model.shell import last_edges
 from rodshell.rods.elements import Elements
+from rodshell.rods.supports import PINNED
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
+from rodshell.solve.grids import side_by_side
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.path import EASY, SAME, Snap, Trace, follow, relax, trace, unaccounted
@@ -60,11 +62,9 @@ class OtherShape(figures.OtherShape):
 class Gap:
     """Where a deployment was lost, seen from flat and from the final shape.
 
-    Parameters
-    ----------
-    reached : share up to which the path forwards was followed, on whichever branch; 0 where none was found from flat.
-    left : share down to which the path backwards is stable.
-    limit : what ends it there, as of a `LoadPath`.
+    Args:
+        reached: share up to which the path forwards was followed, on whichever branch; 0: none was found from flat.
+        left: share down to which the path backwards is stable, where it ends as `limit` says (see `LoadPath`).
     """
 
     reached: float
@@ -90,7 +90,7 @@ class Deployment(figures.Deployment):
     shells: Found[tuple[tuple[Shell, Floats], ...]] = Field(
         default=(),
         description="at each stage but the flat grid, with its state (N, 3), whose twist angles belong to that shell's "
-        "source frames; none where ways of several shells were joined",
+        "source frames",
     )
     gap: Found[Gap | None] = key("where it was lost")
     elsewhere: OtherShape | None = key("the shape in which it ends instead")
@@ -104,33 +104,29 @@ class Deployment(figures.Deployment):
             most = max(moved or 0.0 for moved in self.snapped_by)
             continues = ", and continues to its final shape" if self.reached_from_flat else ""
             other = "; a small difference can make it snap elsewhere" if len(self.snaps) > FEW else ""
-            found.append(
-                said(
-                    "snaps", "pinned", most, unit="m",
-                    where=where, by=length_text(most), continues=continues, other=other,
-                )
-            )  # fmt: skip
+            by = length_text(most)
+            found.append(said("snaps", self.ends, most, unit="m", where=where, by=by, continues=continues, other=other))
         if self.reached_from_flat is False:
             where = "" if self.elsewhere is None else f", {self.elsewhere.words}"
-            found.append(said("guided", "pinned", where=where))
+            found.append(said("guided", self.ends, where=where))
         if self.gap is not None:
-            found.append(said("lost", "pinned", self.lost_at, 0, how=self.gap.words))
+            found.append(said("lost", self.ends, self.lost_at, 0, how=self.gap.words))
         return tuple(found)
 
 
-def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress = lambda share: None) -> Deployment:
+def deploy(
+    shell: Shell, found: Equilibrium, *, stages: int, ends: str = PINNED.name, progress: Progress = lambda share: None
+) -> Deployment:
     """Follow a popped-up shell back to the flat grid, and forwards from there where that path has a gap.
 
-    Parameters
-    ----------
-    shell : with pinned ends, its source frames being at the equilibrium.
-    stages : number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root of
-        the way.
-    progress : called with each share of the deployment that is looked for.
+    Args:
+        shell: its ends being free to turn, its source frames being at the equilibrium.
+        stages: number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root
+            of the way.
+        progress: called with each share of the deployment that is looked for.
 
-    Returns
-    -------
-    The stages reached. Those below the last one that was reached are missing.
+    Returns:
+        The stages reached. Those below the last one that was reached are missing.
     """
     path = _Path(shell, found, progress)
     shares = ((np.arange(stages, 0, -1) / stages) ** 2).tolist()
@@ -158,7 +154,7 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
     wanted = [(share, there) for share, there in whole if share in shares]
     snaps = [snap for snap in lower.snaps if guided is None or snap.stop <= guided[0]]
     return Deployment(
-        ends="pinned",
+        ends=ends,
         share=np.array([0.0, *(share for share, _ in wanted)]),
         positions=np.array([path.flat, *(shell.positions(there.state) for _, there in wanted)]),
         shells=tuple((shell.with_elements(there.elements), there.state) for _, there in wanted),
@@ -171,6 +167,44 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
         guided=guided,
         factorizations=path.factorizations,
     )
+
+
+def deploy_grids(popped: PopUp, *, stages: int, progress: Progress = lambda share: None) -> Deployment:
+    """As `deploy`, of grids that lie side by side each on its own way: a snap of one then costs no steps of the others.
+    The stages are those that all of them reached.
+
+    Args:
+        popped: with pinned ends.
+    """
+    grids = popped.alone or (popped,)
+    ways = [deploy(grid.shell, grid.equilibrium, stages=stages, ends=popped.ends, progress=progress) for grid in grids]
+    if len(ways) == 1:
+        return ways[0]
+    shares = [share for share in ways[0].share.tolist() if all(share in way.share for way in ways)]
+    rows = np.array([[way.share.tolist().index(share) for share in shares] for way in ways])
+    each = [[way.shells[row - 1] for way, row in zip(ways, of_stage, strict=True)] for of_stage in rows.T[1:].tolist()]
+    lost = [way.lost_at for way in ways if way.lost_at is not None]
+    elsewhere = [way.elsewhere for way in ways if way.elsewhere is not None]
+    snaps = sorted({snap for way in ways for snap in zip(way.snaps, way.snapped_by, strict=True)})
+    return Deployment(
+        ends=popped.ends,
+        share=np.array(shares),
+        positions=np.concatenate([way.positions[row] for way, row in zip(ways, rows, strict=True)], axis=1),
+        shells=tuple(side_by_side(popped.shell, parts) for parts in each),
+        snaps=tuple(snap for snap, _ in snaps),
+        snapped_by=tuple(moved for _, moved in snaps),
+        lost_at=max(lost, default=None),
+        gap=max((way.gap for way in ways if way.gap is not None), key=lambda gap: gap.left, default=None),
+        reached_from_flat=all_true([way.reached_from_flat for way in ways]),
+        elsewhere=max(elsewhere, key=lambda shape: shape.distance or 0.0, default=None),
+        guided=max((way.guided for way in ways if way.guided is not None), default=None),
+        factorizations=sum(way.factorizations or 0 for way in ways),
+    )
+
+
+def all_true(answers: Sequence[bool | None]) -> bool | None:
+    """Whether all are true; None where that is not known."""
+    return False if False in answers else None if None in answers else True
 
 
 @dataclass(frozen=True)
@@ -203,7 +237,7 @@ class _Path:
     def backwards(self, start: Equilibrium, shares: Sequence[float]) -> list[Stage]:
         """Stages at descending shares, from the final shape at the first of them down to where the path has a gap."""
         self._progress(shares[0])
-        problem = self._problem(shares[0], self.shell.elements)
+        problem = self._problem(shares[0])
         final = self._counted(find_equilibrium(problem, start.state, start.forces))
         self._pattern, found = final.problem.pattern, [(shares[0], final)]
         if not final.report.stable:
@@ -235,12 +269,12 @@ class _Path:
 
     def low(self, last: Stage, share: float) -> Equilibrium | None:
         """The equilibrium at a small share to which Newton's method leads backwards, over gaps; None if it fails."""
-        (start, here), elements = last, self.shell.elements
+        start, here = last
         if not here.report.stable:
             return None
         found = follow(
-            lambda t: self._problem((1 - t) * start + t * share, elements), here.state, here.forces, first_step=1.0
-        )
+            lambda t: self._problem((1 - t) * start + t * share), here.state, here.forces, first_step=1.0
+        ).whole
         self._counted(found)
         return found if found.report.stable else None
 
@@ -285,19 +319,10 @@ class _Path:
         return way.found if way.t == stop else None
 
     def _trace(self, here: Equilibrium, start: float, stop: float, *, snap: bool, most: int) -> Trace:
-        def problem_at(share: float) -> Problem:
-            return self._problem(share, self.shell.elements)
-
         way = trace(
-            problem_at,
-            here,
-            start,
-            stop,
-            shortest=SHORTEST,
-            snap=snap,
-            most_factorizations=most,
+            self._problem, here, start, stop, shortest=SHORTEST, snap=snap, most_factorizations=most,
             progress=lambda share, _: self._progress(share),
-        )
+        )  # fmt: skip
         self.factorizations += way.factorizations
         return way
 
@@ -323,22 +348,23 @@ class _Path:
         self._smooth = there.report.stable  # where one guess leads astray, the next ones do, too
         return there if self._smooth and not unaccounted(before, there) else None
 
-    def _problem(self, share: float, elements: tuple[Elements, ...]) -> Problem:
-        goals = (1 - share) * self._first + share * self._last
+    def _problem(self, share: float, elements: tuple[Elements, ...] | None = None) -> Problem:
+        """At a share of the deployment; with the elements' source frames of another shape than the final one, if so."""
+        goals, elements = (1 - share) * self._first + share * self._last, elements or self.shell.elements
         return Problem.of_shell(self.shell, self._last, goals=goals, elements=elements, pattern=self._pattern)
 
 
 def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
     """Whether the pinned shell comes to the clamped shape when its ends, held in place, are turned into their clamps.
 
-    Parameters
-    ----------
-    pinned, clamped : stable shells of one footprint and boundary.
+    Args:
+        pinned, clamped: stable shells of one footprint and boundary.
 
-    Returns
-    -------
-    None where that could not be followed. The path continues after a snap.
+    Returns:
+        None where that could not be followed. The path continues after a snap. Of grids side by side whether all do.
     """
+    if pinned.alone:
+        return all_true([reached_by_turning(*grid) for grid in zip(pinned.alone, clamped.alone, strict=True)])
     shell, mesh = clamped.shell, clamped.footprint.mesh
     now, outward = end_directions(mesh, pinned.positions), clamped.boundary.tangents
     start = clamped.state.copy()

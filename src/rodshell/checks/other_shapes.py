@@ -6,12 +6,12 @@ stiffness, one by one and mixed. From each start the energy is lowered to the ne
 is a shape of the shell; that nothing is found proves nothing, so the search says how far it looked.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.checks.bending import edge_directors, rod_frames
+from rodshell.checks.bending import edge_directors
 from rodshell.checks.deployment import Deployment, OtherShape
 from rodshell.figures import checks as figures
 from rodshell.figures.records import Rows, rows
@@ -43,40 +43,17 @@ class OtherShapes(figures.OtherShapes):
     found: Rows[OtherShape] = rows("shapes that were found")
 
 
-def searched(starts: int, kick: float, found: Iterable[OtherShape], work: int, *, through: bool) -> OtherShapes:
-    """What a search found, and how far it looked.
-
-    Parameters
-    ----------
-    kick : the largest, over half the shell's width.
-    work : factorisations.
-    through : whether popping through was among the starts.
-    """
-    ways = ["popped through"] if through else []
-    if kick:
-        by = f"{100 * kick:.0f} % of half its width"
-        ways.append(f"kicked by up to {by} along its {MODES} softest modes or mixtures of them")
-    words = "not looked for: the search may take half of the work that the form took, which is too little here"
-    if starts:
-        number = f"{starts} start{'s' if starts > 1 else ''}"
-        words = f"looked for from {number} ({' and '.join(ways)}); others are not excluded"
-    return OtherShapes(
-        tried=starts, searched=words, popped_through=through, largest_kick=kick, found=tuple(found), factorizations=work
-    )
-
-
 def other_shapes(
     shell: Shell, found: Equilibrium, *, most_factorizations: int, deployment: Deployment | None = None,
     progress: Callable[[int], None] = lambda start: None,
 ) -> OtherShapes:  # fmt: skip
     """Look for other stable equilibria of a shell, its supports being held where they are.
 
-    Parameters
-    ----------
-    found : its stable equilibrium without loads, the shell's source frames being there.
-    most_factorizations : the search ends before they are used up; kicks that are small come first.
-    deployment : of this shell; the shape that it ended in, where that is not the final one, is among those found.
-    progress : called with the number of each start before it.
+    Args:
+        found: its stable equilibrium without loads, the shell's source frames being there.
+        most_factorizations: the search ends before they are used up; kicks that are small come first.
+        deployment: of this shell; the shape that it ended in, where that is not the final one, is among those found.
+        progress: called with the number of each start before it.
     """
     search = _Search(shell, found, deployment)
     kicks = list[float]()
@@ -88,8 +65,22 @@ def other_shapes(
         progress(len(kicks) + 1)
         search.go(start, kick, most)
         kicks.append(kick)
-    largest = max(kicks, default=0.0)
-    return searched(len(kicks), largest, search.shapes, search.factorizations, through=0.0 in kicks)
+    return OtherShapes(
+        tried=len(kicks), searched=_looked(kicks), popped_through=0.0 in kicks, largest_kick=max(kicks, default=0.0),
+        found=tuple(search.shapes), factorizations=search.factorizations,
+    )  # fmt: skip
+
+
+def _looked(kicks: Sequence[float]) -> str:
+    """How far a search looked whose starts had these kicks over half the shell's width; 0 is popping through."""
+    if not kicks:
+        return "not looked for: the search may take half of the work that the form took, which is too little here"
+    ways = ["popped through"] if 0.0 in kicks else []
+    if largest := max(kicks):
+        by = f"{100 * largest:.0f} % of half its width"
+        ways.append(f"kicked by up to {by} along its {MODES} softest modes or mixtures of them")
+    number = f"{len(kicks)} start{'s' if len(kicks) > 1 else ''}"
+    return f"looked for from {number} ({' and '.join(ways)}); others are not excluded"
 
 
 class _Search:
@@ -166,7 +157,7 @@ class _Search:
         state[nodes] += (self._mirrored(above) - self.positions)[self.shell.like[nodes]]
         held = np.append(self.shell.ends, self.shell.ghosts)
         state[held] = self.found.state[held]
-        if frames := rod_frames(self.shell):
+        if frames := self.shell.frames:
             self._turn_sections(frames, state)
         return state
 
@@ -202,13 +193,11 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
 
     Rods in two layers are joined at their crossings.
 
-    Parameters
-    ----------
-    positions : (n, 3) of its nodes [m]; of rods in two layers on the surface between them.
+    Args:
+        positions: (n, 3) of its nodes [m]; of rods in two layers on the surface between them.
 
-    Returns
-    -------
-    (n, 3) the nodes on that surface [m].
+    Returns:
+        (n, 3) the nodes on that surface [m].
     """
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]

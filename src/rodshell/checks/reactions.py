@@ -9,7 +9,6 @@ about the joint is that of the joint's energy: of the forces on the nodes next t
 twist angles. Both are resultants, whatever the joint is made of.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,10 +20,9 @@ from rodshell.figures import checks as figures
 from rodshell.figures.records import Found
 from rodshell.formfinding.finite_sections import joint_normals, joint_tangents
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.joints.crossings import LinkerBend
 from rodshell.layout import FlatGrid
 from rodshell.model import Shell
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import Elements, is_bends
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.validation import brief
 
@@ -52,12 +50,6 @@ class Reactions(figures.Reactions):
             moments=moments,
         )
 
-    @classmethod
-    def merged(cls, parts: Sequence["Reactions"]) -> "Reactions":
-        """Of several shells, one after the other."""
-        columns = zip(*((part.points, part.forces, part.moments) for part in parts), strict=True)
-        return cls.at(*map(np.concatenate, columns))
-
 
 def _largest(parts: Floats) -> float:
     return float(np.linalg.norm(parts, axis=1).max(initial=0.0))
@@ -70,14 +62,18 @@ def _imbalance(parts: Floats) -> float:
 
 
 def reactions(shell: Shell, found: Equilibrium) -> Reactions:
-    """Reactions of a shell without loads whose ends are held.
+    """Reactions of a shell without loads, whose ends are held or pushed by the springs of supports.
 
-    Parameters
-    ----------
-    shell : with its source frames at the equilibrium.
-    found : the equilibrium; its gradient at the held ends is what the supports exert.
+    Args:
+        found: the equilibrium, at which the shell's source frames are; its gradient at the ends, without that of the
+            springs, is what the supports exert.
     """
     state, gradient = found.state, found.gradient
+    if shell.springs:  # their forces are the supports'
+        pushes = np.zeros_like(gradient)
+        for spring in shell.springs:
+            spring.evaluate(state, pushes)
+        gradient = gradient - pushes
     points = state[shell.ends]
     forces, moments = gradient[shell.ends], np.zeros_like(points)
     if len(shell.ghosts):
@@ -91,13 +87,12 @@ def reactions(shell: Shell, found: Equilibrium) -> Reactions:
 class JointLoads:
     """Of each of the grid's c crossings, in its order.
 
-    Parameters
-    ----------
-    normals : (c, 3) unit normals of the two rods, on the side that was up in the flat grid.
-    forces : (c, 2, 3) on its first and its second rod [N]. Where two rods meet they are opposite; where more meet,
-        each is what all the others do together.
-    moments : (c, 3) on the second rod about the joint [N m].
-    flat_angles, angles : (c,) from the first rod's direction to the second's about the normal, flat and now [rad].
+    Args:
+        normals: (c, 3) unit normals of the two rods, on the side that was up in the flat grid.
+        forces: (c, 2, 3) on its first and its second rod [N]. Where two rods meet they are opposite; where more meet,
+            each is what all the others do together.
+        moments: (c, 3) on the second rod about the joint [N m].
+        flat_angles, angles: (c,) from the first rod's direction to the second's about the normal, flat and now [rad].
     """
 
     normals: Floats
@@ -147,14 +142,8 @@ class JointLoads:
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:
     """Of a shell in equilibrium at `state` (N, 3), its source frames being there; with shared DOFs or eccentric.
 
-    Parameters
-    ----------
-    shell : with shared DOFs or eccentric joints, its source frames being at the state.
-    state : (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
-
-    Raises
-    ------
-    InputError : the moments of an energy between rods are not known.
+    Raises:
+        InputError: the moments of an energy between rods are not known.
     """
     mesh, positions = shell.mesh, shell.positions(state)
     met = mesh.at_crossings
@@ -188,9 +177,7 @@ def _on_places(shell: Shell, state: Floats) -> Floats:
     order = np.argsort(key)
     result = np.zeros((len(key), 3))
     clamps = np.repeat(np.arange(len(mesh.rod_start)), 2)
-    for element in (shell.stretch, *shell.within):
-        if isinstance(element, LinkerBend):
-            continue
+    for element in (shell.stretch, *filter(is_bends, shell.within)):
         of_rods = mesh.edge_rods if element is shell.stretch else mesh.bend_rods
         of_rods = np.append(of_rods, clamps[: len(element.blocks) - len(of_rods)])
         rows = _rows(element, state)
@@ -207,25 +194,15 @@ def cut_forces(shell: Shell, state: Floats) -> Floats:
 
     Its part along the edge is the axial force, the rest the shear force: what balances the rod's own energy up to the
     cut. A moment that a joint transfers acts as a pair of forces on the nodes next to it, so that shear forces are
-    those of spans only away from joints.
-
-    Parameters
-    ----------
-    shell : its source frames being at the state.
-    state : (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
+    those of spans only away from joints. The shell is in equilibrium at `state` (N, 3), its source frames being there.
     """
     mesh, start = shell.mesh, shell.mesh.rod_start
     gradient = _on_places(shell, state)
     if len(shell.ghosts):  # a clamp holds the ghost node before a rod's start, too
-        order = np.argsort(shell.ghosts)
-        at_ghosts = np.zeros((len(shell.ghosts), 3))
+        of_rods = np.zeros_like(state)
         for element in shell.within:
-            rows = _rows(element, state)
-            for column in range(element.blocks.shape[1]):
-                held = np.isin(element.blocks[:, column], shell.ghosts)
-                found = order[np.searchsorted(shell.ghosts[order], element.blocks[held, column])]
-                np.add.at(at_ghosts, found, rows[held, column])
-        gradient[start] += at_ghosts[::2]
+            element.evaluate(state, of_rods)
+        gradient[start] += of_rods[shell.ghosts[::2]]
     before = np.cumsum(gradient, axis=0)
     before -= np.repeat(before[start] - gradient[start], mesh.rod_stop - start, axis=0)
     inner = np.ones(len(gradient), dtype=bool)
@@ -241,8 +218,8 @@ def _between(shell: Shell, state: Floats, met: Ints) -> tuple[Floats, Floats]:
     pair = np.sort(mesh.grid.crossings.rods, axis=1) @ [count, 1]
     order = np.argsort(pair)
     forces, moments = np.zeros((len(pair), 2, 3)), np.zeros((len(pair), 3))
-    elements = [element for element in shell.elements if isinstance(element, LinkerBend) or element in shell.between]
-    for element in elements:
+    linkers = (element for element in shell.within if not is_bends(element))
+    for element in (*linkers, *shell.between):
         angles = [c for c in range(element.blocks.shape[1]) if (element.blocks[:, c] >= first).all()]
         if len(element.blocks) == 0:
             continue

@@ -6,7 +6,7 @@ not enough: the unloaded shell is bent, and sinks before it buckles. Loads that 
 are in `rodshell.loads`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -36,13 +36,12 @@ def self_weight(
 ) -> SelfWeight:
     """Load a shell with its own weight until it is no longer stable.
 
-    Parameters
-    ----------
-    found : the equilibrium of the shell without loads, its ends held, with or without bracing.
-    mass : (n,) of the nodes, with that of bracing [kg]; None: the shell's.
-    gravity : [m/s2].
-    most : largest factor that is looked for.
-    progress : as of `load_path`.
+    Args:
+        found: the equilibrium of the shell without loads, its ends held, with or without bracing.
+        mass: (n,) of the nodes, with that of bracing [kg]; None: the shell's.
+        gravity: [m/s2].
+        most: largest factor that is looked for.
+        progress: as of `load_path`.
     """
     if not shell.mass[shell.stretch.blocks, 2].all():  # joints may have some even then
         return SelfWeight(load_factor=None, deflection=None, limit="no mass")
@@ -54,17 +53,7 @@ def self_weight(
     if whole is not None:
         moved = shell.positions(whole.state) - shell.positions(found.state)
         deflection = float(np.linalg.norm(moved, axis=1).max())
-    if end.limit == "none":
-        return SelfWeight(load_factor=None, deflection=deflection, limit="none", factorizations=end.factorizations)
     return SelfWeight(
-        load_factor=end.factor, deflection=deflection, limit=shown_limit(end.limit), factorizations=end.factorizations
-    )
-
-
-def weakest(parts: Sequence[SelfWeight]) -> SelfWeight:
-    """Of patches that stand by themselves: the smallest factor; the largest deflection if all carry their weight."""
-    least = min(parts, key=lambda part: part.at_least)
-    sunk = [part.deflection for part in parts]
-    deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)
-    work = sum(part.factorizations or 0 for part in parts)
-    return least.changed(deflection=deflection, factorizations=work)
+        load_factor=None if end.limit == "none" else end.factor, deflection=deflection, limit=shown_limit(end.limit),
+        factorizations=end.factorizations,
+    )  # fmt: skip

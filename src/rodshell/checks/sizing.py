@@ -23,14 +23,16 @@ from rodshell.checks.bending import VON_MISES, bending_of, largest_stress
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.popup import PopUp
 from rodshell.joints import Ball, Joint
-from rodshell.layout import GridLayout
+from rodshell.layout import Layout, SurfaceLattice
 from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.nets.surface_lattice import surface_net
+from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, Tube, scaled, size_text
 from rodshell.targets import Target
 from rodshell.targets.creased import Creased
-from rodshell.units import length_text, rounded_down
+from rodshell.units import BUILT, as_built, length_text, rounded_down
 from rodshell.untrusted import limit, raised
 
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
@@ -41,8 +43,10 @@ SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is 
 AIM = 3 / 4
 ROOM = 1 / 6  # depth of a rod over the spacing: joints need room
 PLAN = 41  # points each way at which a target without a net is sampled
-MOST_SLENDER = 100_000  # width of a shell over the depth of its rods; known ones have 50 to 5000
+KNOWN = 50  # width of a shell over the depth of its rods, at least
+MOST_SLENDER = 100_000  # the same, at most; known ones have up to 5000
 USUAL = (20, 5000)  # the same of the sizes that are proposed
+SPACED = (5, 500)  # width of a shell over the spacing of its rods, of those
 UNITS = (1e-3, 0.01, 0.0254)  # by which lengths are wrong that were given as metres
 THICKEST, WIDEST = 0.5, 1e3  # m: a section and a shell that are proposed
 
@@ -50,11 +54,10 @@ THICKEST, WIDEST = 0.5, 1e3  # m: a section and a shell that are proposed
 class Bends(NamedTuple):
     """How rods bend, whatever their size.
 
-    Parameters
-    ----------
-    normal, geodesic : (k,) curvatures out of the shell, along its normal, and within it [1/m].
-    twist : (k,) twist per length [rad/m].
-    force : (k,) axial force over EI [1/m2].
+    Args:
+        normal, geodesic: (k,) curvatures out of the shell, along its normal, and within it [1/m].
+        twist: (k,) twist per length [rad/m].
+        force: (k,) axial force over EI [1/m2].
     """
 
     normal: Floats
@@ -71,15 +74,14 @@ class Bends(NamedTuple):
 class Fit:
     """What a rod that is not given has to fit.
 
-    Parameters
-    ----------
-    width : of the shell [m], by which the material is chosen.
-    slender : radius of a rod as slender as the paper's [m].
-    thickest : largest depth of a rod between its joints [m].
-    bends : called if they are needed.
-    thickest_of : what that depth is a share of, in words.
-    bends_from : where the bends are taken from, in words.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.bending`.
+    Args:
+        width: of the shell [m], by which the material is chosen.
+        slender: radius of a rod as slender as the paper's [m].
+        thickest: largest depth of a rod between its joints [m].
+        bends: called if they are needed.
+        thickest_of: what that depth is a share of, in words.
+        bends_from: where the bends are taken from, in words.
+        shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
     """
 
     width: float
@@ -94,25 +96,24 @@ class Fit:
     def on(
         cls,
         target: Target,
-        layout: GridLayout,
+        layout: Layout,
         *,
         anchor: tuple[float, float] | None = None,
         joint: Joint | None = None,
+        progress: Progress = silent,
     ) -> Self:
-        """By the net of a layout on its target.
+        """By the net of a layout on its target, which is marched when bends are first asked for.
 
-        Parameters
-        ----------
-        layout : of the rods on it.
-        anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
-        joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
+        Args:
+            anchor: x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+            joint: ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
         """
         slender = SLENDER * target.size
-        room = ROOM * min(layout.spacing)
+        room = ROOM * layout.least_spacing
 
         @cache  # a net costs more than all that is asked of it
         def bends() -> Bends:
-            found = bends_of(target, layout, anchor)
+            found = bends_of(target, layout, anchor, progress)
             return found if (joint or Ball()).holds_normals else found.rolled()
 
         fit = cls(2 * target.size, slender, 2 * slender, bends)
@@ -126,10 +127,9 @@ class Fit:
     def between(cls, lengths: Floats, ends: Floats) -> Self:
         """By rods whose ends come to lie at given points: each bends like a sine, as if it were joined to no other.
 
-        Parameters
-        ----------
-        lengths : (m,) of the rods [m].
-        ends : (m, 2, 3) where their ends come to lie [m].
+        Args:
+            lengths: (m,) of the rods [m].
+            ends: (m, 2, 3) where their ends come to lie [m].
         """
         chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         ring = float(lengths.max()) / np.pi  # of a rod whose ends meet
@@ -141,13 +141,7 @@ class Fit:
         return cls(width, slender, 2 * slender, lambda: bends, bends_from=alone)
 
     def by_pop_ups(self, shells: Iterable[PopUp], rod: Rod, *, shear_weight: float) -> Self:
-        """The same by the bends that shells of a provisional `rod` have in equilibrium.
-
-        Parameters
-        ----------
-        shells : popped up from flat rods that are all alike.
-        shear_weight : strength over shear strength of its material.
-        """
+        """The same by the bends that shells of a provisional `rod`, all flat rods alike, have in equilibrium."""
         bends = bends_of_pop_ups(shells, rod)
         return replace(self, bends=lambda: bends, bends_from="the bends of a pop-up", shear_weight=shear_weight)
 
@@ -175,14 +169,12 @@ class Fit:
         steps of 1, 1.5, 2, 3, 5, 7. Without a known strength the section is as slender as the paper's rods on its
         hemisphere, and with one no thicker than that.
 
-        Parameters
-        ----------
-        strength : permanent [Pa]; None: the preset's by its building code.
-        shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
+        Args:
+            strength: permanent [Pa]; None: the preset's by its building code.
+            shape: a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
 
-        Raises
-        ------
-        InputError : the tube's wall is too thick for what the bends allow.
+        Raises:
+            InputError: the tube's wall is too thick for what the bends allow.
         """
         strength = strength or permanent_strength(material)
         if strength is None:
@@ -208,17 +200,8 @@ class Fit:
         strength: float | None = None,
         shape: Circle | Tube | None = None,
     ) -> str:
-        """Why `section` was chosen, in words: by what, the share of the strength expected, and what keeps it thin.
-
-        Other parameters as for `section`, which chose it.
-
-        Parameters
-        ----------
-        section : the one that was chosen.
-        material : of the rods; a preset has its own strength and the sizes in which it is sold.
-        strength : permanent [Pa]; None: the preset's.
-        shape : a circle or a tube, if one was asked for.
-        """
+        """Why `section` was chosen, in words: by what, the share of the strength expected, and what keeps it thin. The
+        parameters are those of `section`, which chose it."""
         strength = strength or permanent_strength(material)
         if strength is None:
             return "as slender as the paper's rods, since no strength is known"
@@ -250,58 +233,76 @@ class Fit:
         return f"{said}the next step would be wider than {self.thickest_of}, {length_text(self.thickest)}"
 
 
-def require_likely_sizes(rod: Rod, width: float, spacing: float) -> None:
-    """Refuse sizes of which one was given in another unit than was meant.
+def require_likely_sizes(
+    width: float, spacing: float, section: Section | GivenSection | None = None, unit: float | None = None
+) -> None:
+    """Refuse sizes of which one was given in another unit than was meant. Only their ratios count.
 
-    Parameters
-    ----------
-    rod : with a section whose size is known; others are not judged.
-    width : of the shell [m].
-    spacing : the smallest between rods [m].
+    Args:
+        width: of the shell [m].
+        spacing: the smallest between rods [m].
+        section: one without a size is not judged.
+        unit: that the target's file was read in [m], if it was.
 
-    Raises
-    ------
-    InputError : the rods are as thick as the spacing or the shell, or far thinner than those of any shell.
+    Raises:
+        InputError: the rods are as thick as the spacing or the shell, or far thinner than those of any shell; the
+            spacing is wider than the shell.
     """
-    section = rod.section
-    depth = 2 * max(section.fibre_distances or (0.0,)) if isinstance(section, GivenSection) else section.depth
-    allowed = ""
+    depth = 0.0 if section is None else section.depth
+    shell, allowed = f"the shell of {length_text(width)}", ""
     if 0 < depth * limit(MOST_SLENDER) < width:
-        what = f"thin for the shell of {length_text(width)}, which is more than {limit(MOST_SLENDER):.0f} times as wide"
+        what = f"thin for {shell}, which is more than {limit(MOST_SLENDER):.0f} times as wide"
         allowed = f", {raised(MOST_SLENDER, width / depth)}"
     elif depth >= width:
-        what = f"as wide as the shell of {length_text(width)}"
+        what = f"as wide as {shell}"
+    elif spacing > width:
+        meant = _other_unit("spacing", spacing, width, unit, SPACED)
+        raise InputError(f"the spacing of {length_text(spacing)} is wider than {shell}: give a smaller one, or {meant}")
     elif depth >= spacing:
         what = f"as thick as the spacing of the rods, {length_text(spacing)}"
     else:
         return
-    raise InputError(f"the section of {length_text(depth)} is {what}: {_other_unit(depth, width)}{allowed}")
+    meant = _other_unit("section", depth, width, unit, USUAL)
+    raise InputError(f"the section of {length_text(depth)} is {what}: {meant}{allowed}")
 
 
-def _other_unit(depth: float, width: float) -> str:
-    """What to check, and sizes of section and shell [m] in another unit that would suit each other."""
-    for unit in UNITS:
-        factor = unit if width < USUAL[0] * depth else 1 / unit
-        pairs = ("a section", depth * factor, THICKEST), ("a shell", width / factor, WIDEST)
-        meant = [f"{what} of {length_text(length)}" for what, length, most in pairs if length <= most]
-        if USUAL[0] <= width / (depth * factor) <= USUAL[1] and meant:
-            return f"check its unit ({' or '.join(meant)} would be usual)"
-    return "check their units"
+def doubt_of_unit(width: float, section: Section | GivenSection | None, unit: float | None) -> str:
+    """What is said of a shell whose spacing follows its size, if no building is as wide, and no rod is like it. The
+    parameters are those of `require_likely_sizes`."""
+    depth = 0.0 if section is None else section.depth
+    if unit is None or depth * KNOWN < width < depth * limit(MOST_SLENDER):
+        return ""
+    meant = " or ".join(f"{length_text(wide)} in {name}" for name, wide in as_built(width, unit).items())
+    return meant and f" (if that is too {'small' if width < BUILT[0] else 'large'}, check its unit: {meant})"
 
 
-def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
+def _other_unit(name: str, size: float, width: float, unit: float | None, usual: tuple[float, float]) -> str:
+    """What to check, and sizes in another unit that would suit each other: the ratio of the width and a `size` [m] of
+    that `name` is one of the `usual` ones."""
+    meant = list[str]()
+    for other in UNITS:
+        factor = other if width < usual[0] * size else 1 / other
+        if not meant and usual[0] <= width / (size * factor) <= usual[1]:
+            meant += [f"a {name} of {length_text(size * factor)}"] * (size * factor <= THICKEST)
+            meant += [f"a shell of {length_text(width / factor)}"] * (unit is None and width / factor <= WIDEST)
+    for drawn_in, wide in ({} if unit is None else as_built(width, unit)).items():
+        if usual[0] <= wide / size <= usual[1]:
+            meant.append(f"a shell of {length_text(wide)}, drawn in {drawn_in},")
+    return f"check its unit ({' or '.join(meant)} would be usual)" if meant else "check their units"
+
+
+def bends_of(
+    target: Target, layout: Layout, anchor: tuple[float, float] | None = None, progress: Progress = silent
+) -> Bends:
     """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature.
 
-    No rod runs across a crease.
-
-    Parameters
-    ----------
-    layout : of the rods on it.
-    anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+    No rod runs across a crease. The axes cross at the `anchor`, see `Fit.on`.
     """
+    if isinstance(layout, SurfaceLattice):
+        return Bends(*surface_net(target, layout, anchor=anchor).curvatures)
     if not isinstance(target, Creased):
         try:
-            return net_bends(chebyshev_net(target, layout, anchor=anchor))
+            return net_bends(chebyshev_net(target, layout, anchor=anchor, progress=progress))
         except NetLimitError:  # it is cut by seams, or another anchor is looked for
             pass
     sharpest = np.atleast_1d(_sharpest_of(target))
@@ -324,12 +325,7 @@ def net_bends(net: ChebyshevNet) -> Bends:
 
 
 def bends_of_pop_ups(shells: Iterable[PopUp], rod: Rod) -> Bends:
-    """The bends at every node of every rod, at joints on the side that bends more.
-
-    Parameters
-    ----------
-    rod : section and material of every rod.
-    """
+    """The bends at every node of every rod, at joints on the side that bends more."""
     parts = list[Bends]()
     for popped in shells:
         bent = bending_of(popped.shell, popped.state, rod)
@@ -341,12 +337,7 @@ def bends_of_pop_ups(shells: Iterable[PopUp], rod: Rod) -> Bends:
 
 
 def largest_strain(rod: Rod, bends: Bends, *, shear_weight: float = VON_MISES) -> float:
-    """Largest strain of a section that bends like this, with stretch, and torsion by its stress [-].
-
-    Parameters
-    ----------
-    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
-    """
+    """Largest strain of a section that bends like this, with stretch, and torsion by its stress [-]."""
     assert rod.material is not None
     axial = bends.force * _bend_over_stretch(rod)
     stress = largest_stress(rod, bends.normal, bends.geodesic, axial, bends.twist, weight=shear_weight)

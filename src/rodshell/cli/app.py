@@ -65,23 +65,12 @@ class LazyGroup(click.Group):
             formatter.write_dl(list(COMMANDS.items()))
 
 
-def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
-    if wanted:
-        from rodshell.version import __version__
-
-        click.echo(f"rodshell {__version__}")
-        ctx.exit()
-
-
 @click.group(
     cls=LazyGroup,
     invoke_without_command=True,
     context_settings={"max_content_width": 110, "help_option_names": ["-h", "--help"]},
 )
-@click.option(
-    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
-    help="Print the version and exit.",
-)  # fmt: skip
+@click.version_option(package_name="rodshell", message="%(package)s %(version)s", help="Print the version and exit.")
 @click.pass_context
 def app(ctx: click.Context) -> None:
     """Form finding of elastic gridshells: a target surface goes in, a flat grid of rods comes out.

@@ -1,5 +1,6 @@
 """`rodshell check`: a case, or an earlier result, under loads."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +37,6 @@ def command(source: str, loads: str | None, **values: Any) -> int:
         raise InputError(
             f"{shown(source)} has no loads: give --loads FILE, or [[loads]] and [[combinations]] in the case"
         )
-    from rodshell.results.archive import kept_case, read_inputs
-
-    names = kept_case(case.to_toml(), read_inputs(case.to_toml()), Path())[1]
     if path.is_dir() and output.out is None:
-        output = output.into(source)
-    return run_and_deliver(case, source, output, ["case.toml", *names], formed_before=path.is_dir())
+        output = replace(output, out=source)
+    return run_and_deliver(case, source, output, formed_before=path.is_dir())

@@ -9,7 +9,7 @@ from rodshell.cli.reporting import Progress
 from rodshell.validation import file_path
 
 
-def print_schema(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+def _print_schema(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
     """--schema: print the JSON Schema and exit, as --help does."""
     if wanted:
         from rodshell.results.results import json_schema
@@ -25,7 +25,7 @@ SCHEMA = "Print the JSON Schema of result.json and exit."
 @click.argument("folder", metavar="DIR")
 @click.option("--only", metavar="KINDS", help="Kinds of files, such as dxf,csv; default: all but 3dm.")
 @click.option("--out", "-o", metavar="DIR", help="Folder to write to; default: the result itself.")
-@click.option("--schema", is_flag=True, is_eager=True, expose_value=False, callback=print_schema, help=SCHEMA)
+@click.option("--schema", is_flag=True, is_eager=True, expose_value=False, callback=_print_schema, help=SCHEMA)
 @FORCE
 @QUIET
 def command(folder: str, only: str | None, out: str | None, force: bool, quiet: bool) -> int:

@@ -5,16 +5,16 @@ import signal
 import sys
 import threading
 from contextlib import suppress
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Self
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 PATIENCE = 3  # signals after which the process ends without cleaning up
 
 
 def end_at_once() -> None:
     """Let signals end the process silently except for one line, as long as there is nothing to clean up."""
-    for number in SIGNALS:
+    for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell's background jobs ignore Ctrl-C
             signal.signal(number, _end)
 
@@ -47,14 +47,12 @@ class Interruption:
     def __enter__(self) -> Self:
         Interruption.current = self
         if threading.current_thread() is threading.main_thread():
-            wanted = [number for number in SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
+            wanted = [number for number in _SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
             self._before = {number: signal.signal(number, self._handle) for number in wanted}
         sys.unraisablehook = self._unraisable
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         Interruption.current = None
         sys.unraisablehook = self._hook
         for number, handler in self._before.items():

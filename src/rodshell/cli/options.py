@@ -1,7 +1,7 @@
 """Options of the commands: keys of the case file, and those that several commands have."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
@@ -10,8 +10,10 @@ from typing import Any
 import click
 
 from rodshell.case import CaseKey, case_keys, load_case
-from rodshell.case.keys import BY_KIND
+from rodshell.case.keys import BY_KIND, keys_of_kinds
 from rodshell.errors import InputError
+from rodshell.quantities import Duration
+from rodshell.schema import value_of, written
 
 ALIASES = {
     "target.radius": "--radius",
@@ -81,27 +83,19 @@ def _exists(option: click.Option, arguments: tuple[str, ...]) -> bool:
     """Whether the case that a command line names has the key of an option, so that it may be proposed."""
     if not isinstance(option, CaseOption) or not option.key.kinds:
         return True
-    kinds = _kinds_of(arguments)
-    return kinds is None or kinds[option.key.table] in option.key.kinds
+    known = _keys_with(arguments)
+    return known is None or option.key.path in known
 
 
 @cache
-def _kinds_of(arguments: tuple[str, ...]) -> dict[str, str] | None:
-    """The kinds of the tables that have several, in the case that a command line names; None where there is none."""
+def _keys_with(arguments: tuple[str, ...]) -> Mapping[str, CaseKey] | None:
+    """The keys that the case has which a command line names; None where there is none."""
     given = dict(pairwise(arguments))
     overrides = {f"{table}.kind": kind for table in BY_KIND if (kind := given.get(f"--{table}.kind"))}
     try:
-        case = load_case(arguments[0], overrides)
+        return keys_of_kinds(written(load_case(arguments[0], overrides)))
     except InputError:
         return None
-    section = getattr(case.bracing, "section", None)
-    return {
-        "target": case.target.kind,
-        "rod.section": case.rod.section.kind,
-        "joint": case.joint.kind,
-        "bracing": case.bracing.kind,
-        "bracing.section": BY_KIND["bracing.section"] if section is None else section.kind,
-    }
 
 
 def case_options(*tables: str) -> list[click.Parameter]:
@@ -118,10 +112,9 @@ def overrides_of(values: Mapping[str, str | None]) -> dict[str, object]:
 class RunOptions:
     """Options of the commands that run a job, of their output.
 
-    Parameters
-    ----------
-    kinds : of files in addition to the archive; None: all that every installation can.
-    limit : longest time for all but the files [s].
+    Args:
+        kinds: of files in addition to the archive; None: all that every installation can.
+        limit: longest time for all but the files [s].
     """
 
     out: str | None
@@ -130,10 +123,6 @@ class RunOptions:
     force: bool
     as_json: bool
     quiet: bool
-
-    def into(self, folder: str) -> "RunOptions":
-        """The same with another folder for the results."""
-        return replace(self, out=folder)
 
 
 FORCE = click.option(
@@ -148,21 +137,18 @@ ADDRESS = click.option(
     "answers there can run any program here.",
 )
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
-TIME_LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kinds of files that are not are named.'
+_ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
+_LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kinds of files that are not are named.'
 
 
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The options of `RunOptions`; read them with `read_output_options`.
-
-    out : help of --out.
-    """
+    """The options of `RunOptions`, with the help of --out; read them with `read_output_options`."""
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         options = (
             click.option("--out", "-o", metavar="DIR", help=out),
-            click.option("--only", metavar="KINDS", help=ONLY),
-            click.option("--time-limit", metavar="TIME", help=TIME_LIMIT),
+            click.option("--only", metavar="KINDS", help=_ONLY),
+            click.option("--time-limit", metavar="TIME", help=_LIMIT),
             FORCE,
             click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs."),
             QUIET,
@@ -177,9 +163,8 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
 def read_output_options(values: dict[str, Any]) -> RunOptions:
     """Take these options out of the `values` of a command.
 
-    Raises
-    ------
-    InputError : there is no such kind of file; the time limit is not a time, or not a positive one.
+    Raises:
+        InputError: there is no such kind of file; the time limit is not a time, or not a positive one.
     """
     kinds = wanted_kinds(values.pop("only"))
     limit = seconds_of(values.pop("time_limit"))
@@ -189,29 +174,14 @@ def read_output_options(values: dict[str, Any]) -> RunOptions:
 
 
 def wanted_kinds(only: str | None) -> list[str] | None:
-    """The kinds of files that --only names.
-
-    Raises
-    ------
-    InputError : there is no such kind.
-    """
+    """The kinds of files that --only names; InputError where there is no such kind."""
     if only is None:
         return None
-    from rodshell.output.files import read_kinds
+    from rodshell.output import files
 
-    return read_kinds(only)
+    return files.wanted_kinds(only)
 
 
 def seconds_of(given: str | None) -> float | None:
-    """What --time-limit gives [s].
-
-    Raises
-    ------
-    InputError : it is not a time, or not a positive one.
-    """
-    from rodshell.units import parse_quantity
-
-    seconds = None if given is None else parse_quantity(given, "time", "--time-limit")
-    if seconds is not None and seconds <= 0:
-        raise InputError(f'--time-limit = "{given}": must be larger than zero')
-    return seconds
+    """What --time-limit gives [s]; InputError unless it is a positive time."""
+    return None if given is None else float(value_of(Duration, "--time-limit", given))

@@ -1,9 +1,7 @@
 """`rodshell paper`: the paper's figures, made again with their errors."""
 
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,9 +9,6 @@ from rodshell.cli.options import FORCE, QUIET
 from rodshell.cli.reporting import Progress, compile_before_first, deliver, output_folder
 from rodshell.errors import InputError
 from rodshell.paper import FIGURES, figure_maker, reserved
-
-if TYPE_CHECKING:
-    from rodshell.results.folder import ResultFolder
 
 
 @click.command(epilog="Figures: " + "; ".join(f"{name}: {what}" for name, what in FIGURES.items()))
@@ -49,10 +44,5 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
         for name, place in zip(names, result_folders, strict=True):  # each is written as soon as it is made
             with Progress(quiet=quiet) as progress:
                 made = figure_maker(name)(progress, **given)
-            saved = partial(_save, made)
-            codes.append(deliver(made, saved, place, progress=progress, as_json=as_json, quiet=quiet))
+            codes.append(deliver(made, place, progress=progress, as_json=as_json, quiet=quiet))
     return max(codes)
-
-
-def _save(made: Any, place: "ResultFolder", _: Progress) -> None:
-    made.save(place)

@@ -5,14 +5,13 @@ from typing import Any
 
 import click
 
+from rodshell.case.load import TABLES_OF_RODS
 from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
 from rodshell.cli.reporting import run_and_deliver
 from rodshell.errors import InputError
 
-TABLES = ("rod", "joint", "checks", "fabrication", "drawings")  # of the case that a table of rods has
 
-
-@click.command(cls=CaseCommand, params=case_options(*TABLES))
+@click.command(cls=CaseCommand, params=case_options(*TABLES_OF_RODS))
 @click.argument("source", metavar="RODS.csv|DIR")
 @click.option(
     "--unit", metavar="UNIT", help="Unit of the table's coordinates: m, mm, in, ...; columns that end in _mm need none."
@@ -34,4 +33,4 @@ def command(source: str, unit: str | None, **values: Any) -> int:
     name = f"{path.resolve().stem}-popup"
     if Path(output.out or Path("out") / name).resolve() == path.resolve():
         raise InputError(f"--out {path.resolve()} is the result that is read: give another folder")
-    return run_and_deliver(job.case, name, output, [])
+    return run_and_deliver(job.case, name, output)

@@ -2,18 +2,16 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from rodshell.case import load_case
-from rodshell.cli.form import run_case
+from rodshell.case import Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
+from rodshell.cli.reporting import run_and_deliver
 from rodshell.errors import InputError
+from rodshell.rods.supports import SUPPORTS
 from rodshell.validation import choice
-
-if TYPE_CHECKING:
-    from rodshell.case import Case
 
 LATER = ("pop_up", "refine", "checks", "fabrication", "drawings")  # tables that leave the shell before it as it is
 VARY = "taper"  # where neither the command nor the case says
@@ -50,19 +48,19 @@ def command(name: str, ends: str | None, **values: Any) -> int:
     else:
         stem = path.stem
     if ends is not None:
-        overrides |= {"pop_up.ends": choice("--ends", ends, ("pinned", "clamped"))}
+        overrides |= {"pop_up.ends": choice("--ends", ends, tuple(SUPPORTS))}
     case = load_case(name, overrides)
     if path.is_dir() and case.refine.start is None and all(key.partition(".")[0] in LATER for key in overrides):
         overrides |= _design(path, case)
-    only = ends or case.refine.ends or (case.ends or ("pinned",))[0]
+    only = ends or case.refine.ends or (case.ends or tuple(SUPPORTS))[0]
     vary = case.refine.vary or VARY
-    return run_case(
+    return run_and_deliver(
         load_case(name, overrides | {"refine.vary": vary, "refine.ends": only, "pop_up.ends": only}),
         f"{stem}-refined", output,
     )  # fmt: skip
 
 
-def _design(folder: Path, case: "Case") -> dict[str, object]:
+def _design(folder: Path, case: Case) -> dict[str, object]:
     """The design of an earlier result that was refined by the same keys, to continue from; else nothing."""
     from rodshell.results.archive import read
 

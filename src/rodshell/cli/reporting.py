@@ -3,30 +3,30 @@
 import json
 import os
 import shutil
-import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from glob import escape
 from itertools import count
 from pathlib import Path
 from shlex import quote
 from time import monotonic
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import click
 
+from rodshell.case import Case
 from rodshell.cli.interruption import Interruption
+from rodshell.cli.options import RunOptions
 from rodshell.errors import InputError
 from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
-from rodshell.printed import Printed, say
-from rodshell.progress import limited
+from rodshell.printed import say
+from rodshell.progress import Bar, limited, where
+from rodshell.progress import Progress as ProgressFunction
 
 if TYPE_CHECKING:
-    from rodshell.case import Case
-    from rodshell.cli.options import RunOptions
     from rodshell.form import Form
     from rodshell.results import Archive
     from rodshell.results.folder import ResultFolder
@@ -35,65 +35,59 @@ UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one
 SILENCE = 10.0  # s: the longest without a word, away from a terminal
 TICK = 0.5  # s, on a terminal
 BAR = 24  # characters
+SEARCH = "search.svg"
 FOUND, BAD_INPUT, NOT_CONVERGED, UNBUILDABLE = 0, 2, 3, 4
 
 
-class Progress:
+class Progress(Bar):
     """Says where a job is: stage, iteration, share, residual, elapsed time.
 
     On a terminal that is one live line; else one short line for each stage, and a long one after each `SILENCE`.
     Called as progress(stage, detail, residual) at each iteration; use it in a `with`, or in several in turn.
 
-    Raises
-    ------
-    KeyboardInterrupt : the job was interrupted, and the interrupt was lost.
+    Raises:
+        KeyboardInterrupt: the job was interrupted, and the interrupt was lost.
     """
 
     def __init__(self, *, quiet: bool = False) -> None:
+        super().__init__()
         self._quiet = quiet
         self._begun = self._spoken = monotonic()
-        self._stage = self._where = "preparing"
-        self._live: Printed | None = None
+        self._said = self._where = "preparing"
         self._over = threading.Event()
         self._voice: threading.Thread | None = None
 
     def __enter__(self) -> Self:
         if self._quiet:
             return self
-        stream = Printed.of(sys.stderr)
-        self._live = stream if stream.isatty() else None
+        super().__enter__()
         self._over.clear()
         self._voice = threading.Thread(target=self._speak, args=(TICK if self._live else SILENCE / 10,), daemon=True)
         self._voice.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._over.set()
         if self._voice is not None:
             self._voice.join()
             self._voice = None
-        if self._live is not None:
-            self._live.live("")
-            self._live = None
+        super().__exit__(*error)
 
     def __call__(self, stage: str, detail: str, residual: float) -> None:
         Interruption.check()
-        reached = f", residual {residual:.1e}" if residual else ""
-        self._where = f"{stage}: {detail}{reached}"
-        if stage != self._stage and not self._quiet and self._live is None:
+        self._where = where(stage, detail, residual)
+        if stage != self._said and not self._quiet and self._live is None:
             self._say(stage)
-        self._stage = stage
+        self._said = stage
 
     def _speak(self, every: float) -> None:
         """Say where the job is, however long it has not called."""
         while not self._over.wait(every):
-            where = f"{self._where}, {monotonic() - self._begun:.0f} s"
+            line = f"{self._where}, {monotonic() - self._begun:.0f} s"
             if self._live is not None:
-                self._live.live(where)
+                self._live.live(line)
             elif monotonic() - self._spoken >= SILENCE:
-                self._say(where)
+                self._say(line)
 
     def _say(self, words: str) -> None:
         self._spoken = monotonic()
@@ -103,13 +97,11 @@ class Progress:
 def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
     """Compile the kernels that were not compiled with the wheel or by an earlier run; how many they were.
 
-    Parameters
-    ----------
-    every : those of joints, meshes and dynamics too, which otherwise are compiled when a job calls them.
+    Args:
+        every: those of joints, meshes and dynamics too, which otherwise are compiled when a job calls them.
 
-    Raises
-    ------
-    KeyboardInterrupt : interrupted; what was compiled until then is kept.
+    Raises:
+        KeyboardInterrupt: interrupted; what was compiled until then is kept.
     """
     if COMPILED is not None or os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return 0
@@ -142,17 +134,27 @@ class Result(Protocol):
         """What result.json holds."""
         ...
 
+    def save(self, folder: "ResultFolder") -> object: ...
+
 
 @dataclass(frozen=True)
 class Kept:
-    """An archive as a result; `kinds` of files are written with it (None: all), and `more` by name. `offer` says what a
-    refinement would gain, `refused` why its loads could not be checked."""
+    """An archive as a result.
+
+    Args:
+        kinds: of files that are written with it; None: all.
+        more: files by name.
+        progress: while it is written.
+        offer: what a refinement would gain.
+        refused: why its loads could not be checked.
+    """
 
     archive: "Archive"
-    kinds: list[str] | None = None
-    more: dict[str, str] = field(default_factory=dict)
-    offer: str = ""
-    refused: str = ""
+    kinds: list[str] | None
+    more: dict[str, str]
+    progress: ProgressFunction
+    offer: str
+    refused: str
 
     @property
     def status(self) -> str:
@@ -165,33 +167,24 @@ class Kept:
     def result(self) -> dict[str, Any]:
         return self.archive.results.plain()
 
-    def save(self, folder: "ResultFolder", progress: Callable[[str, str, float], None]) -> Path:
+    def save(self, folder: "ResultFolder") -> Path:
         from rodshell.output.files import save
 
-        return save(self.archive, folder, self.kinds, more=self.more, progress=progress)
+        return save(self.archive, folder, self.kinds, more=self.more, progress=self.progress)
 
 
-def run_and_deliver(
-    case: "Case",
-    name: str,
-    output: "RunOptions",
-    names: Iterable[str],
-    *,
-    pictures: "Callable[[Form], dict[str, str]]" = lambda form: {},
-    formed_before: bool = False,
-) -> int:
+def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before: bool = False) -> int:
     """Run the job of a case and write its form; the exit code.
 
-    Parameters
-    ----------
-    names : patterns of the files that are written in addition to result.json, states.npz and those of the kinds.
-    pictures : more files of the form, by name.
-    formed_before : the form is on disk already; where its loads cannot be checked it is not written again.
+    Args:
+        name: of the case, by which its folder is called.
+        output: where and what to write.
+        formed_before: the form is on disk already; where its loads cannot be checked it is not written again.
     """
     from rodshell.output.files import reserved
 
-    reserved_names = ["result.json", "states.npz", *names, *reserved(output.kinds)]
-    with output_folder(output.out, name, reserved_names, force=output.force) as place:
+    names = ["result.json", "states.npz", *_names_of(case), *reserved(output.kinds)]
+    with output_folder(output.out, name, names, force=output.force) as place:
         compile_before_first(quiet=output.quiet)
         from rodshell.job import Job
 
@@ -206,18 +199,33 @@ def run_and_deliver(
         if form.search is not None and not (output.quiet or output.as_json):
             click.echo(form.search.table())
         offer = "" if output.quiet or output.as_json else _offer(form, progress, in_time)
-        kept = Kept(archive, output.kinds, pictures(form), offer, refused)
-        return deliver(
-            kept,
-            lambda where, _: kept.save(where, in_time),
-            place,
-            progress=progress,
-            as_json=output.as_json,
-            quiet=output.quiet,
-        )
+        kept = Kept(archive, output.kinds, _pictures(form), in_time, offer, refused)
+        return deliver(kept, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
 
 
-def _offer(form: "Form", progress: Progress, in_time: Callable[[str, str, float], None]) -> str:
+def _names_of(case: Case) -> list[str]:
+    """Patterns of the files that are written of a case: itself with its files, a picture, what a fall streams."""
+    if case.of_table:
+        return []
+    from rodshell.results.archive import kept_case, read_inputs
+    from rodshell.solve.simulate import NAMES
+
+    copies = kept_case(case.to_toml(), read_inputs(case.to_toml()), Path())[1]
+    frames = [f"{escape(case.drape.frames)}/{name}.npy" for name in NAMES] if case.drape.frames else []
+    return ["case.toml", *copies, *([SEARCH] if case.undecided else []), *frames]
+
+
+def _pictures(form: "Form") -> dict[str, str]:
+    """The picture of the search, if there was one."""
+    if form.search is None:
+        return {}
+    from rodshell.output.colour_scale import search_svg
+
+    title = f"{form.search.title} by anchor and heading"
+    return {SEARCH: search_svg(title, form.search.trials, form.search.best)}
+
+
+def _offer(form: "Form", progress: Progress, in_time: ProgressFunction) -> str:
     """What double laths would gain, of a form that is not refined, unless the case switches it off."""
     if form.case.refine.offer == "off" or form.refined is not None or form.from_table:
         return ""
@@ -231,34 +239,24 @@ def _offer(form: "Form", progress: Progress, in_time: Callable[[str, str, float]
 def output_folder(
     out: str | None, name: str, names: Iterable[str], *, force: bool
 ) -> "AbstractContextManager[ResultFolder]":
-    """The folder for a result, by default out/NAME; opened before the job starts.
+    """The folder for a result, by default out/NAME; opened before the job starts, see `open_folder`.
 
-    names : patterns of what will be written there.
-
-    Raises
-    ------
-    OutputError : it cannot be written, or holds files of these names that rodshell did not write.
+    Args:
+        names: patterns of what will be written there.
     """
     from rodshell.results.folder import open_folder
 
     return open_folder(out or Path("out") / Path(name).stem, reserved=names, force=force)
 
 
-def deliver(
-    result: Result,
-    save: "Callable[[ResultFolder, Progress], object]",
-    place: "ResultFolder",
-    *,
-    progress: Progress,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+def deliver(result: Result, place: "ResultFolder", *, progress: Progress, as_json: bool, quiet: bool) -> int:
     """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
+    from rodshell.results.results import LEVELS
     from rodshell.results.wording import CASE, FORM, FORM_AGAIN
 
     Interruption.check()
     with progress:
-        folder = _saved(lambda where: save(where, progress), place)
+        folder = _saved(result, place)
     again = f"{FORM} {quote(str(folder / CASE))}"
     if as_json:
         click.echo(json.dumps({"out": str(folder), **result.result()}))
@@ -274,18 +272,20 @@ def deliver(
         say(f"{said}; partial results are in {folder}")
         return NOT_CONVERGED
     verdict = result.result().get("verdict")
-    if verdict and verdict["level"] == "unbuildable":
-        say(f"NOT BUILDABLE: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
-        return UNBUILDABLE
+    codes = {"unbuildable": UNBUILDABLE} | ({"unknown": NOT_CONVERGED} if result.result().get("pop_up") else {})
+    if verdict and (level := verdict["level"]) in codes:
+        named = LEVELS[level].upper()
+        say(f"{named}: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
+        return codes[level]
     return FOUND
 
 
-def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> Path:
+def _saved(result: Result, place: "ResultFolder") -> Path:
     """Where a result was saved: next to its place, if somebody put files there while the job ran."""
     from rodshell.results.folder import ForeignFileError, open_folder
 
     try:
-        save(place)
+        result.save(place)
         for name in place.kept:
             say(f"kept {place.path / name}: it was changed since an earlier run wrote it")
         return place.path

@@ -1,19 +1,26 @@
 """`rodshell studio`: the live page, served from this machine."""
 
+import secrets
+import socket
+import threading
+import webbrowser
 from pathlib import Path
 
 import click
 
+from rodshell.case.link import LARGEST
+from rodshell.cli.options import seconds_of
 from rodshell.errors import InputError
+from rodshell.untrusted import limit
 
-HOST = "Address to listen on."
+_HOST = "Address to listen on."
 NO_TOKEN = "Let in all users of this machine, also without the token in the printed address."
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 @click.command()
 @click.argument("name", metavar="[CASE|SURFACE]", default="pavilion")
-@click.option("--host", default="127.0.0.1", show_default=True, help=HOST)
+@click.option("--host", default="127.0.0.1", show_default=True, help=_HOST)
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=8731, show_default=True, help="Port to listen on; 0: any free one."
 )
@@ -35,17 +42,9 @@ def command(
         from rodshell.studio.server import Settings, studio_app
     except ImportError:
         raise InputError('the studio needs starlette and uvicorn: pip install "rodshell[studio]"') from None
-    import secrets
-    import socket
-    import threading
-    import webbrowser
-
-    from rodshell.case.link import LARGEST
-    from rodshell.cli.options import seconds_of
     from rodshell.studio.start import first_case, own_folder, sessions_folder
-    from rodshell.untrusted import limit
 
-    loopback = host in LOOPBACK
+    loopback = host in _LOOPBACK
     if no_token and not loopback:
         raise InputError(f"--no-token: other machines reach --host {host}: leave one of the two out")
     case, contents = first_case(name)

@@ -27,7 +27,7 @@ from rodshell.targets import Target
 from rodshell.validation import brief, choice, instance, not_negative
 
 ROUND_OFF = 1e-10  # of the target's size: a node is below the surface only from this depth on
-SUPPORTED = 1e-6  # cosine between normal and free directions below which a node's supports hold it along the normal
+_SUPPORTED = 1e-6  # cosine between normal and free directions below which a node's supports hold it along the normal
 
 Stopped = Literal["all", "normal"]
 
@@ -39,13 +39,12 @@ class Touching:
     The blocked directions stay among the unknowns (see `Freedom`), so that nodes may come and go from step to step
     while the pattern of the matrix stays the same.
 
-    Parameters
-    ----------
-    supports : the shell's supports, a constraint.
-    free : the free directions that they leave.
-    nodes : (k,) nodes that touch.
-    points, normals : (k, 3) a point of each node's plane [m], and its unit normal.
-    stuck : (k,) bool; nodes that friction holds at their position in the plane.
+    Args:
+        supports: the shell's supports, a constraint.
+        free: the free directions that they leave.
+        nodes: (k,) nodes that touch.
+        points, normals: (k, 3) a point of each node's plane [m], and its unit normal.
+        stuck: (k,) bool; nodes that friction holds at their position in the plane.
     """
 
     supports: Any  # a solver's `Constraint`; its type is defined in a package that imports this one
@@ -59,13 +58,7 @@ class Touching:
 
     @staticmethod
     def none(supports: Any, state: Floats) -> "Touching":
-        """The constraint where nothing touches.
-
-        Parameters
-        ----------
-        supports : the shell's supports, a constraint.
-        state : (N, 3) [m].
-        """
+        """The constraint where nothing touches, as at the start of each step, whatever touched in the one before."""
         nowhere, no_nodes = np.empty((0, 3)), np.empty(0, dtype=np.intp)
         return Touching(supports, supports.freedom(state), no_nodes, nowhere, nowhere, np.empty(0, dtype=bool))
 
@@ -103,13 +96,8 @@ class Touching:
         return Freedom(directions, self.free.count), along, cosine
 
     def free_share(self, nodes: Ints, normals: Floats) -> Floats:
-        """(k,) cosines between the normals (k, 3) of `nodes` (k,) and the directions that their supports leave free.
-
-        Parameters
-        ----------
-        nodes : (k,) blocks.
-        normals : (k, 3) unit vectors.
-        """
+        """(k,) cosines between the unit normals (k, 3) of `nodes` (k,) and the directions that their supports leave
+        free."""
         along = np.einsum("kcx,kx->kc", self.free.directions[nodes], normals)
         along[np.arange(3) >= self.free.count[nodes][:, None]] = 0.0
         return np.asarray(np.sqrt(dot(along, along)))
@@ -119,18 +107,16 @@ class Touching:
 class ModifiedMass:
     """Contact with a target during a motion [HQK 3.1].
 
-    Parameters
-    ----------
-    target : its body, closed by the wall below its rim.
-    nodes : (k,) blocks that may touch it.
-    stopped : which part of a touching node's velocity an inelastic impact removes: "all" of it [HQK 3.1], or the
-        "normal" part. The first acts on sliding nodes as a drag m/h, which depends on the time step.
-    friction : Coulomb's coefficient [-], by which touching nodes stick or slip; with friction only the normal part of
-        the velocity is removed.
+    Args:
+        target: its body, closed by the wall below its rim.
+        nodes: (k,) blocks that may touch it.
+        stopped: which part of a touching node's velocity an inelastic impact removes: "all" of it [HQK 3.1], or the
+            "normal" part. The first acts on sliding nodes as a drag m/h, which depends on the time step.
+        friction: Coulomb's coefficient [-], by which touching nodes stick or slip; with friction only the normal part
+            of the velocity is removed.
 
-    Raises
-    ------
-    InputError : the coefficient is negative or not finite; `stopped` is neither "all" nor "normal".
+    Raises:
+        InputError: the coefficient is negative or not finite; `stopped` is neither "all" nor "normal".
     """
 
     target: Target
@@ -150,26 +136,12 @@ class ModifiedMass:
         """Whether touching nodes lose their velocity along the surface, too."""
         return self.stopped == "all" and not self.friction
 
-    def touching(self, supports: Any, state: Floats) -> Touching:
-        """The constraint at the start of a step: nothing touches, whatever touched in the step before.
-
-        Parameters
-        ----------
-        supports : the shell's supports, a constraint.
-        state : (N, 3) [m].
-        """
-        return Touching.none(supports, state)
-
     def below(self, state: Floats, touching: Touching) -> Touching | None:
-        """The constraint with all nodes that are newly below the surface at `state`; None if there are none [HQK Eq 8].
+        """The constraint of a step so far with all nodes that are newly below the surface at `state`, the step's end;
+        None if there are none [HQK Eq 8].
 
         Nodes that touch already are not tested again: above a concave surface a node on its plane is below it by an
         amount quadratic in its slide, and elsewhere by round-off (ERRATA to Algorithm 1, which could loop on them).
-
-        Parameters
-        ----------
-        state : (N, 3) at the end of the step [m].
-        touching : the constraint of the step so far.
         """
         outside = np.ones(len(state), dtype=bool)
         outside[self.nodes] = self.target.outside(state[self.nodes])
@@ -177,7 +149,7 @@ class ModifiedMass:
         open_nodes = np.flatnonzero(~outside)
         gap = self.target.contact(state[open_nodes])
         new = gap.distance < -ROUND_OFF * self.target.size
-        new &= touching.free_share(open_nodes, gap.normal) > SUPPORTED
+        new &= touching.free_share(open_nodes, gap.normal) > _SUPPORTED
         if not new.any():
             return None
         points = state[open_nodes] - gap.distance[:, None] * gap.normal
@@ -194,14 +166,13 @@ class ModifiedMass:
     def released(self, touching: Touching, reactions: Floats) -> tuple[Touching, Floats] | None:
         """The constraint without the nodes that friction cannot hold; None where it holds all.
 
-        Parameters
-        ----------
-        reactions : (N, 3) of all supports [N]; that of a stuck node must lie in the friction cone,
-            |tangential| <= friction * normal.
+        Args:
+            reactions: (N, 3) of all supports [N]; that of a stuck node must lie in the friction cone,
+                |tangential| <= friction * normal.
 
-        Returns
-        -------
-        The constraint, and the friction force (N, 3) [N] on the released nodes while they slip, against their motion.
+        Returns:
+            The constraint, and the friction force (N, 3) [N] on the released nodes while they slip, against their
+            motion.
         """
         if not touching.stuck.any():
             return None
@@ -217,13 +188,7 @@ class ModifiedMass:
         return replace(touching, stuck=touching.stuck & ~slips), rubbing
 
     def landed(self, velocity: Floats, touching: Touching) -> Floats:
-        """(N, 3) the velocity after the inelastic impact.
-
-        Parameters
-        ----------
-        velocity : (N, 3) before the impact [m/s].
-        touching : the nodes that touch, with their normals.
-        """
+        """(N, 3) the velocity after the inelastic impact of the nodes that touch [m/s]."""
         result, nodes = velocity.copy(), touching.nodes
         if self.stops_all:
             result[nodes] = 0.0
@@ -232,7 +197,7 @@ class ModifiedMass:
         return result
 
 
-@njit(error_model="numpy")
+@njit("f3 i1 i1 b1 f2 f1")
 def _turn(directions, count, nodes, stuck, along, cosine):  # type: ignore[no-untyped-def]
     """Reflect the directions of each node so that the last is the free part of the normal `along`; it becomes zero."""
     part, mirror = np.empty(3), np.empty(3)

@@ -2,14 +2,13 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.kernels import njit
 from rodshell.model import Freedom
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.targets import Target
 from rodshell.targets.target import shape_operators
 from rodshell.validation import brief
@@ -19,11 +18,10 @@ from rodshell.validation import brief
 class BoundToTarget:
     """Every node on the surface, where it slides in its two tangent directions, or fewer; a constraint with curvature.
 
-    Parameters
-    ----------
-    target : the surface, continued past its end.
-    count : (n,) free directions of each node: 2 in the tangent plane; 1 along `guides`; 0 held.
-    guides : (n, 3) direction that a node with one free direction follows (its part in the tangent plane).
+    Args:
+        target: the surface, continued past its end.
+        count: (n,) free directions of each node: 2 in the tangent plane; 1 along `guides`; 0 held.
+        guides: (n, 3) direction that a node with one free direction follows (its part in the tangent plane).
     """
 
     target: Target
@@ -45,13 +43,7 @@ class BoundToTarget:
         return self._latest[0][1]
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
-        """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N].
-
-        Parameters
-        ----------
-        state : (n, 3) nodes [m].
-        gradient : (n, 3) of the energy there [N].
-        """
+        """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N]."""
         _, slope, hessian = self.target.implicit(state)
         normal, curvature = np.empty_like(slope), np.empty_like(hessian)
         shape_operators(slope, hessian, -gradient, normal, curvature)
@@ -67,17 +59,16 @@ class BoundToTarget:
 
 
 @dataclass(frozen=True, eq=False)
-class UnilateralContact:
+class UnilateralContact(WithoutFrames):
     """Unilateral, frictionless contact as an energy: the augmented Lagrangian of gap >= 0 at every node.
 
     E = (max(0, p - k gap)^2 - p^2) / 2k for each node; its force is max(0, p - k gap) along the normal.
 
-    Parameters
-    ----------
-    target : its body, closed by the wall below its rim.
-    blocks : (m, 1) nodes.
-    stiffness : (m,) k [N/m].
-    multipliers : (m,) p [N]: the contact force at the solution, updated by the caller.
+    Args:
+        target: its body, closed by the wall below its rim.
+        blocks: (m, 1) nodes.
+        stiffness: (m,) k [N/m].
+        multipliers: (m,) p [N]: the contact force at the solution, updated by the caller.
     """
 
     target: Target
@@ -88,12 +79,7 @@ class UnilateralContact:
     __repr__ = brief
 
     def forces(self, state: Floats) -> Floats:
-        """(m,) contact forces [N] at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) [m].
-        """
+        """(m,) contact forces [N] at `state` (N, 3)."""
         gap = self.target.contact(state[self.blocks[:, 0]]).distance
         return np.maximum(0.0, self.multipliers - self.stiffness * gap)
 
@@ -112,12 +98,8 @@ class UnilateralContact:
             hessians[:] = push * gap.normal[:, :, None] * gap.normal[:, None, :] - force[:, None, None] * gap.hessian
         return float(np.sum((force**2 - self.multipliers**2) / (2 * self.stiffness)))
 
-    def refreshed(self, state: Floats) -> Self:
-        """The contact itself: there are no source frames."""
-        return self
 
-
-@njit(error_model="numpy")
+@njit("f2 f2")
 def _tangents(steepest, guides):  # type: ignore[no-untyped-def]
     """(n, 3, 3) two directions across `steepest` (n, 3), the first nearest to `guides` (n, 3); the third is zero."""
     directions = np.empty((len(steepest), 3, 3))

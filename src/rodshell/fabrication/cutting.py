@@ -10,7 +10,7 @@ from rodshell.arrays import Floats
 from rodshell.figures.fabrication import Bar, Piece, Stock
 
 TINY = 1e-9  # of a bar: round-off
-Route = tuple[int, int, float, int]  # to a stop: pieces so far, short ones of them, worst bend, the stop before
+Route = tuple[int, int, float, tuple[float, ...]]  # to a stop: pieces, short ones of them, worst bend, stops before it
 
 
 def splices(
@@ -22,14 +22,13 @@ def splices(
     A splice lies halfway between two neighbouring joints. The choice has the fewest pieces; among such choices the
     fewest `short` pieces; among those the least bend at its most bent splice.
 
-    Parameters
-    ----------
-    length : of the rod as cut [m], over which all distances are measured.
-    joints : distances of the joints from the start [m].
-    stock : longest piece [m].
-    short : pieces under this length are avoided [m].
-    stations, curvature : the rod's bend [1/m] at some ascending distances from the start [m].
-    taken : splices of other laths of the rod; none is made between the same joints [m from the start].
+    Args:
+        length: of the rod as cut [m], over which all distances are measured.
+        joints: distances of the joints from the start [m].
+        stock: longest piece [m].
+        short: pieces under this length are avoided [m].
+        stations, curvature: the rod's bend [1/m] at some ascending distances from the start [m].
+        taken: splices of other laths of the rod; none is made between the same joints [m from the start].
     """
     if length <= stock:
         return []
@@ -43,29 +42,18 @@ def splices(
 
 
 def _fewest(stops: Floats, bend: Floats, stock: float, short: float) -> list[float] | None:
-    """The way from the first stop to the last in the fewest steps of at most `stock`, then in the fewest under `short`,
-    then of the least worst bend.
-    """
-    best: list[Route | None] = [(0, 0, 0.0, -1)]
+    """The stops on the way from the first to the last in the fewest steps of at most `stock`, then in the fewest under
+    `short`, then of the least worst bend."""
+    reached: list[tuple[float, Route]] = [(float(stops[0]), (0, 0, 0.0, ()))]
     for k in range(1, len(stops)):
         ways = [
-            (way[0] + 1, way[1] + (stops[k] - stops[j] < short), max(way[2], float(bend[k])), j)
-            for j, way in enumerate(best)
-            if way is not None and stops[k] - stops[j] <= stock
+            (pieces + 1, few + (stops[k] - stop < short), max(worst, float(bend[k])), (stop, *before))
+            for stop, (pieces, few, worst, before) in reached
+            if stops[k] - stop <= stock
         ]
-        best.append(min(ways) if ways else None)
-    return _back(stops, best)
-
-
-def _back(stops: Floats, best: Sequence[Route | None]) -> list[float] | None:
-    found = list[float]()
-    way = best[-1]
-    if way is None:
-        return None
-    while way is not None and way[3] > 0:
-        found.append(float(stops[way[3]]))
-        way = best[way[3]]
-    return found[::-1]
+        reached += [(float(stops[k]), min(ways))] if ways else []
+    last, (_, _, _, before) = reached[-1]
+    return [*before[-2::-1]] if last == stops[-1] else None
 
 
 def nest(pieces: Sequence[Piece], stock: float, *, kerf: float = 0.0) -> Stock:

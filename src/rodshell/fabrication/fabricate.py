@@ -1,6 +1,6 @@
 """Cut list, layers, splices, stock and bracing of a grid, in one call, and the lengths that decide the cutting."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -30,34 +30,25 @@ SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no m
 class Lath:
     """A lath as it is cut: a rod, or what lies on it over a part of its length.
 
-    Parameters
-    ----------
-    number : 1 is the rod itself, whole.
-    start, stop : its cut ends, allowances included, from the rod's start [m].
-    splices : distances from the rod's start [m].
+    Args:
+        name: that of its rod, of the second on it "U07-2".
+        number: 1 is the rod itself, whole.
+        start, stop: its cut ends, allowances included, from the rod's start [m].
+        splices: distances from the rod's start [m].
     """
 
     rod: int
+    name: str
     number: int
     start: float
     stop: float
     splices: tuple[float, ...] = ()
 
     @property
-    def pieces(self) -> list[float]:
-        """Lengths of its pieces [m]."""
-        lengths: list[float] = np.diff([self.start, *self.splices, self.stop]).tolist()
-        return lengths
-
-
-def lath_name(rod: str, number: int) -> str:
-    """What a lath is called: the first as its rod, the second "U07-2".
-
-    Parameters
-    ----------
-    rod : its id; number : of the lath.
-    """
-    return rod if number == 1 else f"{rod}-{number}"
+    def pieces(self) -> list[Piece]:
+        """What it is cut into, named by it and a number along it."""
+        lengths = np.diff([self.start, *self.splices, self.stop]).tolist()
+        return [Piece(piece=f"{self.name}.{k}", length=length) for k, length in enumerate(lengths, start=1)]
 
 
 class Fabricated(figures.Fabrication):
@@ -87,17 +78,15 @@ def fabricate(
 ) -> Fabricated:  # fmt: skip
     """Cut list, layers, splices, stock and bracing of a grid.
 
-    Parameters
-    ----------
-    curvature : (k,) the sharpest bend that each entry of `rod_nodes` sees [1/m], which splices avoid.
-    final : (n, 3) the final shape, for the bracing [m].
-    pattern : of the bracing; default: both diagonals of every cell.
-    prestrain : by which cables are shortened when they are put in [-]; None: the bracing is not of cables.
-    to_supports : diagonals also from the outermost joints to the rod ends.
+    Args:
+        curvature: (k,) the sharpest bend that each entry of `rod_nodes` sees [1/m], which splices avoid.
+        final: (n, 3) the final shape, for the bracing [m].
+        pattern: of the bracing; default: both diagonals of every cell.
+        prestrain: by which cables are shortened when they are put in [-]; None: the bracing is not of cables.
+        to_supports: diagonals also from the outermost joints to the rod ends.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind.
+    Raises:
+        InputError: a value is of the wrong kind.
     """
     instance("mesh", mesh, GridMesh)
     instance("rod", rod, Rod)
@@ -111,19 +100,15 @@ def fabricate(
     if prestrain is not None:
         number("prestrain", prestrain)
     rods, crossings = mesh.grid.rods, mesh.grid.crossings
-    lengths = np.array([rod_line.length for rod_line in rods])
-    cut = lengths + 2 * options.end_allowance
+    cut = np.array([rod_line.length for rod_line in rods]) + 2 * options.end_allowance
     made, warnings = _laths(mesh, options, curvature)
-    names = [rod_line.name for rod_line in rods]
-    pieces, more = _pieces_of(made, names), dict[str, Any]()
+    more = dict[str, Any]()
     if options.stock_length is not None and not warnings:
         bars = partial(nest, stock=options.stock_length, kerf=options.kerf)
         longer, _ = _laths(mesh, options, curvature, short=SHORT)
-        others = _pieces_of(longer, names)
-        plan, tried = bars(pieces), bars(others)
-        if len(tried.bars) <= len(plan.bars):
-            made, pieces, plan = longer, others, tried
-        more["stock"] = plan
+        more["stock"], tried = bars(_pieces_of(made)), bars(_pieces_of(longer))
+        if len(tried.bars) <= len(more["stock"].bars):
+            made, more["stock"] = longer, tried
     bracing: tuple[Brace, ...] = ()
     if final is not None:
         ends = mesh.ends.ravel()
@@ -132,15 +117,12 @@ def fabricate(
         pairs = diagonals(mesh.grid, pattern)
         if to_supports:
             pairs = np.vstack([pairs, rim_diagonals(mesh.grid, pattern) + [0, len(mesh.joint_pairs)]])
-
-        def apart(points: Floats) -> list[float]:
-            distances: list[float] = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1).tolist()
-            return distances
-
-        points = [*mesh.grid.joint_names, *mesh.grid.support_names]
+        names = [*mesh.grid.joint_names, *mesh.grid.support_names]
+        both = np.stack([flat, there], axis=1)
+        lengths = np.linalg.norm(both[pairs[:, 0]] - both[pairs[:, 1]], axis=2).tolist()
         bracing = tuple(
-            Brace(start=points[a], end=points[b], flat=laid, final=spanned)
-            for (a, b), laid, spanned in zip(pairs.tolist(), apart(flat), apart(there), strict=True)
+            Brace(start=names[a], end=names[b], flat=laid, final=spanned)
+            for (a, b), (laid, spanned) in zip(pairs.tolist(), lengths, strict=True)
         )
         if prestrain is not None:
             bracing = tuple(brace.changed(cut=(brace.final or 0.0) / (1.0 + prestrain)) for brace in bracing)
@@ -155,7 +137,7 @@ def fabricate(
         mass=mass,
         layer=layers(len(rods), crossings.rods.tolist()),
         laths=made,
-        pieces=pieces,
+        pieces=_pieces_of(made),
         warnings=warnings,
         **more,
     )
@@ -180,10 +162,8 @@ def _stretch(rod: Rod, profile: Profile, factors: Floats) -> Floats:
 def _laths(
     mesh: GridMesh, options: Fabrication, curvature: Floats | None, *, short: float = 0.0
 ) -> tuple[tuple[Lath, ...], tuple[Said, ...]]:
-    """All laths with their splices, and a sentence about those that cannot be spliced.
-
-    short : pieces of so many joint distances are avoided.
-    """
+    """All laths with their splices, pieces of under `short` joint distances being avoided, and a sentence about those
+    that cannot be spliced."""
     stock, crossings = options.stock_length, mesh.grid.crossings
     bend = np.zeros(len(mesh.rod_nodes)) if curvature is None else curvature
     made, hopeless = list[Lath](), dict[int, str]()
@@ -205,7 +185,8 @@ def _laths(
                 hopeless.setdefault(k, rod.name if lath == 1 else f"{rod.name} (lath {lath})")
             mine = tuple(at + start for at in found or ())
             spliced += mine
-            made.append(Lath(k, lath, start, stop, mine))
+            name = rod.name if lath == 1 else f"{rod.name}-{lath}"
+            made.append(Lath(k, name, lath, start, stop, mine))
     if not hopeless:
         return tuple(made), ()
     first = next(iter(hopeless.values()))
@@ -214,10 +195,5 @@ def _laths(
     return tuple(made), (said("not_spliced", None, stock, unit="m", place=first, rods=named, stock=length_text(stock)),)
 
 
-def _pieces_of(laths: tuple[Lath, ...], names: Sequence[str]) -> tuple[Piece, ...]:
-    """Every piece, named by its rod's name, lath and number."""
-    return tuple(
-        Piece(piece=f"{lath_name(names[lath.rod], lath.number)}.{number}", length=length)
-        for lath in laths
-        for number, length in enumerate(lath.pieces, start=1)
-    )
+def _pieces_of(laths: Iterable[Lath]) -> tuple[Piece, ...]:
+    return tuple(piece for lath in laths for piece in lath.pieces)

@@ -1,6 +1,6 @@
 """What was checked of a shell without loads, and under its own weight."""
 
-from math import inf
+from re import fullmatch
 
 from pydantic import Field
 
@@ -13,6 +13,8 @@ from rodshell.figures.records import (
     Real,
     Record,
     Rows,
+    T,
+    TableOr,
     Text,
     Vector,
     Whole,
@@ -20,6 +22,15 @@ from rodshell.figures.records import (
     points,
     rows,
 )
+from rodshell.validation import NAME
+
+OTHER_SHAPES = ("pop_up", "deployment")  # with figures in addition to those on supports
+
+
+def _by_shape(record: Record, kind: type[T]) -> dict[str, T]:
+    """What a record holds of shapes: by the names of supports, then of the deployment."""
+    known = {name: value for name, value in record if isinstance(value, kind) and fullmatch(f"{NAME}|pop_up", name)}
+    return {name: known[name] for name in sorted(known, key=OTHER_SHAPES.__contains__)}
 
 
 class WorstBent(Bent):
@@ -31,7 +42,9 @@ class WorstBent(Bent):
 
 
 class Bending(Record):
-    """Bending and stress of all rods in the shapes of the shell."""
+    """Bending and stress of all rods in the shapes of the shell: on each support by its name, and of the deployment."""
+
+    __pydantic_extra__: dict[str, TableOr[WorstBent]] = Field(init=False)
 
     strength: Number = key("by which the use of final shapes is counted: permanent, if that is known", "Pa")
     erection_strength: Number = key("by which the use of the deployment's stages is counted", "Pa")
@@ -44,8 +57,7 @@ class Bending(Record):
 
     def shapes(self) -> dict[str, WorstBent]:
         """What is known, by the name of the shape."""
-        known = {"pinned": self.pinned, "clamped": self.clamped, "pop_up": self.pop_up, "deployment": self.deployment}
-        return {name: bent for name, bent in known.items() if bent is not None}
+        return _by_shape(self, WorstBent)
 
 
 class Clearance(Record):
@@ -59,15 +71,21 @@ class Clearance(Record):
 
 
 class Contact(Record):
-    """Contact of rods with each other."""
+    """Contact of rods with each other: in the shape on each support by its name, and in the deployment."""
+
+    __pydantic_extra__: dict[str, TableOr[Clearance]] = Field(init=False)
 
     pinned: Clearance | None = key("final shape with pinned ends")
     clamped: Clearance | None = key("final shape with clamped ends")
     deployment: Clearance | None = key("the worst stage of the deployment")
 
+    def shapes(self) -> dict[str, Clearance]:
+        """What is known, by the name of the shape."""
+        return _by_shape(self, Clearance)
+
     def of(self, shape: str) -> Clearance | None:
-        """Of "pinned", "clamped" or "deployment"."""
-        return {"pinned": self.pinned, "clamped": self.clamped, "deployment": self.deployment}.get(shape)
+        """Of a support by its name, or of the "deployment"."""
+        return self.shapes().get(shape)
 
 
 class Reactions(Record):
@@ -108,13 +126,6 @@ class SelfWeight(Record):
     braced_limit: Text | None = key("as limit, of the braced shell; absent without bracing")
     factorizations: Whole | None = key("factorisations of the tangent")
 
-    @property
-    def at_least(self) -> float:
-        """The factor as a number: infinite above 100, 0 where nothing is known."""
-        if self.load_factor is not None:
-            return self.load_factor
-        return inf if self.limit == "none" else 0.0
-
 
 class EndsInTheAir(Record):
     """Rod ends, those at seams left out, that lie higher than a fiftieth of the size above the lowest one."""
@@ -151,7 +162,7 @@ class ClampedDeployment(Record):
 class Deployment(Record):
     """The deployment from flat to popped up with pinned ends, the ends driven along straight lines."""
 
-    ends: Text | None = key('end condition: "pinned"')
+    ends: Text | None = key("name of the support")
     stages: Rows[Stage] = rows("equilibria from flat to popped up")
     snaps: Rows[tuple[Real, Real]] = rows("pairs of shares between which the shell snaps forward")
     snapped_by: Rows[Number] = rows("how far a node moves in each snap", "m")

@@ -18,6 +18,8 @@ CODES = {
     "flat": "the target is flat",
     "guided": "lifted and driven by its ends, the shell comes to rest in another shape than the final one",
     "imperfect": "with imperfections the shell falls under a combination of loads, or nothing is known of it",
+    "in_place": "flat, the rods would bend by more than they withstand: the shell is assembled in place",
+    "lies_flat": "the rods can be laid out flat, although they follow curves of the target",
     "linear_buckling": "linear buckling is below the loads, which the shell carries in another shape",
     "lost": "the deployment could not be followed all the way",
     "needs_bracing": "without its bracing the shell does not carry its own weight",
@@ -27,6 +29,7 @@ CODES = {
     "no_room": "rods pass each other so near that there is hardly any room for joints",
     "no_shear_strength": "torsion counts, and the shear strength of timber or a fibre composite was not given",
     "no_strength": "no strength was given",
+    "none_stands": "with some supports the shell falls under its own weight, and with the others that is not known",
     "not_checked": "something was not checked",
     "not_computed": "a computation did not converge or is not complete",
     "not_followed": "the shell could be followed only up to a part of the loads",
@@ -55,19 +58,20 @@ CODES = {
 
 Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
-GOOD = frozenset({"stands", "stands_under_loads", "no_loads", "no_imperfections"})
+GOOD = frozenset({"in_place", "lies_flat", "stands", "stands_under_loads", "no_loads", "no_imperfections"})
 FAULTS = frozenset({
     "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",
     "too_thick", "unstable",
 })  # fmt: skip
 """Of these a shell cannot be built; another on other supports may be."""
+NOT_KNOWN = frozenset({"none_stands", "not_computed"})
 
 
 def level_of(code: str) -> Level:
     """How grave a finding is by itself."""
     if code in GOOD:
         return "good"
-    return "unbuildable" if code in FAULTS else "unknown" if code == "not_computed" else "check"
+    return "unbuildable" if code in FAULTS else "unknown" if code in NOT_KNOWN else "check"
 
 
 class Finding(Record):
@@ -100,11 +104,10 @@ def said(
 ) -> Said:  # fmt: skip
     """A finding in the words of `SENTENCES`.
 
-    Parameters
-    ----------
-    sentence : its name there: the code, or the code and a variant.
-    support, figure, limit, unit, place, offers : see `Finding`.
-    words : that the sentence needs in addition.
+    Args:
+        sentence: its name there: the code, or the code and a variant.
+        support, figure, limit, unit, place, offers: see `Finding`.
+        words: that the sentence needs in addition.
     """
     finding = Finding(
         code=sentence.partition(":")[0], support=support, figure=figure, limit=limit, unit=unit, place=place,

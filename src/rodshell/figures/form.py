@@ -23,7 +23,7 @@ from rodshell.figures.records import (
 )
 
 Gate = Literal["flat", "from_flat", "remeshed", "tolerance", "stable"]
-FEWEST_STATIONS = 2
+_FEWEST_STATIONS = 2
 
 # What was asked for
 
@@ -45,15 +45,26 @@ class Target(Record):
 
 
 class Layout(Record):
-    """The flat grid that was asked for."""
+    """How the rods were to be laid out."""
 
+    kind: Text | None = key("lattice: chebyshev, geodesic, asymptotic or curves")
+    families: Whole | None = key("number of families of a geodesic or asymptotic lattice")
     rods: Text | tuple[Whole, Whole] | None = key('number of rods of families u and v, or "auto"')
-    spacing: tuple[Real, Real] | None = key("distance between neighbouring rods of families u and v", "m")
+    spacing: tuple[Real, Real] | None = key("distance between neighbouring rods of the first family and of others", "m")
     length: Text | Real | None = key('length of every rod before trimming [m], or "auto"')
     edge: Number = key("longest edge of the mesh", "m")
-    rotate: Number = key("angle of family u against the target's x axis", "rad")
+    rotate: Number = key("angle of the first family against the target's x axis", "rad")
     offset: Flat | None = key("shift of the lattice against the axes through the anchor", "m")
     crossing: Number = key("angle between both families on the target, at the anchor", "rad")
+
+
+class FlatState(Record):
+    """The rods of a geodesic or asymptotic lattice laid out in the plane, where they bend as little as they can."""
+
+    lies_flat: Flag | None = key("whether the rods withstand that; else the shell is assembled in place")
+    in_plane_strain: Number = key("largest bending strain of the rods within the plane")
+    limit: Number = key("bending strain that the rods withstand during erection, or up to which they are thin rods")
+    negative_modes: Whole | None = key("directions in which that state is unstable; 0: it is stable")
 
 
 class Section(Record):
@@ -261,7 +272,7 @@ class Stiffness(Record):
 
     @model_validator(mode="after")
     def _as_many(self) -> Self:
-        if not len(self.at) == len(self.factors) >= FEWEST_STATIONS or len(self.sizes) not in (0, len(self.at)):
+        if not len(self.at) == len(self.factors) >= _FEWEST_STATIONS or len(self.sizes) not in (0, len(self.at)):
             raise ValueError(
                 f"{len(self.at)} stations, {len(self.factors)} factors and {len(self.sizes)} sizes: there must be as "
                 "many of each, two or more"
@@ -310,8 +321,8 @@ class Patch(Record):
     rods: Whole | None = key("number of rods")
     left_out: Whole | None = key("number of rods left out because they are too short")
     anchor: Flat | None = key("place in plan through which the grid's axes run", "m")
-    rotate: Number = key("angle of family u against the target's x axis", "rad")
-    spacing: tuple[Real, Real] | None = key("distance between neighbouring rods of families u and v", "m")
+    rotate: Number = key("angle of the first family against the target's x axis", "rad")
+    spacing: tuple[Real, Real] | None = key("distance between neighbouring rods of the first family and of others", "m")
     flat_shift: Flat | None = key("shift of its flat grid in the row of all", "m")
     ends_moved: Number = key("largest distance by which a rod end was moved to meet another on a seam", "m")
     net: Net | None = key("the inextensible net")

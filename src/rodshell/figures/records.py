@@ -8,16 +8,28 @@ of a number, a number that is not finite or a point with two coordinates is refu
 import json
 from collections.abc import Iterator, Mapping
 from math import isfinite
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationInfo
-from pydantic_core import CoreSchema, core_schema
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    FailFast,
+    Field,
+    GetPydanticSchema,
+    Tag,
+    ValidationInfo,
+)
+from pydantic_core import core_schema
 
 from rodshell.arrays import Floats
+from rodshell.validation import NAME
+from rodshell.validation import Ends as Ends
 
-Ends = Literal["pinned", "clamped"]
 LARGEST = 1e30  # of a number in its SI unit, so that its products are finite
 MOST = 10**15  # of a count
 FARTHEST = 1e6  # m between two points of a shell, and of each of its lengths
@@ -48,68 +60,51 @@ def _in_range(value: Any, info: ValidationInfo) -> Any:
     return printable(value) if isinstance(value, str) else value
 
 
-def _no_rows_for_null(value: object) -> object:
-    """A list that is not known has no entries."""
-    return () if value is None else value
+def _instead_of_null(empty: object) -> BeforeValidator:
+    """A list or table that is not known has no entries."""
+    return BeforeValidator(lambda value: empty if value is None else value)
 
 
-def _no_keys_for_null(value: object) -> object:
-    """A table that is not known has no entries."""
-    return {} if value is None else value
-
-
-class _Checked:
-    """What a value must be, by a schema that is written once: pydantic would infer it again for every key."""
-
-    def __init__(self, schema: CoreSchema) -> None:
-        self._schema = schema
-
-    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
-        return {**self._schema}
-
-
-_REAL = core_schema.float_schema(strict=True, ge=-LARGEST, le=LARGEST)
-_NUMBER = core_schema.with_info_before_validator_function(_finite_or_unknown, core_schema.nullable_schema(_REAL))
-
-Real = Annotated[float, _Checked(_REAL)]
-Number = Annotated[Real | None, _Checked(_NUMBER)]
-Whole = Annotated[int, _Checked(core_schema.int_schema(strict=True, ge=-MOST, le=MOST))]
-Flag = Annotated[bool, _Checked(core_schema.bool_schema(strict=True))]
-Text = Annotated[
-    str, _Checked(core_schema.no_info_after_validator_function(printable, core_schema.str_schema(strict=True)))
-]
-_Other = Annotated[Any, _Checked(core_schema.with_info_after_validator_function(_in_range, core_schema.any_schema()))]
 T = TypeVar("T")
-Rows = Annotated[tuple[T, ...], FailFast(), BeforeValidator(_no_rows_for_null)]
-ByEnds = Annotated[dict[Ends, T], BeforeValidator(_no_keys_for_null)]
-Flat = Annotated[tuple[Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 2))]
-_POINT = core_schema.tuple_schema([_NUMBER] * 3)
-Point = Annotated[tuple[Number, Number, Number], _Checked(_POINT)]
+Real = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]
+Number = Annotated[Real | None, BeforeValidator(_finite_or_unknown)]
+Whole = Annotated[int, Field(strict=True, ge=-MOST, le=MOST)]
+Flag = Annotated[bool, Field(strict=True)]
+Text = Annotated[str, Field(strict=True), AfterValidator(printable)]
+Flat = tuple[Number, Number]
+Point = tuple[Number, Number, Number]
+_Other = Annotated[Any, AfterValidator(_in_range)]
+Rows = Annotated[tuple[T, ...], FailFast(), _instead_of_null(())]
+ByEnds = Annotated[dict[Annotated[str, Field(pattern=f"^{NAME}$", strict=True)], T], _instead_of_null({})]
+TableOr = Annotated[
+    Annotated[T, Tag("(table)")] | Annotated[_Other, Tag("(other)")],
+    Discriminator(lambda value: "(table)" if isinstance(value, dict | BaseModel) else "(other)"),
+]
+"""A key of a record that is not known here, such as the name of a support: what its table holds is a T."""
 
 
-def _array(schema: CoreSchema, *shape: int) -> _Checked:
-    """A list of numbers or points, or a point, which in Python is an array of this shape; what is not known is NaN."""
+def _array(kept: Any, *shape: int) -> GetPydanticSchema:
+    """What is `kept` as a list of numbers or points, or a point, and in Python is an array of this shape; what is not
+    known is NaN."""
 
     def made(given: Any) -> Floats:
         values = np.array(() if given is None else given, dtype=float).reshape(shape)
         return np.where(np.abs(values) <= LARGEST, values, np.nan)
 
-    checked = core_schema.json_or_python_schema(
-        json_schema=core_schema.no_info_after_validator_function(made, schema),
-        python_schema=core_schema.no_info_plain_validator_function(made),
-        serialization=core_schema.plain_serializer_function_ser_schema(lambda values: plain(values)),
+    return GetPydanticSchema(
+        lambda source, handler: core_schema.json_or_python_schema(
+            json_schema=core_schema.no_info_after_validator_function(made, handler.generate_schema(kept)),
+            python_schema=core_schema.no_info_plain_validator_function(made),
+            serialization=core_schema.plain_serializer_function_ser_schema(plain),
+        )
     )
-    return _Checked(checked)
 
 
-def _list(row: CoreSchema) -> CoreSchema:
-    return core_schema.nullable_schema(core_schema.list_schema(row, fail_fast=True))
-
-
-Vector = Annotated[Floats, _array(_POINT, 3)]
-Points = Annotated[Floats, _array(_list(_POINT), -1, 3)]
-Numbers = Annotated[Floats, _array(_list(_NUMBER), -1)]
-Found = Annotated[T, _Checked(core_schema.any_schema())]  # what a check found and its record leaves out
+Vector = Annotated[Floats, _array(Point, 3)]
+Points = Annotated[Floats, _array(Annotated[list[Point] | None, FailFast()], -1, 3)]
+Numbers = Annotated[Floats, _array(Annotated[list[Number] | None, FailFast()], -1)]
+Found = Annotated[T, GetPydanticSchema(lambda source, handler: core_schema.any_schema())]
+"""What a check found and its record leaves out."""
 
 
 class Record(BaseModel):
@@ -177,12 +172,7 @@ def by_ends(meaning: str) -> Any:
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null.
-
-    Parameters
-    ----------
-    content : keys and values; NumPy's arrays and numbers are converted.
-    """
+    """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null."""
     lines = []
     for name, value in plain(content).items():
         if isinstance(value, list) and value and isinstance(value[0], dict):
@@ -198,12 +188,7 @@ def _dumps(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable.
-
-    Parameters
-    ----------
-    value : dictionaries, sequences, arrays, records, numbers, texts.
-    """
+    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable."""
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None
     if isinstance(value, str):

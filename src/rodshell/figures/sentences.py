@@ -27,6 +27,18 @@ SENTENCES = {
         "under {place} with {ends} ends and imperfections nothing is known above {factor} times the loads"
     ),
     "imperfect: unloaded": "with {ends} ends and imperfections the shell is unstable before the loads of {place} act",
+    "in_place": (
+        "the rods cannot be laid out flat: there they would bend within the plane by up to {bent}, and withstand "
+        "{withstood} during erection; bring rod by rod to its place over a scaffold, by the holes of its strip"
+    ),
+    "in_place: unstable": (
+        "the rods cannot be laid out flat, since no stable state in the plane was found; bring rod by rod to its place "
+        "over a scaffold, by the holes of its strip"
+    ),
+    "lies_flat": (
+        "the rods can be laid out flat: there they bend within the plane by up to {bent}, and withstand {withstood} "
+        "during erection"
+    ),
     "linear_buckling": (
         "under {place} with {ends} ends linear buckling is at {factor} times these loads: the shell carries them only "
         "in another shape, its nodes having moved by {moved}"
@@ -66,7 +78,13 @@ SENTENCES = {
         "the design strength of the rods is not known, so that whether they break under the loads was not judged: "
         "give strength.permanent and strength.short"
     ),
-    "not_checked: clamped": "whether the clamped shape is reached from the pinned one by turning the ends is not known",
+    "none_stands": (
+        "no support that was asked for is shown to hold the shell up: with {falls} ends it falls under its own "
+        "weight{bracing}, and {unknown}; take stiffer rods, or brace it, and check it again"
+    ),
+    "not_checked: clamped": (
+        "whether the {ends} shape is reached from the {pinned} one by turning the ends is not known"
+    ),
     "not_checked: contact": (
         "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
         "rod.section.fibre_distances for that"
@@ -136,7 +154,7 @@ SENTENCES = {
         "{shape} bending strains the rods by {strain}: they are too thick for this curvature, and the theory of thin "
         "rods is valid up to about {valid}; use thinner rods or a larger target"
     ),
-    "turned": "turned into their clamps after deployment, the ends lead to another than the clamped shape",
+    "turned": "turned into their clamps after deployment, the ends lead to another than the {ends} shape",
     "unstable": "with {ends} ends the shell is unstable{count} and would snap to another shape",
     "unstable: unloaded": "with {ends} ends the shell is unstable before the loads of {place} act",
 }

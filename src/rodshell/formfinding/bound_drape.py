@@ -53,15 +53,13 @@ def bound_drape(
 ) -> Draped:
     """Drape a layout over a target by its net; see `drape`.
 
-    Parameters
-    ----------
-    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
-    warm_start : a grid draped before, whose net is the first guess of the new net.
-    joint : its eccentricity places the rods in two layers, and it may hold rods against rolling.
+    Args:
+        anchor: x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+        warm_start: a grid draped before, whose net is the first guess of the new net.
+        joint: its eccentricity places the rods in two layers, and it may hold rods against rolling.
 
-    Raises
-    ------
-    NetLimitError : no net covers the target from this anchor and heading.
+    Raises:
+        NetLimitError: no net covers the target from this anchor and heading.
     """
     eccentricity = joint.eccentricity if joint else 0.0
     near = warm_start.net if warm_start else None
@@ -147,7 +145,7 @@ def bound_drape(
     )
 
 
-@njit()
+@njit("i2 i1 b1")
 def _mark(spans, rod_nodes, marked):  # type: ignore[no-untyped-def]
     """Mark the nodes of the pieces of rods whose first and last entry of `rod_nodes` are `spans` (m, 2)."""
     for piece in range(len(spans)):
@@ -206,10 +204,9 @@ def _bind(target: Target, mesh: GridMesh, start: Floats, normal: Floats, spans: 
     """All nodes on the target; those of the two axes, and the ends of rods, move only along the net's lines, and the
     anchor does not move. An end closer than `hold` edges to another node is left to that, since it would be a lever.
 
-    Parameters
-    ----------
-    start, normal : (n, 3) nodes of the net [m], and the target's normals there.
-    spans : (m, 2) see `spans_along`.
+    Args:
+        start, normal: (n, 3) nodes of the net [m], and the target's normals there.
+        spans: (m, 2) see `spans_along`.
     """
     count, guides = np.full(mesh.node_count, 2, dtype=np.intp), np.zeros((mesh.node_count, 3))
     guides[:, 1] = np.abs(normal[:, 0]) > 0.7
@@ -242,11 +239,10 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
 def _net_deviation(target: Target, mesh: GridMesh, ends: Floats, whole: Ints, spans: Ints, positions: Floats) -> Floats:
     """(k, 2) how far past both ends of each rod that is built this state crosses the target's end, along the rod [m].
 
-    Parameters
-    ----------
-    ends, whole : (k, 2), (k,) of rods as cut by the net [m], and the rod of the mesh that each belongs to.
-    spans : (k, 2) see `spans_along`.
-    positions : (n, 3) of the mesh's nodes [m].
+    Args:
+        ends, whole: (k, 2), (k,) of rods as cut by the net [m], and the rod of the mesh that each belongs to.
+        spans: (k, 2) see `spans_along`.
+        positions: (n, 3) of the mesh's nodes [m].
     """
     nodes, ends, whole = spans.ravel(), ends.ravel(), np.repeat(whole, 2)
     first, last = mesh.rod_start[whole], mesh.rod_stop[whole] - 1

@@ -37,18 +37,16 @@ CHECKS = 10  # steps between two checks whether it is at rest
 class DynamicPopUpSettings:
     """How the rod ends move from the footprint to the boundary.
 
-    Parameters
-    ----------
-    coupling : of rods at their joints: shared DOFs, implicit or explicit penalty [HQK 2.2].
-    time_step : [s]; with explicit ties at most nine tenths of their stability limit.
-    moving_time : time in which the ends reach the boundary, on straight paths, starting and stopping smoothly [s].
-    duration : longest simulated time [s]; the motion ends earlier when the grid is at rest.
-    drags : rates at which velocities decay [1/s], while the ends move and afterwards. With less drag at first a grid
-        can swing through its plane and pop up to the other side.
+    Args:
+        coupling: of rods at their joints: shared DOFs, implicit or explicit penalty [HQK 2.2].
+        time_step: [s]; with explicit ties at most nine tenths of their stability limit.
+        moving_time: time in which the ends reach the boundary, on straight paths, starting and stopping smoothly [s].
+        duration: longest simulated time [s]; the motion ends earlier when the grid is at rest.
+        drags: rates at which velocities decay [1/s], while the ends move and afterwards. With less drag at first a grid
+            can swing through its plane and pop up to the other side.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind or sign.
+    Raises:
+        InputError: a value is of the wrong kind or sign.
     """
 
     coupling: Coupling = field(default_factory=SharedDofs)
@@ -69,9 +67,8 @@ class DynamicPopUpSettings:
 class DynamicPopUp:
     """A shell that popped up in time.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the footprint's nodes [m].
+    Args:
+        positions: (n, 3) of the footprint's nodes [m].
     """
 
     positions: Floats
@@ -92,17 +89,15 @@ def dynamic_pop_up(
     A flat grid stays flat, in unstable equilibrium: as in `pop_up`, the motion starts from a low arch, with the ends
     moved by a twentieth of their path.
 
-    Parameters
-    ----------
-    footprint, boundary : where the m rods' ends are and where they go.
-    joint : the connection of rods where they cross; ball joints by default.
-    settings : coupling, time stepping and drag.
-    progress : called as progress(stage, detail, residual) every ten steps.
+    Args:
+        footprint, boundary: where the m rods' ends are and where they go.
+        joint: the connection of rods where they cross; ball joints by default.
+        settings: coupling, time stepping and drag.
+        progress: called as progress(stage, detail, residual) every ten steps.
 
-    Raises
-    ------
-    StabilityError : explicit ties are too stiff for any step.
-    ConvergenceError : a step fails.
+    Raises:
+        StabilityError: explicit ties are too stiff for any step.
+        ConvergenceError: a step fails.
     """
     instance("footprint", footprint, Footprint)
     instance("boundary", boundary, Boundary)

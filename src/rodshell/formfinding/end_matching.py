@@ -42,12 +42,11 @@ KEPT = 200  # partial choices that are kept from point to point
 class EndGoals:
     """Points where rods should end.
 
-    Parameters
-    ----------
-    points : (n, 3) on seams of the target [m].
-    tangents : (n, 3) unit tangents that the rods should have there, as far as spacing allows.
-    rows : indices of the points along each seam, in their order there.
-    on_seam : whether points (k, 3) of the target's end lie on one of these seams, as a mask (k,).
+    Args:
+        points: (n, 3) on seams of the target [m].
+        tangents: (n, 3) unit tangents that the rods should have there, as far as spacing allows.
+        rows: indices of the points along each seam, in their order there.
+        on_seam: whether points (k, 3) of the target's end lie on one of these seams, as a mask (k,).
     """
 
     points: Floats
@@ -60,10 +59,9 @@ class EndGoals:
 class MatchedEnd:
     """A rod end of a net that lies at one of the points where rods should end.
 
-    Parameters
-    ----------
-    side : 0 at its start, 1 at its end.
-    distance : from the point [m].
+    Args:
+        side: 0 at its start, 1 at its end.
+        distance: from the point [m].
     """
 
     point: int
@@ -76,9 +74,8 @@ class MatchedEnd:
 class MatchedNet:
     """A layout and its net, with the rod ends that lie at the points where rods should end.
 
-    Parameters
-    ----------
-    anchor : x, y of the point under the layout's middle [m].
+    Args:
+        anchor: x, y of the point under the layout's middle [m].
     """
 
     layout: GridLayout
@@ -101,14 +98,12 @@ def match_net(
 ) -> MatchedNet:
     """Choose the lines of a layout such that its rods end at the goals, one at each; goals may remain without a rod.
 
-    Parameters
-    ----------
-    anchor : x, y of the point of the target under the layout's middle [m].
-    eccentricity : distance of the layers of families u and v [m].
+    Args:
+        anchor: x, y of the point of the target under the layout's middle [m].
+        eccentricity: distance of the layers of families u and v [m].
 
-    Raises
-    ------
-    NetLimitError : no net covers the target from this anchor and heading.
+    Raises:
+        NetLimitError: no net covers the target from this anchor and heading.
     """
     net = chebyshev_net(target, layout, anchor=anchor, eccentricity=eccentricity)
     uv, inside = _coordinates(net, goals.points), inside_nodes(target, net.net)
@@ -267,12 +262,11 @@ def choose_families(coordinates: Floats, points: Floats, price: Floats, spacing:
     between neighbours over the spacing is minimised, plus the price of the choice at each point: by dynamic programming
     along the seam, whose state is the last rod of either family.
 
-    Parameters
-    ----------
-    coordinates : (n, 2) u, v of the points in the net [m]; the offset of a rod of family u is its v.
-    points : (n, 3) along the seam [m].
-    price : (n, 2) cost of family u and of family v at each point [-].
-    spacing : of families u and v [m].
+    Args:
+        coordinates: (n, 2) u, v of the points in the net [m]; the offset of a rod of family u is its v.
+        points: (n, 3) along the seam [m].
+        price: (n, 2) cost of family u and of family v at each point [-].
+        spacing: of families u and v [m].
     """
     offset = coordinates[:, ::-1] / np.array(spacing)
     winding = _running(np.abs(np.diff(offset, axis=0)))

@@ -18,7 +18,16 @@ from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
 from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.formfinding.gravity_drape import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
 from rodshell.formfinding.methods import Draped, DrapeFigures, Fall, smallest_joint_angle
-from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force
+from rodshell.formfinding.rest import (
+    LONGEST,
+    Rest,
+    energy_decay,
+    joint_gap,
+    lowest_modes,
+    out_of_balance,
+    rest_advice,
+    unbalanced_force,
+)
 from rodshell.geometry.frames import dot
 from rodshell.joints import ImplicitPenalty, Joint
 from rodshell.layout import GridLayout, mesh_grid
@@ -42,6 +51,10 @@ USUAL_SIZE = 0.2  # [m]
 OF_LIMIT = 0.9  # share of the stability limit of explicit ties, whichever nodes touch, that is taken as time step
 UNSTABLE = -1e-3  # [1/s2]: the free turn about the vertical has 0 up to round-off
 CHECKS = 10  # steps between two checks whether it is at rest
+CREEPS = (
+    "its kinetic energy no longer falls, it creeps sideways, where nothing holds it; friction may hold it "
+    '(drape.friction), or use method = "bound"'
+)
 SLOW = 20.0  # s of processor time, after which the fall says what makes it slow
 LIMITS = 4  # checks for rest between two checks of the step limit
 
@@ -58,16 +71,14 @@ def fall_drape(
 ) -> Draped:
     """Let a layout fall on a target in time; see `drape`.
 
-    Parameters
-    ----------
-    fall : height, time stepping, coupling, impacts, friction and drag.
-    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+    Args:
+        fall: height, time stepping, coupling, impacts, friction and drag.
+        anchor: x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
 
-    Raises
-    ------
-    InputError : the anchor lies outside the target.
-    StabilityError : the time step is beyond the stability limit of explicit ties, at the start or after landing.
-    ConvergenceError : the first step fails, however small. Where a later step fails, the fall ends, not at rest.
+    Raises:
+        InputError: the anchor lies outside the target.
+        StabilityError: the time step is beyond the stability limit of explicit ties, at the start or after landing.
+        ConvergenceError: the first step fails, however small. Where a later step fails, the fall ends, not at rest.
     """
     top = anchor_point(target, anchor)
     grid = initial_grid(target, layout, anchor)
@@ -78,8 +89,8 @@ def fall_drape(
     rest, report = simulation.outcome(series)
     assert series.last is not None
     positions = middle_surface(mesh, shell.mesh, shell.positions(series.last.state))
-    if not report.reason and lost_contact(mesh, positions, layout, top, target):
-        report = replace(report, status=Status.LOST_CONTACT)
+    if report.status is not Status.OUT_OF_TIME and lost_contact(mesh, positions, layout, top, target):
+        report = replace(report, status=Status.LOST_CONTACT, reason="")
     angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
     figures = DrapeFigures(
         max_gap=float(max(0.0, -target.contact(positions).distance.min())),
@@ -100,7 +111,7 @@ def fall_drape(
         levels=(report,),
         figures=figures,
         rest=rest,
-        warnings=_warnings(rest, series, simulation),
+        warnings=_warnings(rest, report, simulation),
     )
 
 
@@ -208,12 +219,13 @@ class _FallSimulation:
         tied = isinstance(self.fall.coupling, ImplicitPenalty)
         fewer = 'drape.coupling "shared" has fewer, and the same rest' if tied else "a longer layout.edge has fewer"
         unknowns = self.shell.freedom().size
-        return f"{said}; {spent / steps:.1g} s of processor time a step, for {unknowns} unknowns: {fewer}"
+        creeps = f"; {CREEPS}" if self.creeps(time) else ""
+        return f"{said}; {spent / steps:.1g} s of processor time a step, for {unknowns} unknowns: {fewer}{creeps}"
 
     @property
     def touching(self) -> Touching:
         assert self.stepper.last is not None
-        return self.stepper.last  # type: ignore[return-value]
+        return self.stepper.last
 
     def activity(self, sample: Sample) -> tuple[float, float]:
         """Kinetic energy [J] and largest out-of-balance force [N]."""
@@ -223,6 +235,11 @@ class _FallSimulation:
     def rests(self, energy: float, force: float) -> bool:
         """Whether this kinetic energy [J] and out-of-balance force [N] count as rest."""
         return energy < self._still and force < self._balanced
+
+    def creeps(self, time: float) -> bool:
+        """Whether the kinetic energy no longer falls: nothing holds the grid sideways, and it slides on."""
+        usual = USUAL_DURATION * self._slowness
+        return time >= 0.5 * usual and energy_decay(self._energies)[0] * LONGEST * usual < 1.0
 
     def advice(self, rest: Rest) -> str:
         """A drag and a duration that would bring the grid to rest, from the kinetic energy and its decay."""
@@ -246,6 +263,14 @@ class _FallSimulation:
         rest = Rest(resting, last.time, energy, force, gap, growth, done.steps, done.refused_steps)
         strain = float(np.abs(self.shell.stretch.strains(last.state)).max())
         status = Status.OUT_OF_TIME if self._out_of_time else Status.MOVING
+        reason = self._out_of_time
+        if done.end is End.STALLED:
+            reason = (
+                f"the fall ended at t = {rest.time:.4g} s, where no time step converged, however small "
+                f"({done.reason}); use a shorter edge, or softer or shared joints"
+            )
+        elif not reason and self.creeps(last.time):
+            reason = f"the grid is NOT AT REST after {rest.time:.3g} s: {CREEPS}"
         report = SolveReport(
             Status.CONVERGED if resting else status,
             self.shell.freedom().size,
@@ -255,17 +280,14 @@ class _FallSimulation:
             force,
             strain,
             sum(s < UNSTABLE for s in growth),
-            "" if resting else self._out_of_time,
+            "" if resting else reason,
         )
         return rest, report
 
 
-def _warnings(rest: Rest, series: TimeSeries, simulation: _FallSimulation) -> tuple[str, ...]:
-    if series.report is not None and series.report.end is End.STALLED:
-        return (
-            f"the fall ended at t = {rest.time:.4g} s, where no time step converged, however small "
-            f"({series.report.reason}); use a shorter edge, or softer or shared joints",
-        )
+def _warnings(rest: Rest, report: SolveReport, simulation: _FallSimulation) -> tuple[str, ...]:
+    if report.status is Status.MOVING and report.reason:
+        return (report.reason,)
     if not rest.at_rest:
         return (
             f"the grid is NOT AT REST after {rest.time:.3g} s: kinetic energy {rest.kinetic_energy:.1e} J, "

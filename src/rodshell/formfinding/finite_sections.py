@@ -19,8 +19,7 @@ from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
+from rodshell.rods.section import GivenSection, Rod
 from rodshell.targets import Target
 from rodshell.units import length_text
 
@@ -33,10 +32,9 @@ BEYOND = 0.1  # share of the rods' length beyond their buckling moment; with les
 def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     """(c, 2, 3) tangents of both rods at each joint, from the neighbours on either side; not normalised [m].
 
-    Parameters
-    ----------
-    mesh : of n nodes and c joints.
-    positions : (n, 3) of the nodes [m].
+    Args:
+        mesh: of n nodes and c joints.
+        positions: (n, 3) of the nodes [m].
     """
     before, after = np.moveaxis(positions[mesh.rod_nodes[mesh.beside_crossings]], 2, 0)
     return np.asarray(after - before)
@@ -45,9 +43,8 @@ def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
 def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
     """(c, 3) unit normals at the joints, across both rods, on the side that is up in the flat grid.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes [m].
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
     """
     tangents, flat = joint_tangents(mesh, positions), joint_tangents(mesh, mesh.flat)
     up = np.sign(cross(flat[:, 0], flat[:, 1])[:, 2:])
@@ -57,9 +54,8 @@ def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
 def node_normals(mesh: GridMesh, positions: Floats) -> Floats:
     """(n, 3) unit normals at all nodes, those of the joints interpolated linearly along the rods.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes [m].
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
     """
     (crossings, share), at_joints = mesh.between_crossings, joint_normals(mesh, positions)
     first, last = at_joints[crossings].transpose(1, 0, 2)
@@ -73,11 +69,10 @@ def place_in_layers(
 ) -> tuple[GridMesh, Floats, Floats]:
     """The mesh in two layers, with the positions (k, 3) of its nodes [m] and the normals (k, 3) there.
 
-    Parameters
-    ----------
-    mesh : of n nodes, whose rods meet in shared nodes.
-    positions, normals : (n, 3) of the surface between the layers [m], [-].
-    eccentricity : distance of the layers [m].
+    Args:
+        mesh: of n nodes, whose rods meet in shared nodes.
+        positions, normals: (n, 3) of the surface between the layers [m], [-].
+        eccentricity: distance of the layers [m].
     """
     layered = mesh.in_layers(eccentricity)
     rod_normals = normals[mesh.rod_nodes]
@@ -87,11 +82,10 @@ def place_in_layers(
 def middle_surface(mesh: GridMesh, layered: GridMesh, positions: Floats) -> Floats:
     """(n, 3) positions of the nodes of `mesh`, on the surface between two layers of rods [m].
 
-    Parameters
-    ----------
-    mesh : of n nodes, whose rods meet in shared nodes.
-    layered : the same mesh in layers, of k nodes; or `mesh` itself.
-    positions : (k, 3) of the nodes of `layered` [m].
+    Args:
+        mesh: of n nodes, whose rods meet in shared nodes.
+        layered: the same mesh in layers, of k nodes; or `mesh` itself.
+        positions: (k, 3) of the nodes of `layered` [m].
     """
     if not layered.layered:
         return positions
@@ -103,12 +97,12 @@ def middle_surface(mesh: GridMesh, layered: GridMesh, positions: Floats) -> Floa
 
 def rod_thickness(rod: Rod) -> float:
     """Size of a rod's section along the shell's normal [m]; 0 where the shape of its section is not known."""
-    section = rod.section
-    if isinstance(section, GivenSection):
-        return 0.0
-    if isinstance(section, Circle | Tube):
-        return 2 * section.outer_radius
-    return 2 * section.a if isinstance(section, Ellipse) else section.width
+    return 0.0 if isinstance(rod.section, GivenSection) else 2 * rod.section.half_widths[0]
+
+
+def rod_breadth(rod: Rod) -> float:
+    """Size of a rod's section within the shell [m]; 0 where the shape of its section is not known."""
+    return 2 * rod.section.half_widths[1] if rod.section.half_widths else 0.0
 
 
 def thickness_warnings(
@@ -116,12 +110,11 @@ def thickness_warnings(
 ) -> tuple[str, ...]:
     """A warning where thick rods, laid one above the other, would differ in length from lines on one surface.
 
-    Parameters
-    ----------
-    normal : (n, 3) of the target at the mesh's nodes.
-    positions : (n, 3) of the mesh's nodes, on the target [m].
-    touching : (n,) which of them lie on the target itself, not on its continuation.
-    spacing : of the rods [m].
+    Args:
+        normal: (n, 3) of the target at the mesh's nodes.
+        positions: (n, 3) of the mesh's nodes, on the target [m].
+        touching: (n,) which of them lie on the target itself, not on its continuation.
+        spacing: of the rods [m].
     """
     thick = rod_thickness(rod)
     bent = thick * _curvatures(normal, positions, mesh.edges, touching)
@@ -137,7 +130,7 @@ def thickness_warnings(
     )
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i2 b1")
 def _curvatures(normal, positions, edges, touching):  # type: ignore[no-untyped-def]
     """(e,) the surface's curvature along each edge, by the normals at its ends [1/m]; 0 if one does not touch it."""
     result = np.zeros(len(edges))
@@ -190,13 +183,12 @@ def flat_warnings(points: Floats, rod: Rod) -> tuple[str, ...]:
 class StrongBending:
     """How the rods of a net bend about their strong axis.
 
-    Parameters
-    ----------
-    ratio : of the larger bending stiffness to the smaller [-].
-    flat : whether they lie flat, the strong axis being the surface's normal; else they stand on edge.
-    curvature : about the strong axis, where the moment is largest [1/m].
-    moment : the largest moment over that at which a rod buckles sideways between its joints [-].
-    beyond : share of the rods' length where the moment is beyond that [-].
+    Args:
+        ratio: of the larger bending stiffness to the smaller [-].
+        flat: whether they lie flat, the strong axis being the surface's normal; else they stand on edge.
+        curvature: about the strong axis, where the moment is largest [1/m].
+        moment: the largest moment over that at which a rod buckles sideways between its joints [-].
+        beyond: share of the rods' length where the moment is beyond that [-].
     """
 
     ratio: float
@@ -227,10 +219,9 @@ def strong_bending(
 ) -> StrongBending | None:
     """How rods that cannot roll at their joints bend about their strong axis; None where both axes are alike.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes, on the target [m].
-    touching : (n,) which of them lie on the target itself, not on its continuation.
+    Args:
+        positions: (n, 3) of the mesh's nodes, on the target [m].
+        touching: (n,) which of them lie on the target itself, not on its continuation.
     """
     stiffnesses = rod.bend_stiffnesses
     weak, strong = sorted(stiffnesses)
@@ -259,12 +250,11 @@ def section_rotation(shell: Shell, state: Floats) -> Floats | None:
     From 0 to pi/2, between the rod's first material director and the normal, both projected along the rod; None where
     rods have no directors, because they bend alike in all directions.
 
-    Parameters
-    ----------
-    state : (N, 3) of the shell, with the source frames there.
+    Args:
+        state: (N, 3) of the shell, with the source frames there.
     """
     mesh = shell.mesh
-    frames = next((element for element in shell.within if isinstance(element, BendTwist)), None)
+    frames = shell.frames
     if frames is None or not shell.angles:
         return None
     bends = slice(len(mesh.bends))

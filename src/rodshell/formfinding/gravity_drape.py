@@ -48,13 +48,11 @@ def gravity_drape(
 ) -> Draped:
     """Drape a layout over a target in static equilibrium under its weight; see `drape`.
 
-    Parameters
-    ----------
-    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+    Args:
+        anchor: x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
 
-    Raises
-    ------
-    InputError : the anchor lies outside the target.
+    Raises:
+        InputError: the anchor lies outside the target.
     """
     top = anchor_point(target, anchor)
     grid = initial_grid(target, layout, anchor)
@@ -207,13 +205,11 @@ def _reporting(progress: Progress, where: str, most: int) -> Callable[[int, floa
 def anchor_point(target: Target, anchor: tuple[float, float] | None) -> Floats:
     """(3,) the point of the target under the layout's middle [m].
 
-    Parameters
-    ----------
-    anchor : x, y [m]; default: the target's highest point.
+    Args:
+        anchor: x, y [m]; default: the target's highest point.
 
-    Raises
-    ------
-    InputError : the anchor lies outside the target.
+    Raises:
+        InputError: the anchor lies outside the target.
     """
     x, y = anchor if anchor is not None else target.summit
     top = target.lift(np.array([[x, y]]))[0]
@@ -226,13 +222,11 @@ def initial_grid(target: Target, layout: GridLayout, anchor: tuple[float, float]
     """The layout's flat grid; rods "auto" are the lines that the net finds on the target, lengths "auto" extend past
     the target's end.
 
-    Parameters
-    ----------
-    anchor : x, y of the point under the layout's middle [m]; default: the target's highest point.
+    Args:
+        anchor: x, y of the point under the layout's middle [m]; default: the target's highest point.
 
-    Raises
-    ------
-    NetLimitError : no net covers the target from this anchor and heading.
+    Raises:
+        NetLimitError: no net covers the target from this anchor and heading.
     """
     if layout.rods != "auto" and layout.length != "auto":
         return layout.flat_grid(layout.rods, layout.length)
@@ -253,9 +247,8 @@ def middle_marks(grid: FlatGrid) -> list[tuple[float, ...]]:
 def placed_over(mesh: GridMesh, layout: GridLayout, top: Floats) -> Floats:
     """(n, 3) nodes of the flat grid turned to its heading, its middle at a point [m].
 
-    Parameters
-    ----------
-    top : (3,) that point [m].
+    Args:
+        top: (3,) that point [m].
     """
     c, s = np.cos(layout.rotate), np.sin(layout.rotate)
     return np.asarray(mesh.flat @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + top)
@@ -264,10 +257,9 @@ def placed_over(mesh: GridMesh, layout: GridLayout, top: Floats) -> Floats:
 def lost_contact(mesh: GridMesh, state: Floats, layout: GridLayout, top: Floats, target: Target) -> bool:
     """Whether the grid slid from its place on the target: the rod nearest the heading's axis left its vertical plane.
 
-    Parameters
-    ----------
-    state : (n, 3) of the mesh's nodes [m].
-    top : (3,) the point under the layout's middle [m].
+    Args:
+        state: (n, 3) of the mesh's nodes [m].
+        top: (3,) the point under the layout's middle [m].
     """
     rods = [k for k, rod in enumerate(mesh.grid.rods) if rod.family == "u"]
     axis = min(rods, key=lambda k: abs(mesh.grid.rods[k].offset))

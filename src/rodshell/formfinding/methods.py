@@ -17,8 +17,8 @@ from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import StrongBending, joint_tangents
 from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
-from rodshell.layout import FlatRod, GridLayout, GridMesh
-from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.layout import FlatRod, GridMesh, Layout
+from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.nets import ChebyshevNet
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status
@@ -32,7 +32,6 @@ STANDARD_GRAVITY = 9.81  # m/s2, as in the paper
 STOPPED: tuple[Stopped, ...] = get_args(Stopped)
 
 MethodName = Literal["bound", "gravity", "paper"]
-METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
 
 
 @dataclass(frozen=True)
@@ -47,13 +46,11 @@ class Bound:
 class Gravity:
     """The grid rests on the target in static equilibrium, under its weight.
 
-    Parameters
-    ----------
-    acceleration : of gravity [m/s2].
+    Args:
+        acceleration: of gravity [m/s2].
 
-    Raises
-    ------
-    InputError : the acceleration is not a positive number.
+    Raises:
+        InputError: the acceleration is not a positive number.
     """
 
     acceleration: float = STANDARD_GRAVITY
@@ -69,25 +66,23 @@ class Gravity:
 class Fall:
     """The grid falls on the target in time, by implicit Euler steps with impacts, until it is at rest [HQK 3].
 
-    Parameters
-    ----------
-    acceleration : of gravity [m/s2].
-    height : of the flat grid above the target's highest point [m].
-    coupling : of rods at their joints: shared DOFs, implicit or explicit penalty [HQK 2.2].
-    time_step : [s]; default: 10 ms on a target of 0.2 m, in proportion to the square root of its size; with explicit
-        ties at most nine tenths of their stability limit, whichever nodes touch.
-    duration : longest simulated time [s]; default: 6 s on a target of 0.2 m, in proportion to the root of its size.
-    stopped : the part of a node's velocity that an impact removes, see `ModifiedMass`.
-    friction : Coulomb's coefficient between rods and target [-].
-    drag : rate at which all velocities decay [1/s]; default: 12/s on a target of 0.2 m, in inverse proportion to the
-        square root of its size. The state of rest does not depend on it.
-    stream : folder for the frames, which must not contain any yet, read with `TimeSeries.load`; None keeps none.
-    every : number of steps from one frame to the next.
-    settle : end as soon as the grid is at rest; otherwise at the end of the duration.
+    Args:
+        acceleration: of gravity [m/s2].
+        height: of the flat grid above the target's highest point [m].
+        coupling: of rods at their joints: shared DOFs, implicit or explicit penalty [HQK 2.2].
+        time_step: [s]; default: 10 ms on a target of 0.2 m, in proportion to the square root of its size; with explicit
+            ties at most nine tenths of their stability limit, whichever nodes touch.
+        duration: longest simulated time [s]; default: 6 s on a target of 0.2 m, in proportion to the root of its size.
+        stopped: the part of a node's velocity that an impact removes, see `ModifiedMass`.
+        friction: Coulomb's coefficient between rods and target [-].
+        drag: rate at which all velocities decay [1/s]; default: 12/s on a target of 0.2 m, in inverse proportion to the
+            square root of its size. The state of rest does not depend on it.
+        stream: folder for the frames, which must not contain any yet, read with `TimeSeries.load`; None keeps none.
+        every: number of steps from one frame to the next.
+        settle: end as soon as the grid is at rest; otherwise at the end of the duration.
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind or sign.
+    Raises:
+        InputError: a value is of the wrong kind or sign.
     """
 
     acceleration: float = STANDARD_GRAVITY
@@ -126,9 +121,8 @@ Method = Bound | Gravity | Fall
 def require_method(value: object) -> None:
     """Refuse all but the three methods, with one sentence that names them.
 
-    Raises
-    ------
-    InputError : `value` is a word, a class, or anything else.
+    Raises:
+        InputError: `value` is a word, a class, or anything else.
     """
     if not isinstance(value, Bound | Gravity | Fall):
         methods = "rodshell.Bound(), rodshell.Gravity() or rodshell.Fall()"
@@ -138,9 +132,8 @@ def require_method(value: object) -> None:
 def require_coupling(name: str, value: object) -> None:
     """Refuse all but the three couplings, with one sentence that calls the argument by its `name`.
 
-    Raises
-    ------
-    InputError : `value` is a word, a class, or anything else.
+    Raises:
+        InputError: `value` is a word, a class, or anything else.
     """
     kinds = "rodshell.SharedDofs(), rodshell.ImplicitPenalty() or rodshell.ExplicitPenalty()"
     instance(name, value, SharedDofs | ImplicitPenalty | ExplicitPenalty, kinds)
@@ -150,15 +143,14 @@ def require_coupling(name: str, value: object) -> None:
 class DrapeFigures:
     """How well a grid lies on its target.
 
-    Parameters
-    ----------
-    max_gap : largest distance between the target and a node that should touch it, or depth of a node inside [m].
-    contact_pulls : number of nodes on the target that it would have to pull to hold them.
-    min_angle : smallest angle between two rods at a joint on the target [rad].
-    min_angle_at : x, y, z of that joint [m].
-    net_deviation : (k, 2) how far past its ends in the flat grid each of the `rods` would end if this drape placed
-        them, at start and end, along the rod [m]; None where the drape does place them.
-    strong_bending : bending of rods with a strong axis whose joints keep them from rolling (`Bound`); else None.
+    Args:
+        max_gap: largest distance between the target and a node that should touch it, or depth of a node inside [m].
+        contact_pulls: number of nodes on the target that it would have to pull to hold them.
+        min_angle: smallest angle between two rods at a joint on the target [rad].
+        min_angle_at: x, y, z of that joint [m].
+        net_deviation: (k, 2) how far past its ends in the flat grid each of the `rods` would end if this drape placed
+            them, at start and end, along the rod [m]; None where the drape does place them.
+        strong_bending: bending of rods with a strong axis whose joints keep them from rolling (`Bound`); else None.
     """
 
     max_gap: float
@@ -170,25 +162,40 @@ class DrapeFigures:
 
 
 @dataclass(frozen=True, eq=False)
+class FlatState:
+    """Rods along curves of a target, laid out in the plane such that they bend as little as they can.
+
+    Args:
+        positions: (n, 2) of the mesh's nodes [m]; where no such state was found, their plan.
+        strain: the largest of a rod's fibres that bend in the plane [-], or None.
+        report: of the solve; without negative modes that state is stable.
+    """
+
+    positions: Floats
+    strain: float | None
+    report: SolveReport
+
+
+@dataclass(frozen=True, eq=False)
 class Draped:
     """A flat grid lying on a target, not yet trimmed.
 
-    Parameters
-    ----------
-    target, layout, rod, anchor : as they were given; anchor is x, y [m], or None.
-    eccentricity : distance of the two layers of rods [m]; 0 where they meet.
-    mesh : the whole mesh, with the lines and tails that are cut off later.
-    positions : (n, 3) of its nodes [m]; of rods in two layers, of the surface between the layers.
-    rods : the k rods to be built, each from end to end of the target (`Bound`), or whole (`Gravity`, `Fall`).
-    levels : report of the solve on each level of refinement, the last at the layout's edge length.
-    figures : how well the grid lies on the target.
-    net : the net that the drape started from; None where it started from the flat grid.
-    rest : how the motion ended (`Fall`); else None.
+    Args:
+        target, layout, rod, anchor: as they were given; anchor is x, y [m], or None.
+        eccentricity: distance of the two layers of rods [m]; 0 where they meet.
+        mesh: the whole mesh, with the lines and tails that are cut off later.
+        positions: (n, 3) of its nodes [m]; of rods in two layers, of the surface between the layers.
+        rods: the k rods to be built, each from end to end of the target (`Bound`), or whole (`Gravity`, `Fall`).
+        levels: report of the solve on each level of refinement, the last at the layout's edge length.
+        figures: how well the grid lies on the target.
+        net: the net that the drape started from; None where it started from the flat grid.
+        rest: how the motion ended (`Fall`); else None.
+        flat_state: of rods along curves of the target, which do not form a straight lattice in the plane; else None.
     """
 
     method: Method
     target: Target
-    layout: GridLayout
+    layout: Layout
     rod: Rod
     anchor: tuple[float, float] | None
     eccentricity: float
@@ -199,6 +206,7 @@ class Draped:
     figures: DrapeFigures
     net: ChebyshevNet | None = None
     rest: "Rest | None" = None
+    flat_state: FlatState | None = None
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -224,10 +232,9 @@ class Draped:
 def smallest_joint_angle(mesh: GridMesh, positions: Floats, inside: Bools) -> tuple[float, tuple[float, float, float]]:
     """Smallest angle between two rods at a joint [rad], and where it is [m].
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes [m].
-    inside : (n,) nodes whose joints are considered.
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
+        inside: (n,) nodes whose joints are considered.
     """
     tangents = joint_tangents(mesh, positions)
     angle = np.arctan2(

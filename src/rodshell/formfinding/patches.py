@@ -1,230 +1,89 @@
-"""Several simple gridshells joined at seams: a target is cut into patches, each is formed alone, and on the seams the
-rod ends of both sides meet at common points [HQK 3.4, the outlook]."""
+"""Several simple gridshells joined at seams: a target is cut into patches, each is draped alone, and on the seams the
+rod ends of both sides meet at common points [HQK 3.4, the outlook]. All patches pop up as one shell."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from math import degrees
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
-from rodshell.formfinding.finite_sections import flat_warnings
 from rodshell.formfinding.methods import Draped
-from rodshell.formfinding.pipeline import Agreement, PatchForm, find_stages
-from rodshell.formfinding.popup import ENDS, Ends, Start
-from rodshell.formfinding.seams import FEWEST, Meeting, PatchNet, lay_patches, patches_of, transported_heading
+from rodshell.formfinding.pipeline import Stages, compared, find_stages, with_pop_ups
+from rodshell.formfinding.popup import pop_up
+from rodshell.formfinding.seams import FEWEST, Seams, lay_patches, patches_of, transported_heading
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
 from rodshell.joints import Ball, Joint, require_joint
-from rodshell.layout import GridLayout
-from rodshell.layout.mesh import SideBySide, side_by_side
+from rodshell.layout import GridLayout, Layout
+from rodshell.layout.gridlayout import require_chebyshev
+from rodshell.layout.mesh import side_by_side
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
-from rodshell.solve.equilibrium import SolveReport, Status
+from rodshell.rods.supports import BOTH, SUPPORTS, Asked, supports_of
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.targets.patch_layout import PatchLayout
 from rodshell.units import shown
-from rodshell.validation import choices_of
+from rodshell.validation import Ends, either
 
-MANY = 0.1  # of the rods: a larger share left out gives a warning
-ASTRAY = 0.005  # of the size: rod ends that are moved further give a warning
 GAP = 2.0  # spacings between the flat grids of neighbouring patches
-
-
-@dataclass(frozen=True, eq=False)
-class MergedPopUp:
-    """The popped-up shells of all patches, merged; the mechanical models stay separate.
-
-    Parameters
-    ----------
-    positions : (n, 3) of the nodes of all patches, one after the other [m].
-    report : the merged report of all solves.
-    """
-
-    ends: Ends
-    start: Start
-    footprint: Footprint
-    boundary: Boundary
-    positions: Floats
-    report: SolveReport
-
-
-@dataclass(frozen=True)
-class PatchedForm:
-    """A form in patches.
-
-    Parameters
-    ----------
-    patch_nets, patches : of each patch by its name: its rods, and every stage of its form.
-    meetings : where rods of two patches end at one point.
-    moved : of each patch the largest distance between a rod end of its mesh and that point, to which it was moved [m].
-    """
-
-    target: Target
-    seams: tuple[Seam, ...]
-    layout: GridLayout
-    rod: Rod
-    joint: Joint
-    patch_layouts: Mapping[str, PatchLayout]
-    patch_nets: dict[str, PatchNet]
-    patches: dict[str, PatchForm]
-    meetings: tuple[Meeting, ...]
-    moved: dict[str, float]
-    ends: tuple[Ends, ...]
-
-    @property
-    def status(self) -> str:
-        """ "converged", or which patch stopped and what to do."""
-        for name, form in self.patches.items():
-            if form.status != "converged":
-                return form.status if "(patch " in form.status else f"{form.status} (patch {name})"
-        return "converged"
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        whole = set(self.target.warnings)  # said once; and a patch may be flat where the shell is not
-        whole.update(*(flat_warnings(form.trimmed.positions, self.rod) for form in self.patches.values()))
-        words = [
-            f"patch {k}: {word}" for k, form in self.patches.items() for word in form.warnings if word not in whole
-        ]
-        words += [
-            f"patch {k}: rod ends were moved by up to {by:.3g} m to the points where they meet others: its net does "
-            "not reach these points well; try another heading or anchor"
-            for k, by in self.moved.items()
-            if by > ASTRAY * self.target.size
-        ]
-        share = left_out(self.patch_nets)
-        if share > MANY:
-            words.append(
-                f"{100 * share:.0f} % of the rods are left out, because no rod of the next patch can meet them at a "
-                "seam: another heading may leave out fewer (layout.rotate, or seams.patches for a single patch)"
-            )
-        return (*flat_warnings(self.draped, self.rod), *self.target.warnings, *words)
-
-    @property
-    def cut_along(self) -> tuple[Seam, ...]:
-        """Where the target is cut: along creases that seams are drawn near to."""
-        return next(iter(self.patch_nets.values())).patch.seams
-
-    def parameters(self) -> dict[str, object]:
-        """Seams and what patches have of their patch_layouts, as they stand in a case file."""
-        patches = [{"name": name, **_given(overrides)} for name, overrides in self.patch_layouts.items()]
-        return {"lines": [seam.points.tolist() for seam in self.seams], "patches": patches}
-
-    @cached_property
-    def flat(self) -> SideBySide:
-        """The flat grids of all patches in a row."""
-        gap = GAP * max(max(net.layout.spacing) for net in self.patch_nets.values())
-        return side_by_side({name: form.footprint.mesh for name, form in self.patches.items()}, gap)
-
-    @property
-    def footprint(self) -> Footprint:
-        return Footprint(self.flat.mesh)
-
-    @cached_property
-    def draped(self) -> Floats:
-        """(n, 3) all patches on the target [m]."""
-        shapes = [form.boundary.draped for form in self.patches.values()]
-        return np.concatenate([shape for shape in shapes if shape is not None])
-
-    @cached_property
-    def boundary(self) -> Boundary:
-        """Of all patches, rod by rod."""
-        parts = [form.boundary for form in self.patches.values()]
-        points, tangents = (np.concatenate([getattr(part, what) for part in parts]) for what in ("points", "tangents"))
-        return Boundary(points, tangents, self.draped)
-
-    @cached_property
-    def popped(self) -> dict[Ends, MergedPopUp]:
-        """The shells of all patches as one, for each kind of ends that all were popped up with."""
-        forms = list(self.patches.values())
-        return {
-            ends: MergedPopUp(
-                ends,
-                "draped",
-                self.footprint,
-                self.boundary,
-                np.concatenate([form.popped[ends].positions for form in forms]),
-                merged_report([form.popped[ends].report for form in forms]),
-            )
-            for ends in forms[0].popped
-            if all(ends in form.popped for form in forms)
-        }
-
-    @property
-    def agreement(self) -> dict[Ends, Agreement]:
-        forms = list(self.patches.values())
-        return {
-            ends: merged_agreement([form.agreement[ends] for form in forms])
-            for ends in forms[0].agreement
-            if all(ends in form.agreement for form in forms)
-        }
-
-    @property
-    def dropped(self) -> tuple[tuple[str, str], ...]:
-        """Rods that are not built, with the reason."""
-        return tuple(
-            (f"{name}-{rod}", why)
-            for name, form in self.patches.items()
-            for rod, why in (*self.patch_nets[name].dropped, *form.trimmed.dropped)
-        )
 
 
 def find_patched_stages(
     target: Target,
     seams: Sequence[Seam],
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     patch_layouts: Mapping[str, PatchLayout] | None = None,
     joint: Joint | None = None,
-    ends: Ends | Sequence[Ends] = ENDS,
-    warm_start: PatchedForm | None = None,
+    ends: Asked = BOTH,
+    warm_start: Stages | None = None,
     same_drape: bool = False,
     progress: Progress = silent,
-) -> PatchedForm:
-    """Cut a target into patches, lay their rods such that they meet, and form each; see `rodshell.find_form`.
+) -> Stages:
+    """Cut a target into patches, lay their rods such that they meet, drape each, and pop up all as one shell; see
+    `rodshell.find_form`.
 
-    Parameters
-    ----------
-    patch_layouts : settings of single patches, by name.
-    warm_start, same_drape : as in `find_stages`; patches are matched by their names.
+    Args:
+        patch_layouts: settings of single patches, by name.
+        warm_start, same_drape: as in `find_stages`; patches are matched by their names.
     """
-    ends = choices_of("ends", ends, ENDS)
+    layout, supports = require_chebyshev(layout, "seams"), supports_of(ends)
+    names = tuple(support.name for support in supports)
+    if others := set(names) - set(SUPPORTS):
+        raise InputError(f"patches stand on {either([*SUPPORTS])} supports, not on {others.pop()}: leave out the seams")
     require_joint(joint)
-    patch_layouts, joint = dict(patch_layouts or {}), joint or Ball()
-    earlier = warm_start.patches if warm_start is not None else {}
-    if warm_start is not None and same_drape:
-        patch_nets, meetings = warm_start.patch_nets, warm_start.meetings
+    joint = joint or Ball()
+    earlier = {} if warm_start is None else warm_start.patches
+    if warm_start is not None and warm_start.seams is not None and same_drape:
+        joined = warm_start.seams
     else:
-        patch_nets, meetings = _lay(target, seams, layout, patch_layouts, joint.eccentricity, progress)
-    found, moved = dict[str, PatchForm](), dict[str, float]()
-    for name, patch in patch_nets.items():
-        end_points = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
+        joined = _lay(target, seams, layout, dict(patch_layouts or {}), joint.eccentricity, progress)
+    found, moved = dict[str, Stages](), dict[str, float]()
+    for name, net in joined.nets.items():
 
         def patch_progress(stage: str, detail: str, residual: float, name: str = name) -> None:
             if stage == "net":
                 return  # the net is known and only marched again: no reason to discard what is finished
             progress(stage, f"patch {name}, {detail}", residual)
 
-        found[name] = find_stages(
-            patch.patch, patch.layout, rod,
-            anchor=patch.anchor, joint=joint, ends=ends, warm_start=earlier.get(name), same_drape=same_drape,
-            name=name, cut=partial(cut_with_ends, end_points=end_points), progress=patch_progress,
+        lying = find_stages(
+            net.patch, net.layout, rod,
+            anchor=net.anchor, joint=joint, ends=(), warm_start=earlier.get(name), same_drape=same_drape,
+            name=name, cut=partial(cut_with_ends, end_points=joined.ends_of(name)), progress=patch_progress,
         )  # fmt: skip
-        moved[name] = _moved(found[name])
-    return PatchedForm(
-        target, tuple(seams), layout, rod, joint, patch_layouts, patch_nets, found, meetings, moved, ends
-    )
+        found[name], moved[name] = replace(lying, ends=names), _moved(lying)
+    return with_pop_ups(side_by_side_stages(found, replace(joined, moved=moved)), supports, warm_start, progress)
 
 
 def best_heading(
     target: Target,
     seams: Sequence[Seam],
-    layout: GridLayout,
+    layout: Layout,
     patch_layouts: Mapping[str, PatchLayout],
     *,
     eccentricity: float = 0.0,
@@ -232,27 +91,20 @@ def best_heading(
 ) -> float:
     """The heading at the target's summit [rad] that leaves out the smallest share of the rods; a few are tried.
 
-    Raises
-    ------
-    RodshellError : every heading fails; the error is that of the first heading.
+    Raises:
+        RodshellError: every heading fails; the error is that of the first heading.
     """
-    shares, reasons = dict[float, float](), list[RodshellError]()
+    layout, shares, reasons = require_chebyshev(layout, "seams"), dict[float, float](), list[RodshellError]()
     for heading in HEADINGS:
         progress("seams", f"trying {degrees(heading):.0f} deg", 0.0)
         try:
-            patch_nets, _ = _lay(target, seams, replace(layout, rotate=heading), patch_layouts, eccentricity, silent)
-            shares[heading] = left_out(patch_nets)
+            joined = _lay(target, seams, replace(layout, rotate=heading), patch_layouts, eccentricity, silent)
+            shares[heading] = joined.left_out
         except RodshellError as reason:
             reasons.append(reason)
     if not shares:
         raise reasons[0]
     return min(shares, key=lambda heading: round(shares[heading], 2))
-
-
-def left_out(patch_nets: Mapping[str, PatchNet]) -> float:
-    """The share of the rods that is left out because no rod of the next patch meets them at a seam."""
-    missing = sum(len(net.layout.left_out) for net in patch_nets.values())
-    return missing / (missing + sum(len(net.rods) for net in patch_nets.values()))
 
 
 def _lay(
@@ -262,7 +114,7 @@ def _lay(
     patch_layouts: Mapping[str, PatchLayout],
     eccentricity: float,
     progress: Progress,
-) -> tuple[dict[str, PatchNet], tuple[Meeting, ...]]:
+) -> Seams:
     if layout.rods != "auto" or layout.length != "auto":
         raise InputError('a target cut by seams counts its rods itself: leave layout rods and length at "auto"')
     progress("seams", "cutting", 0.0)
@@ -274,7 +126,8 @@ def _lay(
         name: _layout_of(patch, layout, patch_layouts.get(name, PatchLayout())) for name, patch in patches.items()
     }
     anchors = {name: patch_layouts[name].anchor if name in patch_layouts else None for name in patches}
-    return lay_patches(patches, layouts, anchors, eccentricity=eccentricity, progress=progress)
+    laid = lay_patches(patches, layouts, anchors, eccentricity=eccentricity, progress=progress)
+    return Seams(target, layout, *laid)
 
 
 def _layout_of(patch: Patch, layout: GridLayout, overrides: PatchLayout) -> GridLayout:
@@ -287,11 +140,10 @@ def _layout_of(patch: Patch, layout: GridLayout, overrides: PatchLayout) -> Grid
 def cut_with_ends(draped: Draped, end_points: Mapping[tuple[str, int], Floats]) -> Trimmed:
     """Trim a draped grid, and move the rod ends at seams to the points where they meet others.
 
-    Parameters
-    ----------
-    draped : a grid on its patch.
-    end_points : (3,) the point of each of these ends, by rod and side [m]; the ends of rods in layers are put above or
-        below it.
+    Args:
+        draped: a grid on its patch.
+        end_points: (3,) the point of each of these ends, by rod and side [m]; the ends of rods in layers are put above
+            or below it.
     """
     trimmed = trim(draped, fewest=FEWEST)
     mesh, positions = trimmed.mesh, trimmed.positions.copy()
@@ -305,7 +157,7 @@ def cut_with_ends(draped: Draped, end_points: Mapping[tuple[str, int], Floats]) 
     return replace(trimmed, positions=positions, boundary=boundary)
 
 
-def _moved(form: PatchForm) -> float:
+def _moved(form: Stages) -> float:
     """Largest distance by which rod ends of a patch were moved from their draped positions [m]."""
     draped, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
     return float(
@@ -313,29 +165,26 @@ def _moved(form: PatchForm) -> float:
     )
 
 
-def _given(overrides: PatchLayout) -> dict[str, object]:
-    return {key: value for key, value in asdict(overrides).items() if value is not None}
+def joined_again(patches: dict[str, Stages], seams: Seams, ends: Ends) -> Stages:
+    """Patches that were popped up with one end condition, each alone, as one form: its shell begins where they are."""
+    joined = side_by_side_stages(patches, seams)
+    there = np.concatenate([patch.popped[ends].positions for patch in patches.values()])
+    start = replace(joined.boundary, draped=there)
+    popped = pop_up(joined.footprint, start, joined.rod, ends=ends, joint=joined.joint)
+    return compared(replace(joined, popped={ends: replace(popped, boundary=joined.boundary)}))
 
 
-def merged_report(reports: Sequence[SolveReport]) -> SolveReport:
-    """Of solves that have nothing to do with each other."""
-    worst = next((report.status for report in reports if not report.converged), Status.CONVERGED)
-    total = replace(
-        reports[0],
-        status=worst,
-        reason=next((report.reason for report in reports if report.reason), ""),
-        dofs=sum(report.dofs for report in reports),
-        force_residual=max(report.force_residual for report in reports),
-        max_strain=max(report.max_strain for report in reports),
-        negative_modes=sum(report.negative_modes for report in reports),
+def side_by_side_stages(patches: dict[str, Stages], seams: Seams) -> Stages:
+    """Patches as one form, before they are popped up."""
+    first = next(iter(patches.values()))
+    meshes = {name: patch.footprint.mesh for name, patch in patches.items()}
+    gap = GAP * max(max(net.layout.spacing) for net in seams.nets.values())
+    dropped = tuple(
+        (f"{name}-{rod}", why)
+        for name, patch in patches.items()
+        for rod, why in (*seams.nets[name].dropped, *patch.dropped)
     )
-    return total.after(*reports[1:])
-
-
-def merged_agreement(parts: Sequence[Agreement]) -> Agreement:
-    """Of several patches; each counts by its nodes."""
-    worst = max(parts, key=lambda part: part.max)
-    count = np.array([len(part.gaps) for part in parts])
-    square = np.array([part.rms for part in parts]) ** 2
-    rms = float(np.sqrt(np.average(square, weights=count)))
-    return replace(worst, gaps=np.concatenate([part.gaps for part in parts]), rms=rms)
+    return Stages(
+        "", first.rod, first.joint, first.ends, Footprint(side_by_side(meshes, gap)),
+        Boundary.of_grids([patch.boundary for patch in patches.values()]), dropped, patches=patches, seams=seams,
+    )  # fmt: skip

@@ -4,17 +4,19 @@ The last stage is the agreement: how far the popped-up shell is from the target,
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from math import degrees, pi, sqrt
+from dataclasses import dataclass, field, replace
+from math import sqrt
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.drape import drape
-from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
-from rodshell.formfinding.methods import Bound, Draped, Method
-from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
+from rodshell.formfinding.finite_sections import flat_warnings
+from rodshell.formfinding.form_warnings import grid_warnings, pop_up_warnings
+from rodshell.formfinding.methods import Bound, Draped, FlatState, Method
+from rodshell.formfinding.popup import PopUp, pop_up
+from rodshell.formfinding.seams import Seams
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
     NEAREST_JOINT,
@@ -27,32 +29,27 @@ from rodshell.formfinding.trim import (
 )
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.kernels import njit
-from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
+from rodshell.layout import FlatGrid, GridMesh, Layout, mesh_grid
 from rodshell.layout.flatgrid import TOGETHER
-from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.progress import Progress, silent
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import BOTH, PINNED, Asked, Support, supports_of
 from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.units import length_text, percent_text
-from rodshell.validation import choices_of, instance
-
-STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
-ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other axis
-LONG_TAIL = 3.0  # spacings past a rod's last joint
-ON_THE_END, MOST_OFF = 2e-4, 1e-3  # of the size, and m: a support that is further from the target's end gives a warning
+from rodshell.validation import Ends, instance
 
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
     """Distance between rods and target, over nodes and the middles of edges; of rods in layers from their own layer.
 
-    Parameters
-    ----------
-    gaps : (n,) signed distance of each node, positive outside [m].
-    max, rms : of all nodes and edge middles [m].
-    where : the point of the rods with the largest distance [m].
-    size : the target's size, by which the relative figures are divided [m].
+    Args:
+        gaps: (n,) signed distance of each node, positive outside [m].
+        max, rms: of all nodes and edge middles [m].
+        where: the point of the rods with the largest distance [m].
+        size: the target's size, by which the relative figures are divided [m].
     """
 
     gaps: Floats
@@ -60,6 +57,15 @@ class Agreement:
     rms: float
     where: tuple[float, float, float]
     size: float
+
+    @staticmethod
+    def of_all(parts: "Sequence[Agreement]") -> "Agreement":
+        """Of several patches; each counts by its nodes."""
+        worst = max(parts, key=lambda part: part.max)
+        count = np.array([len(part.gaps) for part in parts])
+        square = np.array([part.rms for part in parts]) ** 2
+        rms = float(np.sqrt(np.average(square, weights=count)))
+        return replace(worst, gaps=np.concatenate([part.gaps for part in parts]), rms=rms)
 
     @property
     def max_relative(self) -> float:
@@ -97,7 +103,7 @@ def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     return np.asarray(_edge_middles(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
 
 
-@njit(error_model="numpy")
+@njit("f2 i1 i1 i1 f1")
 def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
     result, edge = np.zeros((len(rod_nodes) - len(rod_start), 3)), 0
     for rod in range(len(rod_start)):
@@ -119,18 +125,19 @@ def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type:
 
 
 @dataclass(frozen=True)
-class PatchForm:
-    """Every stage of one shell: a form in one piece, one patch of a form, or a table of rods.
+class Stages:
+    """Every stage of one shell: of one grid, of several that are joined at seams, or of a table of rods.
 
-    Parameters
-    ----------
-    name : of the patch; "" where it is the only one.
-    rod, joint, ends : as they were given; `ends` are the requested end conditions.
-    footprint : the flat grid, ready to be cut.
-    boundary : where its rod ends go.
-    popped, agreement : by end condition; missing where an earlier stage did not converge.
-    dropped : rods that are not built, with the reason.
-    lying : the draped grid, cut to its target; None for a table of rods.
+    Args:
+        name: of a patch of a form; else "".
+        rod, joint, ends: as they were given; `ends` are the requested end conditions.
+        footprint: the flat grids, ready to be cut; of several patches in a row.
+        boundary: where the rod ends go.
+        dropped: rods that are not built, with the reason.
+        lying: the draped grid, cut to its target; None for a table of rods, and for several patches.
+        popped, agreement: by end condition; missing where an earlier stage did not converge.
+        patches: the stages of each patch by its name, its shells being parts of the whole; none of a single grid.
+        seams: how the patches are joined; None for a single grid.
     """
 
     name: str
@@ -139,27 +146,40 @@ class PatchForm:
     ends: tuple[Ends, ...]
     footprint: Footprint
     boundary: Boundary
-    popped: dict[Ends, PopUp]
-    agreement: dict[Ends, Agreement]
     dropped: tuple[tuple[str, str], ...]
-    lying: Trimmed | None
+    lying: Trimmed | None = None
+    popped: dict[Ends, PopUp] = field(default_factory=dict)
+    agreement: dict[Ends, Agreement] = field(default_factory=dict)
+    patches: dict[str, "Stages"] = field(default_factory=dict)
+    seams: Seams | None = None
+
+    @property
+    def parts(self) -> "tuple[Stages, ...]":
+        """The stages of each grid: of all patches, or of the only one."""
+        return tuple(self.patches.values()) or (self,)
 
     @property
     def from_table(self) -> bool:
         """Whether the form is that of a table of rods, which has no target."""
-        return self.lying is None
+        return self.lying is None and self.seams is None
 
     @property
     def trimmed(self) -> Trimmed:
         """The draped grid cut to its target.
 
-        Raises
-        ------
-        InputError : this is a table of rods.
+        Raises:
+            InputError: this is a table of rods, or there are several patches.
         """
+        if self.patches:
+            raise InputError(f"this form has {len(self.patches)} patches: take patches[k].draped or .trimmed")
         if self.lying is None:
             raise InputError("a table of rods has no target, and so it was never draped on one")
         return self.lying
+
+    @property
+    def on_target(self) -> Floats:
+        """(n, 3) nodes of all grids as they were draped and trimmed [m]; a table of rods raises as `trimmed` does."""
+        return np.concatenate([part.trimmed.positions for part in self.parts])
 
     @property
     def draped(self) -> Draped:
@@ -168,27 +188,46 @@ class PatchForm:
 
     @property
     def target(self) -> Target:
-        """The target, which for a patch ends at its seams; raises as `trimmed` does."""
-        return self.draped.target
+        """The target, which for a patch ends at its seams; a table of rods raises as `trimmed` does."""
+        return self.seams.target if self.seams else self.draped.target
 
     @property
-    def layout(self) -> GridLayout:
-        """The layout of the flat grid; raises as `trimmed` does."""
-        return self.draped.layout
+    def layout(self) -> Layout:
+        """The layout of the flat grid; a table of rods raises as `trimmed` does."""
+        return self.seams.layout if self.seams else self.draped.layout
 
     @property
     def drape_out_of_time(self) -> bool:
         """Whether a time limit stopped the drape."""
         return self.lying is not None and self.draped.report.status is Status.OUT_OF_TIME
 
-    def finished_pop_ups(self, ends: Sequence[Ends]) -> dict[Ends, PopUp]:
-        """The pop-ups with these ends that were not stopped by a time limit."""
-        found = [end for end in ends if end in self.popped]
-        return {end: self.popped[end] for end in found if self.popped[end].report.status is not Status.OUT_OF_TIME}
+    @property
+    def flat_state(self) -> FlatState | None:
+        """Where the rods lie in the plane, where they follow curves of the target."""
+        return None if self.lying is None else self.draped.flat_state
+
+    def lies_as(self, other: "Stages") -> bool:
+        """Whether all grids are the same and lie on the same targets; a table of rods lies on none."""
+        if self.from_table or other.from_table:
+            return self is other
+        if list(self.patches) != list(other.patches):
+            return False
+        return all(part.draped is there.draped for part, there in zip(self.parts, other.parts, strict=True))
+
+    def finished_pop_ups(self, supports: Sequence[Support]) -> dict[Ends, PopUp]:
+        """The pop-ups on these supports that were not stopped by a time limit."""
+        return {
+            ends: shell
+            for ends, shell in self.popped.items()
+            if shell.support in supports and shell.report.status is not Status.OUT_OF_TIME
+        }
 
     @property
     def status(self) -> str:
-        """ "converged", or which stage stopped and what to do."""
+        """ "converged", or which stage stopped, of which patch, and what to do."""
+        for name, patch in self.patches.items():
+            if patch.status != "converged":
+                return patch.status if "(patch " in patch.status else f"{patch.status} (patch {name})"
         if self.lying is not None and self.draped.report.reason:
             return self.draped.report.reason
         if self.lying is not None and not self.draped.converged:
@@ -213,44 +252,52 @@ class PatchForm:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
-        if self.lying is None:
-            return _rolled(self.popped)
-        tails = (*_off_the_end(self.lying), *_long_tails(self.lying)) if self.draped.converged else ()
-        flat = flat_warnings(self.lying.positions, self.rod)
-        pieces = _in_pieces(self.lying)
-        return (*flat, *self.draped.warnings, *pieces, *_stretched(self.draped), *tails, *_rolled(self.popped))
+        if self.seams is not None:
+            return self._warnings_of_patches(self.seams)
+        of_grid = () if self.lying is None else grid_warnings(self.lying, self.rod)
+        return (*of_grid, *pop_up_warnings(self.popped))
+
+    def _warnings_of_patches(self, seams: Seams) -> tuple[str, ...]:
+        whole = set(seams.target.warnings)  # said once; and a patch may be flat where the shell is not
+        whole.update(*(flat_warnings(patch.trimmed.positions, self.rod) for patch in self.parts))
+        each = [
+            f"patch {name}: {word}"
+            for name, patch in self.patches.items()
+            for word in patch.warnings
+            if word not in whole
+        ]
+        return (*flat_warnings(self.on_target, self.rod), *seams.target.warnings, *each, *seams.warnings)
 
 
 def find_stages(
     target: Target,
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     method: Method = Bound(),
     anchor: tuple[float, float] | None = None,
     joint: Joint | None = None,
-    ends: Ends | Sequence[Ends] = ENDS,
+    ends: Asked = BOTH,
     name: str = "",
-    warm_start: PatchForm | None = None,
+    warm_start: Stages | None = None,
     same_drape: bool = False,
     cut: Callable[[Draped], Trimmed] = trim,
     progress: Progress = silent,
-) -> PatchForm:
+) -> Stages:
     """Drape, trim, map back, pop up and compare; see `rodshell.find_form`.
 
-    Parameters
-    ----------
-    warm_start : stages found before, from whose net and shells the new ones start.
-    same_drape : whether nothing that the drape depends on has changed since: then drape and footprint of `warm_start`
-        are taken over, and so are its pop-ups with the same ends, except those that a time limit stopped.
-    cut : how the draped shell is trimmed.
+    Args:
+        warm_start: stages found before, from whose net and shells the new ones start.
+        same_drape: whether nothing that the drape depends on has changed since: then drape and footprint of
+            `warm_start` are taken over, and so are its pop-ups with the same ends, except those that a time limit
+            stopped.
+        cut: how the draped shell is trimmed.
     """
-    ends = choices_of("ends", ends, ENDS)
+    supports = supports_of(ends)
     require_joint(joint)
     joint = joint or Ball()
     if warm_start is not None and same_drape and not warm_start.drape_out_of_time:
-        draped, trimmed, footprint = warm_start.draped, warm_start.trimmed, warm_start.footprint
-        popped, compared = warm_start.finished_pop_ups(ends), dict(warm_start.agreement)
+        trimmed, footprint = warm_start.trimmed, warm_start.footprint
     else:
         draped = drape(
             layout, rod, target,
@@ -258,55 +305,88 @@ def find_stages(
             warm_start=warm_start.draped if warm_start else None, progress=progress,
         )  # fmt: skip
         trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
-        footprint, popped, compared = map_back(trimmed), dict[Ends, PopUp](), dict[Ends, Agreement]()
-    earlier = warm_start.popped if warm_start else {}
-    for end in ends if draped.converged else ():
+        footprint = map_back(trimmed)
+    names = tuple(support.name for support in supports)
+    lying = Stages(name, rod, joint, names, footprint, trimmed.boundary, trimmed.dropped, trimmed)
+    return with_pop_ups(lying, supports, warm_start, progress)
+
+
+def with_pop_ups(stages: Stages, supports: Sequence[Support], earlier: Stages | None, progress: Progress) -> Stages:
+    """Draped grids popped up as one shell on each of their supports, and compared.
+
+    Where the drape of a patch did not converge the others are popped up alone.
+
+    Args:
+        earlier: whose finished pop-ups are taken over where the grids lie as before, and are first guesses elsewhere.
+    """
+    if not all(part.draped.converged for part in stages.parts):
+        each = {name: with_pop_ups(patch, supports, None, progress) for name, patch in stages.patches.items()}
+        return replace(stages, patches=each)
+    known = earlier.finished_pop_ups(supports) if earlier is not None and stages.lies_as(earlier) else {}
+    before, popped = {} if earlier is None else earlier.popped, dict(known)
+    for support in supports:
+        end = support.name
         if end in popped:
             continue
         popped[end] = pop_up(
-            footprint, trimmed.boundary, rod,
-            ends=end, warm_start=earlier.get(end), joint=joint, like=next(iter(popped.values()), None),
+            stages.footprint, stages.boundary, stages.rod,
+            ends=support, warm_start=before.get(end), joint=stages.joint, like=next(iter(popped.values()), None),
             progress=progress,
         )  # fmt: skip
         if popped[end].report.status is Status.OUT_OF_TIME:
             break
-    popped = {end: popped[end] for end in ends if end in popped}
-    compared = {
-        end: compared[end] if end in compared else agreement(shell, target)
-        for end, shell in popped.items()
-        if shell.report.converged
-    }
-    return PatchForm(name, rod, joint, ends, footprint, trimmed.boundary, popped, compared, trimmed.dropped, trimmed)
+    return compared(replace(stages, popped={end: popped[end] for end in stages.ends if end in popped}), earlier)
+
+
+def compared(stages: Stages, earlier: Stages | None = None) -> Stages:
+    """Stages with the shells of their patches, and with the gaps of all that converged; those of earlier shells are
+    taken over."""
+    shells, patches, gaps = stages.popped, dict[str, Stages](), dict[Ends, Agreement]()
+    for k, (name, patch) in enumerate(stages.patches.items()):
+        of_patch = {end: _of_patch(shell, k, patch) for end, shell in shells.items()}
+        patches[name] = compared(replace(patch, popped=of_patch))
+    for end in [end for end, shell in shells.items() if shell.report.converged]:
+        if patches:
+            gaps[end] = Agreement.of_all([patch.agreement[end] for patch in patches.values()])
+        elif earlier is not None and earlier.popped.get(end) is shells[end]:
+            gaps[end] = earlier.agreement[end]
+        else:
+            gaps[end] = agreement(shells[end], stages.target)
+    return replace(stages, patches=patches, agreement=gaps)
+
+
+def _of_patch(popped: PopUp, k: int, patch: Stages) -> PopUp:
+    """The shell of the k-th patch, of all that were popped up together, on the patch's own mesh."""
+    shell = replace(popped.alone[k].shell, mesh=patch.footprint.mesh)
+    return replace(popped.alone[k], footprint=patch.footprint, boundary=patch.boundary, shell=shell)
 
 
 def popped_again(
-    form: PatchForm, footprint: Footprint, boundary: Boundary, ends: Ends, *, progress: Progress = silent
-) -> PatchForm:
+    form: Stages, footprint: Footprint, boundary: Boundary, ends: Ends, *, progress: Progress = silent
+) -> Stages:
     """The form of another flat grid on the same target: popped up and compared.
 
-    Parameters
-    ----------
-    form : whose target, rods and joints are kept.
-    footprint, boundary : the other grid, and where its rod ends go.
-    ends : the only end condition of the other form.
+    Args:
+        form: whose target, rods and joints are kept.
+        footprint, boundary: the other grid, and where its rod ends go.
+        ends: the only end condition of the other form.
     """
-    popped = pop_up(footprint, boundary, form.rod, ends=ends, joint=form.joint, progress=progress)
+    support = form.popped[ends].support if ends in form.popped else ends
+    popped = pop_up(footprint, boundary, form.rod, ends=support, joint=form.joint, progress=progress)
     compared = {ends: agreement(popped, form.target)} if popped.report.converged else {}
     return replace(
         form, ends=(ends,), footprint=footprint, boundary=boundary, popped={ends: popped}, agreement=compared
     )
 
 
-def meshed_again(form: PatchForm, ends: Ends) -> PatchForm:
+def meshed_again(form: Stages, ends: Ends) -> Stages:
     """The same rods on a new mesh with the same longest edge, popped up from the shape that they had.
 
-    Parameters
-    ----------
-    form : of a target, with a pop-up.
-    ends : how the rods' ends are held.
+    Args:
+        form: of a target, with a pop-up.
     """
     old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
-    mesh, normals = mesh_grid(old.grid, form.layout.edge), None
+    mesh, normals = mesh_grid(old.grid, form.layout.longest_edge), None
     if old.layered:
         mesh = mesh.in_layers(2 * float(np.abs(old.heights).max()))
         assert boundary.normals is not None
@@ -327,18 +407,16 @@ def pop_up_stages(
     joint: Joint | None = None,
     edge: float | None = None,
     progress: Progress = silent,
-) -> PatchForm:
+) -> Stages:
     """Pop up rods given by their flat lines and the final positions of their ends.
 
-    Parameters
-    ----------
-    finals : (m, 2, 3) where the two ends of each rod of `grid` go [m].
-    joint : the connection of rods where they cross, without eccentricity; ball joints by default.
-    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+    Args:
+        finals: (m, 2, 3) where the two ends of each rod of `grid` go [m].
+        joint: the connection of rods where they cross, without eccentricity; ball joints by default.
+        edge: longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
 
-    Raises
-    ------
-    InputError : no rod has three joints; the joint is eccentric.
+    Raises:
+        InputError: no rod has three joints; the joint is eccentric.
     """
     require_joint(joint)
     joint = joint or Ball()
@@ -360,85 +438,6 @@ def pop_up_stages(
     footprint = Footprint(mesh_grid(kept, edge or even))
     points = finals[rows].reshape(-1, 3)
     boundary = Boundary(points, np.zeros_like(points))
-    popped = pop_up(footprint, boundary, rod, ends="pinned", start="flat", joint=joint, progress=progress)
+    popped = pop_up(footprint, boundary, rod, ends=PINNED, start="flat", joint=joint, progress=progress)
     dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
-    return PatchForm("", rod, joint, ("pinned",), footprint, boundary, {"pinned": popped}, {}, dropped, None)
-
-
-def _stretched(draped: Draped) -> tuple[str, ...]:
-    """A warning where rods stretch under their weight; in weight over stiffness the section's area cancels out."""
-    strain = draped.report.max_strain
-    if isinstance(draped.method, Bound) or not draped.converged or strain <= STRETCHED:
-        return ()
-    return (
-        f"on the target the rods stretch by {100 * strain:.2g} % under their own weight, so that they are cut too "
-        'short: use a stiffer or lighter material (rod.material; a thicker section does not help), or method "bound"',
-    )
-
-
-def _off_the_end(trimmed: Trimmed) -> tuple[str, ...]:
-    """A warning where supports of the net's rods lie off the target's end: edges are straight, rods are bent."""
-    draped, points = trimmed.draped, trimmed.boundary.points
-    if draped.eccentricity or not isinstance(draped.method, Bound):
-        return ()
-    off = np.abs(draped.target.margin(points))
-    allowed, worst = min(ON_THE_END * draped.target.size, MOST_OFF), int(np.argmax(off > (1 - 1e-6) * off.max()))
-    if off[worst] <= allowed:
-        return ()
-    edge = length_text(0.9 * draped.layout.edge * sqrt(allowed / off[worst]))  # the error is of second order
-    rod, (x, y, z) = trimmed.mesh.grid.rods[worst // 2].name, points[worst]
-    return (
-        f"{np.count_nonzero(off > allowed)} supports are off the end of the target, by up to {length_text(off[worst])} "
-        f"(of rod {rod} at ({x:.4g}, {y:.4g}, {z:.4g}) m), since the mesh's edges are long for its curvature: use a "
-        f"layout.edge of {edge}",
-    )
-
-
-def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
-    """A warning where rods run far past their last joint, since crossings there lie too near to an end."""
-    grid = trimmed.mesh.grid
-    ends = np.array([(rod.start, rod.end) for rod in grid.rods])
-    first, last = ends[:, 1].copy(), ends[:, 0].copy()
-    np.minimum.at(first, grid.crossings.rods, grid.crossings.at)
-    np.maximum.at(last, grid.crossings.rods, grid.crossings.at)
-    tails = np.maximum(first - ends[:, 0], ends[:, 1] - last)
-    spacing = max(trimmed.draped.layout.spacing)
-    long, worst = int(np.count_nonzero(tails > LONG_TAIL * spacing)), int(np.argmax(tails))
-    if not long:
-        return ()
-    left = len(FlatGrid.of(grid.rods).crossings) - len(grid.crossings)
-    others = f" ({long} rods do so by more than {LONG_TAIL:g} spacings)" if long > 1 else ""
-    near = f"no joint is made within {NEAREST_JOINT:g} spacings of a rod's end, here at {left} crossings"
-    why = f": {near}" if left else ""
-    return (
-        f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; another offset or "
-        "anchor of the layout may help, or leave such rods out",
-    )
-
-
-def _in_pieces(trimmed: Trimmed) -> tuple[str, ...]:
-    """A warning where rods that are built do not run from rim to rim."""
-    built, net = {rod.name for rod in trimmed.mesh.grid.rods}, trimmed.draped.net
-    names = [] if net is None else [name for name, pieces in net.pieces.items() if not built.isdisjoint(pieces)]
-    if not names:
-        return ()
-    are = "rods are" if len(names) > 1 else "rod is"
-    return (
-        f"{len(names)} {are} on the target in several pieces, each with its own ends: {', '.join(names)}; where they "
-        "end at an opening, it needs a ring that carries their reactions; where they only cross the edge twice, "
-        "another offset of the layout may help",
-    )
-
-
-def _rolled(popped: dict[Ends, PopUp]) -> tuple[str, ...]:
-    """A warning where laths on edge lie down, as joints do not hold them, and then bend about their weak axes."""
-    for ends, shell in popped.items():
-        angles = section_rotation(shell.shell, shell.state) if shell.report.converged else None
-        if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
-            return (
-                f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "
-                f"{degrees(angles.max()):.0f} ({ends} ends), and bend about their weak axes, since nothing holds them: "
-                'bolted laths keep their orientation, with larger stresses; set joint.kind = "pin", or swap the '
-                "width and the height of the section",
-            )
-    return ()
+    return Stages("", rod, joint, (popped.ends,), footprint, boundary, dropped, popped={popped.ends: popped})

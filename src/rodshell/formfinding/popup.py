@@ -16,25 +16,27 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding.finite_sections import node_normals
+from rodshell.formfinding.supports import let_go
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.frames import dot, unit
 from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.joints import Ball, Joint, require_joint
+from rodshell.joints.crossings import UP
 from rodshell.layout import GridMesh
 from rodshell.layout.transfer import transferred_edges, transferred_nodes
 from rodshell.model import Shell
-from rodshell.model.shell import UP
+from rodshell.model.rod_sections import RodSections
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import CLAMPED, PINNED, Support, support_of
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
+from rodshell.solve.grids import alone, together
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
 from rodshell.solve.problem import Pattern, Problem, Supports, mean_radius
 from rodshell.units import length_text
-from rodshell.validation import choice, instance, whole
+from rodshell.validation import Ends, choice, instance, whole
 
-Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
-ENDS: tuple[Ends, ...] = get_args(Ends)
 STARTS: tuple[Start, ...] = get_args(Start)
 
 FIRST_RISE = 0.05  # share of the ends' paths in the step that leaves the plane
@@ -52,26 +54,32 @@ NEARBY = 0.1  # of the length: a state further from the guess may be another equ
 class PopUp:
     """The popped-up shell, and how it was found.
 
-    Parameters
-    ----------
-    ends, start : the end condition, and where the solve started from.
-    footprint, boundary : as they were given, in layers where joints are eccentric.
-    shell : the mechanical model, its source frames being at the equilibrium.
-    equilibrium : with the ends held where they are; its report counts the work of all solves on the way.
+    Args:
+        support, start: what holds the rods' ends, and where the solve started from.
+        footprint, boundary: as they were given, in layers where joints are eccentric.
+        shell: the mechanical model, its source frames being at the equilibrium.
+        equilibrium: with the ends held where they are; its report counts the work of all solves on the way.
+        alone: of grids side by side the shell of each; of one grid none.
     """
 
-    ends: Ends
+    support: Support
     start: Start
     footprint: Footprint
     boundary: Boundary
     shell: Shell
     equilibrium: Equilibrium
+    alone: tuple["PopUp", ...] = ()
 
     def __repr__(self) -> str:
         rods, state = len(self.footprint.rods), self.report.status.value
         if self.report.converged:
             state = "stable" if self.report.stable else "unstable"
         return f"<PopUp: {rods} rods, {self.ends} from {self.start}, {state}>"
+
+    @property
+    def ends(self) -> Ends:
+        """Name of the support."""
+        return self.support.name
 
     @cached_property
     def positions(self) -> Floats:
@@ -109,7 +117,7 @@ def pop_up(
     boundary: Boundary,
     rod: Rod,
     *,
-    ends: Ends = "clamped",
+    ends: Ends | Support = CLAMPED,
     start: Start = "draped",
     warm_start: PopUp | None = None,
     joint: Joint | Sequence[Joint] | None = None,
@@ -119,36 +127,39 @@ def pop_up(
 ) -> PopUp:
     """Move the rod ends of `footprint` to `boundary` and find the equilibrium of the free grid.
 
-    Parameters
-    ----------
-    ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp).
-    start : "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
-        flat grid, which leaves its plane to the side that the boundary's directions point away from (without
-        directions to that of +z), then turns the clamps.
-    warm_start : a shell popped up before with the same ends, for start="draped": the displacements and axial forces
-        that it had on the same rods are the first guess. Where that does not lead to a stable state nearby, the
-        draped state is used.
-    joint : the connection of rods where they cross: one joint for all crossings, or a sequence with one for each;
-        ball joints by default. Eccentric joints place the rods in two layers: each rod starts on its own line, half
-        of their distance above or below the draped surface, and the boundary's ends lie there.
-    like : a pop-up of the same footprint, such as with other ends. Where its matrices have the same pattern they are
-        not analysed again, which saves time and changes nothing else.
-    most_factorizations : with start="flat", about how many each path (of the ends, and of the clamps) may take before
-        it is given up; None: no such limit, and a path that Newton's method loses is followed in short steps.
+    Grids that lie side by side are one shell. From flat, and where all together are not stable, each is popped up
+    alone, so that what becomes of one does not depend on the others.
 
-    Raises
-    ------
-    InputError : an argument of the wrong kind; `start` is "draped" and the boundary has no draped state; `warm_start`
-        has other ends, or comes with start="flat"; the joints do not fit the grid.
+    Args:
+        ends: "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp); or a
+            support of your own, which lets go of the ends once the shell has popped up.
+        start: "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
+            flat grid, which leaves its plane to the side that the boundary's directions point away from (without
+            directions to that of +z), then turns the clamps.
+        warm_start: a shell popped up before with the same ends, for start="draped": the displacements and axial forces
+            that it had on the same rods are the first guess. Where that does not lead to a stable state nearby, the
+            draped state is used.
+        joint: the connection of rods where they cross: one joint for all crossings, or a sequence with one for each;
+            ball joints by default. Eccentric joints place the rods in two layers: each rod starts on its own line, half
+            of their distance above or below the draped surface, and the boundary's ends lie there.
+        like: a pop-up of the same footprint, such as with other ends. Where its matrices have the same pattern they are
+            not analysed again, which saves time and changes nothing else.
+        most_factorizations: with start="flat", about how many each path (of the ends, and of the clamps) may take
+            before it is given up; None: no such limit, and a path that Newton's method loses is followed in short
+            steps.
+
+    Raises:
+        InputError: an argument of the wrong kind; `start` is "draped" and the boundary has no draped state;
+            `warm_start` has other ends, or comes with start="flat"; the joints do not fit the grid.
     """
-    choice("ends", ends, ENDS)
+    support = support_of(ends)
     choice("start", start, STARTS)
     if warm_start is not None:
         instance("warm_start", warm_start, PopUp, "what an earlier rodshell.pop_up returned")
     if warm_start is not None and start != "draped":
         raise InputError('an earlier pop-up can only be used with start="draped": leave out warm_start, or start')
-    if warm_start is not None and warm_start.ends != ends:
-        raise InputError(f"the earlier pop-up has {warm_start.ends} ends, not {ends}: give one with the same ends")
+    if warm_start is not None and warm_start.ends != support.name:
+        raise InputError(f"the earlier pop-up has {warm_start.ends} ends, not {support}: give one with the same ends")
     if like is not None:
         instance("like", like, PopUp, "what an earlier rodshell.pop_up returned")
     instance("footprint", footprint, Footprint)
@@ -170,16 +181,7 @@ def pop_up(
         )
     known = like.equilibrium.problem.pattern if like is not None else None
     stages = _Stages(footprint, boundary, rod, joint, progress, known, most_factorizations)
-    if start == "draped":
-        shell, found = (stages.again(warm_start) if warm_start else None) or stages.release(ends)
-    else:
-        shell, found = stages.rise()
-        if ends == "clamped" and found.report.converged:
-            shell, found = stages.turn_clamps(shell, found)
-    shell = shell.with_elements(found.elements)
-    if start == "flat":  # the ends have arrived
-        found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
-    return PopUp(ends, start, footprint, boundary, shell, found)
+    return stages.popped(support, start, warm_start)
 
 
 @dataclass(frozen=True)
@@ -193,16 +195,18 @@ class _Stages:
     progress: Progress
     pattern: Pattern | None = None
     most_factorizations: int | None = None
+    isotropic: bool | None = None
 
-    def _counting(self, what: str, most: int) -> Callable[[int, float], None]:
+    def counting(self, what: str, most: int) -> Callable[[int, float], None]:
         return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
 
-    def shell(self, ends: Ends) -> Shell:
+    def shell(self, support: Support) -> Shell:
         mesh = self.footprint.mesh
-        shell = Shell.of(mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
+        clamped = support.holds_directions
+        shell = Shell.of(mesh, self.rod, clamped=clamped, joint=self.joint, isotropic=self.isotropic)
         if not shell.angles:
             return shell
-        return shell.turned(PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], self.boundary.points).turn)
+        return shell.turned(np.array([motion.turn for motion in _motions(mesh, self.boundary.points)]))
 
     @property
     def length(self) -> float:
@@ -217,7 +221,8 @@ class _Stages:
         states far from the target. None where rods can roll at their joints: laths on edge have as many modes, and
         lie down.
         """
-        return None if self.rolls else int(MODES_PER_JOINT * len(self.footprint.mesh.grid.crossings))
+        fewest = min(len(mesh.grid.crossings) for mesh in self.footprint.mesh.grids)
+        return None if self.rolls else int(MODES_PER_JOINT * fewest)
 
     @property
     def most_rolling(self) -> int | None:
@@ -232,6 +237,53 @@ class _Stages:
         joints = self.joint if isinstance(self.joint, Sequence) else (self.joint,)
         return not all(joint.holds_normals for joint in joints)
 
+    def popped(self, support: Support, start: Start, warm_start: PopUp | None) -> PopUp:
+        """Of several grids as one shell, or each alone: from flat, and where all together are not stable."""
+        grids = self._of_grids()
+        if start == "flat" and grids:
+            return self._one_by_one(grids, support, start)
+        if start == "draped":
+            shell, found = (self.again(warm_start, support) if warm_start else None) or self.release(support)
+            if grids and not found.report.stable and found.report.status is not Status.OUT_OF_TIME:
+                return self._one_by_one(grids, support, start, found.report)
+        else:
+            shell, found = self.rise()
+            if support.holds_directions and found.report.converged:
+                shell, found = self.turn_clamps(shell, found, support)
+        shell = shell.with_elements(found.elements)
+        if start == "flat":  # the ends have arrived
+            found = replace(found, problem=replace(found.problem, constraint=Supports(shell.held_ends())))
+        if found.report.converged:
+            shell, found = let_go(shell, found, support, self.boundary.points, self.counting)
+        parts = [alone(shell, found, k, grid.shell(support), grid.boundary.points) for k, grid in enumerate(grids)]
+        pairs = zip(grids, parts, strict=True)
+        each = tuple(PopUp(support, start, grid.footprint, grid.boundary, *part) for grid, part in pairs)
+        return PopUp(support, start, self.footprint, self.boundary, shell, found, each)
+
+    def _one_by_one(self, grids: Sequence["_Stages"], support: Support, start: Start, *earlier: SolveReport) -> PopUp:
+        """Each grid popped up alone, after `earlier` solves of all that were not stable."""
+        each, shell = tuple(grid.popped(support, start, None) for grid in grids), self.shell(support)
+        parts = [(grid.shell, grid.equilibrium) for grid in each]
+        found = together(shell, self.problem(shell), parts, *earlier)
+        shell = shell.with_elements(found.elements)
+        return PopUp(support, start, self.footprint, self.boundary, shell, found, each)
+
+    def _of_grids(self) -> list["_Stages"]:
+        """Those of each grid, where several lie side by side."""
+        mesh, every = self.footprint.mesh, self.joint
+        if not mesh.side_by_side:
+            return []
+        sections = RodSections.of(mesh, [self.rod] * len(mesh.grid.rods)).nodes
+        isotropic = bool((sections[:, 0] == sections[:, 1]).all())  # else each grid needs frames, as the whole does
+        stops = np.cumsum([0, *(len(grid.grid.crossings) for grid in mesh.side_by_side)])
+        return [
+            replace(
+                self, footprint=Footprint(grid), boundary=self.boundary.of_grid(mesh, k), pattern=None,
+                isotropic=isotropic, joint=every[stops[k] : stops[k + 1]] if isinstance(every, Sequence) else every,
+            )
+            for k, grid in enumerate(mesh.side_by_side)
+        ]  # fmt: skip
+
     def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
         """The shell with its ends (and ghost nodes) held at the boundary, or at `goals`."""
         return Problem.of_shell(shell, self.boundary.points, goals=goals, pattern=self.pattern)
@@ -245,7 +297,7 @@ class _Stages:
             normals = node_normals(self.footprint.mesh, positions)
         return shell.state(positions, tangents, normals)
 
-    def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
+    def release(self, support: Support) -> tuple[Shell, Equilibrium]:
         """Release the draped state: the ends stay, the target's forces vanish.
 
         In one solve, or, where that fails, by descending the energy. Abandoned where the state has more negative modes
@@ -253,9 +305,10 @@ class _Stages:
         """
         if self.boundary.draped is None:
             raise InputError('this boundary has no draped state to start from: use start="flat"')
-        shell = self.shell(ends)
+        shell = self.shell(support)
         state = self.upright(shell, self.boundary.draped, self.boundary.tangents, self.boundary.normals)
         forces = np.zeros(len(self.footprint.mesh.edges))
+        several = len(self.footprint.mesh.grids) > 1  # then each leaves its own saddle, to its own side
         at_once = find_stable(
             self.problem(shell),
             state,
@@ -263,20 +316,20 @@ class _Stages:
             limit_steps=True,
             most_modes=self.most_modes,
             most_iterations=MOST_AT_ONCE,
-            progress=self._counting(f"{ends}, iteration", MOST_AT_ONCE),
+            slide=not several,
+            progress=self.counting(f"{support}, iteration", MOST_AT_ONCE),
         )
-        if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
+        given_up = at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME)
+        if at_once.report.stable or given_up or several:
             return shell, at_once
         relaxed = relax(
             self.problem(shell),
             state,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"{ends}, descending, step {k} of at most {MOST_STEPS}", step
-            ),
+            progress=self.counting(f"{support}, descending, step", MOST_STEPS),
         )
         return shell, replace(relaxed, report=relaxed.report.after(at_once.report))
 
-    def again(self, warm_start: PopUp) -> tuple[Shell, Equilibrium] | None:
+    def again(self, warm_start: PopUp, support: Support) -> tuple[Shell, Equilibrium] | None:
         """Start from the displacements of an earlier pop-up; None where that does not lead to a stable state nearby.
 
         Not for rods with twist angles: these are not transferred, and without them the draped state is a better guess.
@@ -284,7 +337,7 @@ class _Stages:
         here, there = self.boundary.draped, warm_start.boundary.draped
         if here is None or there is None or warm_start.shell.angles:
             return None
-        shell, mesh, before = self.shell(warm_start.ends), self.footprint.mesh, warm_start.footprint.mesh
+        shell, mesh, before = self.shell(support), self.footprint.mesh, warm_start.footprint.mesh
         moved = transferred_nodes(warm_start.positions - there, before, mesh)
         moved[mesh.ends] = 0.0
         state = self.upright(shell, here + moved, self.boundary.tangents)
@@ -294,9 +347,7 @@ class _Stages:
             state,
             stiffer * transferred_edges(warm_start.forces, before, mesh),
             most_iterations=MOST_AGAIN,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"{warm_start.ends}, again, iteration {k} of at most {MOST_AGAIN}", step
-            ),
+            progress=self.counting(f"{support}, again, iteration", MOST_AGAIN),
         )
         strayed = np.abs(shell.positions(found.state) - here - moved).max() > NEARBY * self.length
         return None if strayed or not found.report.stable else (shell, found)
@@ -307,7 +358,7 @@ class _Stages:
         In steps as long as Newton's method allows, or, where these do not lead to a stable shell, in short ones.
         """
         mesh, boundary = self.footprint.mesh, self.boundary
-        shell = self.shell("pinned")
+        shell = self.shell(PINNED)
         flat = flat_below(mesh, boundary.points)
         first = flat[mesh.ends.ravel()]
         arch = self.upright(shell, arched(self.footprint, flat, first, boundary))
@@ -324,7 +375,7 @@ class _Stages:
             most_factorizations=self.most_factorizations,
             most_modes=self.most_rolling,
             progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
-        )
+        ).whole
         late = found.report.status is Status.OUT_OF_TIME
         if found.report.stable or late or self.most_factorizations is not None:
             return shell, found
@@ -340,9 +391,7 @@ class _Stages:
         here = relax(
             problem_at(FIRST_RISE),
             arch,
-            progress=lambda k, step: self.progress(
-                "pop-up", f"from flat, descending, step {k} of at most {MOST_STEPS}", step
-            ),
+            progress=self.counting("from flat, descending, step", MOST_STEPS),
         )
         if not here.report.stable:
             kept, other = (here, failed) if here.report.status is Status.OUT_OF_TIME else (failed, here)
@@ -370,10 +419,10 @@ class _Stages:
             return replace(failed, report=failed.report.after(here.report, *path.reports))
         return replace(path.found, report=replace(work, status=Status.STALLED))
 
-    def turn_clamps(self, free: Shell, pinned: Equilibrium) -> tuple[Shell, Equilibrium]:
+    def turn_clamps(self, free: Shell, pinned: Equilibrium, support: Support) -> tuple[Shell, Equilibrium]:
         """Turn the end directions of the pinned state to those of the boundary."""
         mesh, outward = self.footprint.mesh, self.boundary.tangents
-        shell, positions = self.shell("clamped"), free.positions(pinned.state)
+        shell, positions = self.shell(support), free.positions(pinned.state)
         now = end_directions(mesh, positions)
         start = self.upright(shell, positions, now)
 
@@ -390,7 +439,7 @@ class _Stages:
             progress=lambda t, k, step: self.progress(
                 "pop-up", f"turning clamps, {100 * t:.0f} %, iteration {k}", step
             ),
-        )
+        ).whole
         return shell, replace(found, report=found.report.after(pinned.report))
 
 
@@ -408,18 +457,26 @@ def turned(now: Floats, goal: Floats, t: float) -> Floats:
 
 
 def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
-    """The flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
+    """Each flat grid turned and moved in its plane so that its rods' ends have the shortest paths.
 
-    Parameters
-    ----------
-    points : (2m, 3) where both ends of each rod in turn are to go [m].
-    height : of the grid's plane [m].
+    Args:
+        points: (2m, 3) where both ends of each rod in turn are to go [m].
+        height: of the plane [m].
 
-    Returns
-    -------
-    (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
+    Returns:
+        (n, 3) positions of the mesh's nodes [m]; rods in two layers keep their distance from the plane.
     """
-    return PlanarMotion.onto(mesh.flat[mesh.ends.ravel()], points).moved(mesh.flat, height)
+    laid = np.empty_like(mesh.flat)
+    for k, motion in enumerate(_motions(mesh, points)):
+        nodes = mesh.grid_of_nodes == k
+        laid[nodes] = motion.moved(mesh.flat[nodes], height)
+    return laid
+
+
+def _motions(mesh: GridMesh, points: Floats) -> list[PlanarMotion]:
+    """Of each flat grid, so that its rods' ends have the shortest paths to the points (2m, 3) [m]."""
+    flat, of_ends = mesh.flat[mesh.ends.ravel()], np.repeat(mesh.grid_of_rods, 2)
+    return [PlanarMotion.onto(flat[of_ends == k], points[of_ends == k]) for k in range(len(mesh.grids))]
 
 
 def flat_below(mesh: GridMesh, points: Floats) -> Floats:

@@ -25,16 +25,16 @@ Energies = Sequence[tuple[float, float]]  # times [s] and kinetic energies [J]
 class Rest:
     """How a motion ended.
 
-    Parameters
-    ----------
-    at_rest : whether kinetic energy and out-of-balance force are below their limits.
-    time : simulated [s].
-    kinetic_energy : [J].
-    force_residual : largest out-of-balance force on a node, along its free directions [N].
-    joint_gap : largest distance between two rods at a joint, where a penalty lets them separate [m].
-    growth : (k,) lowest s of K x = s M x [1/s2] with the touching nodes free in their tangent planes: a negative one
-        grows as exp(sqrt(-s) t) without friction. Empty where the motion is not at rest.
-    steps, refused_steps : number of time steps taken, and of those that failed and were repeated with a shorter step.
+    Args:
+        at_rest: whether kinetic energy and out-of-balance force are below their limits.
+        time: simulated [s].
+        kinetic_energy: [J].
+        force_residual: largest out-of-balance force on a node, along its free directions [N].
+        joint_gap: largest distance between two rods at a joint, where a penalty lets them separate [m].
+        growth: (k,) lowest s of K x = s M x [1/s2] with the touching nodes free in their tangent planes: a negative one
+            grows as exp(sqrt(-s) t) without friction. Empty where the motion is not at rest.
+        steps, refused_steps: number of time steps taken, and of those that failed and were repeated with a shorter
+            step.
     """
 
     at_rest: bool
@@ -55,10 +55,9 @@ class Rest:
 def out_of_balance(motion: Motion, state: Floats, load: Floats) -> Floats:
     """(N, 3) gradient of all energies less the load [N]: what supports and contact must carry.
 
-    Parameters
-    ----------
-    state : (N, 3) nodes [m] and twist angles [rad].
-    load : (N, 3) on them [N], [N m].
+    Args:
+        state: (N, 3) nodes [m] and twist angles [rad].
+        load: (N, 3) on them [N], [N m].
     """
     return motion.energies.gradient(state) - load
 
@@ -66,11 +65,10 @@ def out_of_balance(motion: Motion, state: Floats, load: Floats) -> Floats:
 def unbalanced_force(motion: Motion, state: Floats, load: Floats, touching: Touching) -> float:
     """Largest force on a node that neither its supports nor contact nor friction balance [N].
 
-    Parameters
-    ----------
-    state : (N, 3) nodes [m] and twist angles [rad].
-    load : (N, 3) on them [N], [N m].
-    touching : the nodes in contact with the target.
+    Args:
+        state: (N, 3) nodes [m] and twist angles [rad].
+        load: (N, 3) on them [N], [N m].
+        touching: the nodes in contact with the target.
     """
     gradient = out_of_balance(motion, state, load)
     free = touching.freedom(state)
@@ -82,11 +80,10 @@ def unbalanced_force(motion: Motion, state: Floats, load: Floats, touching: Touc
 def lowest_modes(motion: Motion, state: Floats, load: Floats, touching: Touching, target: Target) -> tuple[float, ...]:
     """The lowest s of K x = s M x [1/s2] with the touching nodes sliding on the target, without friction.
 
-    Parameters
-    ----------
-    state : (N, 3) nodes [m] and twist angles [rad].
-    load : (N, 3) on them [N], [N m].
-    touching : the nodes in contact with the target.
+    Args:
+        state: (N, 3) nodes [m] and twist angles [rad].
+        load: (N, 3) on them [N], [N m].
+        touching: the nodes in contact with the target.
     """
     sliding = replace(touching, stuck=np.zeros(len(touching.nodes), dtype=bool))
     free = sliding.freedom(state)
@@ -110,13 +107,12 @@ def rest_advice(energies: Energies, still: float, force: float, usual: float, dr
 
     A drag c makes velocities decay as exp(-c t / 2) where it is far from critical, and energies as exp(-c t).
 
-    Parameters
-    ----------
-    energies : times [s] and kinetic energies [J] of the fall that was too short.
-    still : kinetic energy that counts as rest [J].
-    force : out-of-balance force over that which counts as rest [-]; energies are proportional to its square.
-    usual : duration of a fall on such a target [s].
-    drag : of that fall [1/s].
+    Args:
+        energies: times [s] and kinetic energies [J] of the fall that was too short.
+        still: kinetic energy that counts as rest [J].
+        force: out-of-balance force over that which counts as rest [-]; energies are proportional to its square.
+        usual: duration of a fall on such a target [s].
+        drag: of that fall [1/s].
     """
     words = []
     most = max((energy for _, energy in energies), default=0.0)
@@ -137,9 +133,8 @@ def energy_decay(energies: Energies) -> tuple[float, float]:
 
     Peaks are compared, since the energy oscillates; the rate is 0 where too few energies are given.
 
-    Parameters
-    ----------
-    energies : times [s] and kinetic energies [J], in ascending order of time.
+    Args:
+        energies: times [s] and kinetic energies [J], in ascending order of time.
     """
     times, values = np.array(energies, dtype=float).reshape(-1, 2).T
     end = times[-1] if len(times) else 0.0

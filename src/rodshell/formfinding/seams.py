@@ -4,7 +4,7 @@ The rods are chosen such that where a rod ends on a seam, a rod of the next patc
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from string import ascii_uppercase
 
 import numpy as np
@@ -33,6 +33,8 @@ LEAST = 0.01  # of the target's area: smaller parts are not patches
 DEEP = 0.05  # of the size: a centre of area closer to the patch's end is not used as its middle
 REMEDY = "turn the layout (layout.rotate), so that its rods cross the seams, or use a smaller spacing"
 FEWEST = 2  # joints of a rod; fewer than elsewhere, as leaving out a rod also removes those that it meets
+MANY = 0.1  # of the rods: a larger share left out gives a warning
+ASTRAY = 0.005  # of the size: rod ends that are moved further give a warning
 SWINGS = f"it has fewer than {FEWEST} joints and would swing"
 ALONE = "it ends on a seam where no rod of the next patch can meet it"
 
@@ -40,9 +42,8 @@ ALONE = "it ends on a seam where no rod of the next patch can meet it"
 def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
     """The patches by their names A, B, ..., from left to right.
 
-    Raises
-    ------
-    InputError : the seams cut off nothing, or there are more patches than letters.
+    Raises:
+        InputError: the seams cut off nothing, or there are more patches than letters.
     """
     creased = target if isinstance(target, Creased) else None
     seams = creased.seams if creased else seams
@@ -186,6 +187,56 @@ class PatchNet:
 
 
 @dataclass(frozen=True, eq=False)
+class Seams:
+    """How the patches of a target are joined.
+
+    Args:
+        target, layout: of the whole.
+        nets: the rods of each patch, by its name.
+        meetings: where rods of two patches end at one point.
+        moved: of each patch the largest distance between a rod end of its mesh and that point, to which it was moved
+            [m].
+    """
+
+    target: Target
+    layout: GridLayout
+    nets: dict[str, PatchNet]
+    meetings: tuple[Meeting, ...]
+    moved: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def lines(self) -> tuple[Seam, ...]:
+        """Where the target is cut: along creases that seams are drawn near to."""
+        return next(iter(self.nets.values())).patch.seams
+
+    @property
+    def left_out(self) -> float:
+        """The share of the rods that is left out because no rod of the next patch meets them at a seam."""
+        missing = sum(len(net.layout.left_out) for net in self.nets.values())
+        return missing / (missing + sum(len(net.rods) for net in self.nets.values()))
+
+    def ends_of(self, patch: str) -> dict[tuple[str, int], Floats]:
+        """By rod and side, the points (3,) at which rods of a patch meet others [m]."""
+        return {(end.rod, end.side): at.point for at in self.meetings for end in at.ends if end.patch == patch}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that a user should read."""
+        words = [
+            f"patch {name}: rod ends were moved by up to {by:.3g} m to the points where they meet others: its net does "
+            "not reach these points well; try another heading or anchor"
+            for name, by in self.moved.items()
+            if by > ASTRAY * self.target.size
+        ]
+        if self.left_out > MANY:
+            words.append(
+                f"{100 * self.left_out:.0f} % of the rods are left out, because no rod of the next patch can meet them "
+                "at a seam: another heading may leave out fewer (layout.rotate, or seams.patches for a single patch)"
+            )
+        return tuple(words)
+
+
+@dataclass(frozen=True, eq=False)
 class _OpenEnd:
     """A rod end on a seam that no rod meets yet: the sides of the patch beyond, its outward tangent, and the tangent of
     its patch across the seam."""
@@ -214,10 +265,9 @@ def lay_patches(
 
     Rods that meet no other at a seam are left out, and so are those that would swing without them.
 
-    Parameters
-    ----------
-    patches, layouts, anchors : by the patches' names; anchors x, y [m], default the patch's middle.
-    eccentricity : see `chebyshev_net`; at a seam the points midway between the layers meet.
+    Args:
+        patches, layouts, anchors: by the patches' names; anchors x, y [m], default the patch's middle.
+        eccentricity: see `chebyshev_net`; at a seam the points midway between the layers meet.
     """
     patch_nets, waiting, meetings = dict[str, PatchNet](), list[_OpenEnd](), list[Meeting]()
     for name, patch in patches.items():

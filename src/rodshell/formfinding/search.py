@@ -9,11 +9,13 @@ import numpy as np
 
 from rodshell.errors import InputError, OutOfTimeError, RodshellError
 from rodshell.formfinding.pipeline import find_stages
-from rodshell.layout import GridLayout
+from rodshell.layout import GridLayout, Layout
+from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.net_ends import inside_nodes
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import CLAMPED
 from rodshell.targets import Target
 from rodshell.validation import choice, instance, is_auto, number, point, some
 
@@ -73,7 +75,7 @@ class Search:
 
 def search(
     target: Target,
-    layout: GridLayout,
+    layout: Layout,
     rod: Rod,
     *,
     objective: Objective = "shear",
@@ -83,19 +85,18 @@ def search(
 ) -> Search:
     """Try anchors and headings with a coarse grid.
 
-    Parameters
-    ----------
-    objective : "shear", the largest angle by which joints close or open from 90 degrees; "curvature", the largest
-        of any rod on the target [1/m]; "gap", rms of the clamped pop-up over the target's size.
-    anchors : points of the plan [m]; "auto": the default one and four around it.
-    headings : angles of family u against x [rad]; "auto": 0 to 75 degrees in steps of 15.
+    Args:
+        objective: "shear", the largest angle by which joints close or open from 90 degrees; "curvature", the largest
+            of any rod on the target [1/m]; "gap", rms of the clamped pop-up over the target's size.
+        anchors: points of the plan [m]; "auto": the default one and four around it.
+        headings: angles of family u against x [rad]; "auto": 0 to 75 degrees in steps of 15.
 
-    Raises
-    ------
-    InputError : no trial has a net; an unknown objective.
+    Raises:
+        InputError: no trial has a net; an unknown objective.
     """
     instance("target", target, Target)
-    instance("layout", layout, GridLayout)
+    instance("layout", layout, Layout)
+    require_chebyshev(layout, "searches for anchor or heading")
     instance("rod", rod, Rod)
     choice("objective", objective, get_args(Objective))
     require_progress(progress)
@@ -153,10 +154,10 @@ def largest_curvature(net: ChebyshevNet) -> float:
 
 
 def _gap(target: Target, layout: GridLayout, rod: Rod, anchor: Point) -> float:
-    form = find_stages(target, layout, rod, anchor=anchor, ends=("clamped",))
+    form = find_stages(target, layout, rod, anchor=anchor, ends=CLAMPED)
     if form.status != "converged":
         raise InputError(form.status)
-    return form.agreement["clamped"].rms_relative
+    return form.agreement[CLAMPED.name].rms_relative
 
 
 def _spread_anchors(target: Target) -> list[Point]:

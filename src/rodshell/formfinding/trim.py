@@ -1,6 +1,7 @@
 """Trim what extends past the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -10,9 +11,10 @@ from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
-from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
 from rodshell.nets import chebyshev_net
+from rodshell.targets import Target
 from rodshell.validation import array, finite, instance, whole
 
 NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
@@ -23,12 +25,11 @@ FEWEST_JOINTS = 3  # a rod with fewer swings about the line through its joints
 class Boundary:
     """The final boundary G: where the rod ends go.
 
-    Parameters
-    ----------
-    points : (2m, 3), start and end of each rod's own line in turn [m].
-    tangents : (2m, 3) outward unit tangents of the draped rods there: the directions of clamps.
-    draped : (n, 3) the state of the whole trimmed shell that has these ends, or None [m].
-    normals : (n, 3) of the surface at the draped nodes, where rods lie in layers; else None.
+    Args:
+        points: (2m, 3), start and end of each rod's own line in turn [m].
+        tangents: (2m, 3) outward unit tangents of the draped rods there: the directions of clamps.
+        draped: (n, 3) the state of the whole trimmed shell that has these ends, or None [m].
+        normals: (n, 3) of the surface at the draped nodes, where rods lie in layers or along its curves; else None.
     """
 
     points: Floats
@@ -47,14 +48,26 @@ class Boundary:
     def __repr__(self) -> str:
         return f"<Boundary: ends of {len(self.points) // 2} rods>"
 
+    @staticmethod
+    def of_grids(parts: Sequence["Boundary"]) -> "Boundary":
+        """Of grids that lie side by side."""
+        rows = {field.name: [getattr(part, field.name) for part in parts] for field in fields(Boundary)}
+        known = {name: of for name, of in rows.items() if all(row is not None for row in of)}
+        return Boundary(**{name: np.concatenate(of) for name, of in known.items()})
+
+    def of_grid(self, mesh: GridMesh, k: int) -> "Boundary":
+        """Of the k-th of the grids of a `mesh` that lie side by side."""
+        ends, nodes = np.repeat(mesh.grid_of_rods == k, 2), mesh.grid_of_nodes == k
+        draped, normals = (None if rows is None else rows[nodes] for rows in (self.draped, self.normals))
+        return Boundary(self.points[ends], self.tangents[ends], draped, normals)
+
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
     """The trimmed grid, flat: its rods end on the footprint G0.
 
-    Parameters
-    ----------
-    mesh : of the m trimmed rods.
+    Args:
+        mesh: of the m trimmed rods.
     """
 
     mesh: GridMesh
@@ -80,11 +93,10 @@ class Footprint:
 class Trimmed:
     """The draped grid without its overhangs.
 
-    Parameters
-    ----------
-    mesh : of the trimmed rods; rods in layers have separate nodes in it, each on its own line.
-    positions : (n, 3) of its nodes [m].
-    dropped : names of the rods that are left out, each with the reason.
+    Args:
+        mesh: of the trimmed rods; rods in layers have separate nodes in it, each on its own line.
+        positions: (n, 3) of its nodes [m].
+        dropped: names of the rods that are left out, each with the reason.
     """
 
     draped: Draped
@@ -100,18 +112,17 @@ class Trimmed:
 def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     """Cut every rod at the target's end and drop the rods that cannot be built or would swing [HQK 3.2].
 
-    Parameters
-    ----------
-    draped : a grid lying on its target.
-    fewest : number of joints from which a rod does not swing.
+    Args:
+        draped: a grid lying on its target.
+        fewest: number of joints from which a rod does not swing.
 
-    Raises
-    ------
-    InputError : `draped` is of another kind; no rod is left, or a hanging rod is too short to reach the target's end.
+    Raises:
+        InputError: `draped` is of another kind; no rod is left, or a hanging rod is too short to reach the target's
+            end.
     """
     instance("draped", draped, Draped, "what rodshell.drape returned")
     whole("fewest", fewest, 0)
-    margin = NEAREST_JOINT * min(draped.layout.spacing)
+    margin = NEAREST_JOINT * draped.layout.least_spacing
     rods, positions, dropped = draped.rods, draped.positions, list(draped.dropped)
     if isinstance(draped.method, Bound):
         source = draped.mesh
@@ -119,15 +130,16 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
         rods, lost = _cut_rods(draped)
         dropped += lost
         source, positions = _recut(draped, rods)
-    kept, swinging = FlatGrid.of(rods, margin=margin).without(lambda grid: grid.joint_counts() < fewest)
+    grid, _ = source.grid.cut(rods, margin=margin)
+    kept, swinging = grid.without(lambda grid: grid.joint_counts() < fewest)
     dropped += [(name, f"it has fewer than {fewest} joints and would swing") for name in swinging]
     if not kept.rods:
         raise InputError(
             f"no rod of the grid has {fewest} joints on the target: use a smaller spacing or a larger target"
         )
-    mesh, nodes = cut_mesh(source, kept)
+    mesh, nodes = cut_mesh(source, kept.rods, margin=margin)
     positions = positions.take(nodes, axis=0)
-    normals: Floats | None = None
+    normals = None if isinstance(draped.layout, GridLayout) else draped.target.on_surface(positions).normal
     if draped.eccentricity:
         bound = isinstance(draped.method, Bound)
         normals = draped.target.on_surface(positions).normal if bound else node_normals(mesh, positions)
@@ -141,9 +153,8 @@ def in_layers(footprint: Footprint, boundary: Boundary, eccentricity: float) -> 
 
     Without a draped state the boundary's points are already the ends of the rods' own lines.
 
-    Parameters
-    ----------
-    eccentricity : distance of the layers [m].
+    Args:
+        eccentricity: distance of the layers [m].
     """
     mesh, draped = footprint.mesh, boundary.draped
     if draped is None:
@@ -171,6 +182,8 @@ def ends_past_net(trimmed: Trimmed) -> Floats | None:
     Of a bound drape, whose G0 is that of the net: how far the draped rods would. None where there is no such net.
     """
     draped, rods = trimmed.draped, trimmed.mesh.grid.rods
+    if not isinstance(draped.layout, GridLayout):
+        return None
     if draped.figures.net_deviation is not None:
         past = dict(zip([rod.name for rod in draped.rods], draped.figures.net_deviation, strict=True))
         return np.array([past[rod.name] for rod in rods])
@@ -187,14 +200,13 @@ def ends_past_net(trimmed: Trimmed) -> Floats | None:
 def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     """(2m, 3) outward unit tangents at start and end of each rod in turn, to second order from the last two edges.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the mesh's nodes [m].
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
     """
     return unit(_end_tangents(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
 
 
-@njit(error_model="numpy")
+@njit("f2 i1 i1 i1 f1")
 def _end_tangents(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
     """As `end_tangents`, of about length 1."""
     result = np.empty((2 * len(rod_start), 3))
@@ -224,7 +236,7 @@ def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]
     kept, dropped = list[FlatRod](), list[tuple[str, str]]()
     for k, rod in enumerate(draped.rods):
         s = draped.mesh.stations[draped.mesh.rod_slice(k)]
-        inside = draped.target.margin(draped.positions[draped.mesh.nodes_of(k)]) > 0
+        inside = _margin(draped.target, draped.positions[draped.mesh.nodes_of(k)]) > 0
         if not inside.any():
             dropped.append((rod.name, "it never touches the target"))
             continue
@@ -236,12 +248,22 @@ def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]
     return tuple(kept), dropped
 
 
+def _margin(target: Target, x: Floats) -> Floats:
+    """As `Target.margin`, but negative on the wall below a rim, whose distance to the rim in plan is 0."""
+    margin = target.margin(x)
+    if target.base is not None:
+        return margin
+    level, gradient = target.level(x)
+    below: Floats = np.minimum(level / np.linalg.norm(gradient, axis=1), 0.0)
+    return margin + below
+
+
 def _crossing(draped: Draped, rod: int, before: int) -> float:
     """Material coordinate where a rod crosses the target's end, between its nodes `before` and the next."""
     nodes, s = draped.mesh.nodes_of(rod), draped.mesh.stations[draped.mesh.rod_slice(rod)]
     first = int(np.clip(before - 1, 0, len(s) - 4))
     window = slice(first, first + 4)
-    margin = draped.target.margin(draped.positions[nodes[window]])
+    margin = _margin(draped.target, draped.positions[nodes[window]])
     fit = np.polyfit(s[window] - s[before], margin, 3)
     low, high = 0.0, s[before + 1] - s[before]
     rising = np.polyval(fit, low) < 0
@@ -253,7 +275,7 @@ def _crossing(draped: Draped, rod: int, before: int) -> float:
 
 def _recut(draped: Draped, rods: tuple[FlatRod, ...]) -> tuple[GridMesh, Floats]:
     """A mesh of the cut rods with their draped positions, its end nodes put on the target."""
-    mesh = mesh_grid(FlatGrid.of(rods), draped.layout.edge)
+    mesh = mesh_grid(FlatGrid.of(rods), draped.layout.longest_edge)
     names = {rod.name: k for k, rod in enumerate(draped.mesh.grid.rods)}
     positions = draped.mesh.prolong(draped.positions, mesh, rods=[names[rod.name] for rod in rods])
     ends = np.unique(mesh.ends)

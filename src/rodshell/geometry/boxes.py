@@ -12,12 +12,7 @@ Corners = Sequence[tuple[float, float]]
 
 
 def boxes_meet(box: Floats, others: Iterable[Floats]) -> bool:
-    """Whether the rectangle (4, 2) covers a part of one of the others.
-
-    Parameters
-    ----------
-    box : (4, 2) corners in a row; others : the same of each.
-    """
+    """Whether the rectangle (4, 2), its corners in a row, covers a part of one of the others."""
     corners = box.tolist()
     return any(not _apart(corners, other.tolist()) for other in others)
 
@@ -33,24 +28,16 @@ def _apart(box: Corners, other: Corners) -> bool:
 
 
 def lines_meet(box: Floats, lines: Floats) -> bool:
-    """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2): no axis separates them.
-
-    Parameters
-    ----------
-    box : (4, 2) corners in a row; lines : (m, 2, 2) ends.
-    """
+    """Whether one of the lines (m, 2, 2), from end to end, runs through the rectangle (4, 2): no axis separates
+    them."""
     return bool(each_meets(box[None], lines[None])[0])
 
 
-@njit(error_model="numpy")
+@njit("f3 f4")
 def each_meets(boxes, lines):  # type: ignore[no-untyped-def]
-    """(n,) whether one of its own lines runs through each rectangle.
+    """(n,) whether one of its own `lines` (n, m, 2, 2) runs through each of the rectangles `boxes` (n, 4, 2).
 
     In coordinates along its sides each rectangle is the square from -1 to 1.
-
-    Parameters
-    ----------
-    boxes : (n, 4, 2) corners of each in a row; lines : (n, m, 2, 2) ends of its m lines.
     """
     met = np.zeros(len(boxes), dtype=np.bool_)
     for n in range(len(boxes)):
@@ -70,12 +57,8 @@ def each_meets(boxes, lines):  # type: ignore[no-untyped-def]
 
 
 def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:
-    """(k,) length of all lines together that is within the rectangle where it is after each shift.
-
-    Parameters
-    ----------
-    box : (4, 2) corners in a row; shifts : (k, 2) of it; lines : (m, 2, 2) ends.
-    """
+    """(k,) length of all `lines` (m, 2, 2) together that is within the rectangle (4, 2) where it is after each of the
+    `shifts` (k, 2)."""
     corners = (box + shifts[:, None]).reshape(-1, 2)
     lines = lines_near(lines, corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf))
     sides = box[[1, 3]] - box[0]
@@ -91,12 +74,8 @@ def length_beneath(box: Floats, shifts: Floats, lines: Floats) -> Floats:
 
 
 def lines_near(lines: Floats, low: Floats, high: Floats) -> Floats:
-    """Those of the lines (m, 2, 2) that may come into a rectangle.
-
-    Parameters
-    ----------
-    lines : (m, 2, 2) ends; low, high : (2,) lower left and upper right corner of the rectangle.
-    """
+    """Those of the lines (m, 2, 2) that may come into the rectangle from its lower left corner `low` to the upper right
+    `high`."""
     a, b = lines[:, 0], lines[:, 1]
     near = (np.minimum(a, b) < high) & (np.maximum(a, b) > low)
     return np.asarray(lines[near[:, 0] & near[:, 1]])

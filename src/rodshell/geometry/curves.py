@@ -10,19 +10,13 @@ from rodshell.kernels import njit
 TOUCH = 1e-6  # of the extent of all polylines: ends this close are joined
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+@njit("f2 f3 f1")  # type: ignore[untyped-decorator, unused-ignore]
 def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
-    """Interpolate with polynomials, one for each requested point.
+    """Values (n, d) of polynomials, one for each of the parameters `s` (n,) [m].
 
-    Parameters
-    ----------
-    knots : (n, p), parameters at which each polynomial is known [m].
-    points : (n, p, d), its values there.
-    s : (n,) requested parameters [m].
-
-    Returns
-    -------
-    (n, d) values at `s`.
+    Args:
+        knots: (n, p) parameters at which each polynomial is known [m].
+        points: (n, p, d) its values there.
     """
     result = np.empty((points.shape[0], points.shape[2]))
     for n in range(len(s)):
@@ -46,24 +40,18 @@ def put_lagrange(knots, points, n, at, result, row):  # type: ignore[no-untyped-
 
 
 def on_curve(knots: Floats, points: Floats, s: Floats) -> Floats:
-    """Interpolate a curve by local cubics, to fourth order.
+    """Points (n, 3) [m] of a curve at the parameters `s` (n,) [m], by local cubics, to fourth order.
 
     In each interval the cubic goes through the four nearest knots, or through all if there are fewer.
 
-    Parameters
-    ----------
-    knots : (m,) ascending parameters [m].
-    points : (m, 3) points of the curve there [m].
-    s : (n,) requested parameters [m].
-
-    Returns
-    -------
-    (n, 3) points of the curve at `s` [m].
+    Args:
+        knots: (m,) ascending parameters [m].
+        points: (m, 3) points of the curve there [m].
     """
     return np.asarray(_on_curve(knots, np.ascontiguousarray(points), s))
 
 
-@njit()
+@njit("f1 f2 f1")
 def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     count, axes = min(4, len(knots)), points.shape[1]
     near, around = np.empty((len(s), count)), np.empty((len(s), count, axes))
@@ -76,22 +64,20 @@ def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     return lagrange(near, around, s)
 
 
-@njit()  # type: ignore[untyped-decorator, unused-ignore]
+@njit("f1 f3 i f1 f")  # type: ignore[untyped-decorator, unused-ignore]
 def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: float) -> Floats:
     """Interpolate m lines with common knots, as `on_curve` does.
 
-    Parameters
-    ----------
-    knots : (k,) ascending parameters of all lines [m].
-    points : (k, m, 3) points of the lines [m]; NaN where a line is not known. Of each line the run of known points
-        around `origin` is used.
-    origin : index of the knot around which the lines are known.
-    s : (n,) requested parameters [m].
-    beyond : the cubics are continued past the known points by this many steps of the knots.
+    Args:
+        knots: (k,) ascending parameters of all lines [m].
+        points: (k, m, 3) points of the lines [m]; NaN where a line is not known. Of each line the run of known points
+            around `origin` is used.
+        origin: index of the knot around which the lines are known.
+        s: (n,) requested parameters [m].
+        beyond: the cubics are continued past the known points by this many steps of the knots.
 
-    Returns
-    -------
-    (m, n, 3) points [m]; NaN further away from the known points.
+    Returns:
+        (m, n, 3) points [m]; NaN further away from the known points.
     """
     count, lines, spare, most = len(knots), points.shape[1], len(s), min(4, len(knots))
     result = np.empty((lines, len(s), 3))
@@ -166,31 +152,17 @@ def _right_of(knots, at):  # type: ignore[no-untyped-def]
 
 
 def closed_loops(strokes: Iterable[Floats]) -> list[Floats]:
-    """Join polylines end to end into closed loops; those that stay open are left out.
+    """Polylines (n, 3), in any order and direction, joined end to end into closed loops (n, 3), the longest first.
 
-    Parameters
-    ----------
-    strokes : polylines (n, 3) in any order and direction [m].
-
-    Returns
-    -------
-    Loops (n, 3), the longest first; the first point is not repeated at the end.
+    Those that stay open are left out. The first point is not repeated at the end.
     """
     loops = [line[:-1] for line in join_end_to_end(strokes) if len(line) > 3 and np.array_equal(line[0], line[-1])]
     return sorted(loops, key=lambda x: -float(np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1).sum()))
 
 
 def join_end_to_end(strokes: Iterable[Floats]) -> list[Floats]:
-    """Join polylines whose ends touch.
-
-    Parameters
-    ----------
-    strokes : polylines (n, 3) in any order and direction [m].
-
-    Returns
-    -------
-    Polylines (n, 3); a closed polyline ends with its first point.
-    """
+    """Polylines (n, 3), in any order and direction, joined where their ends touch; closed ones end with their first
+    point."""
     given = list(strokes)
     if not given:
         return []

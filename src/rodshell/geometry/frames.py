@@ -37,7 +37,7 @@ def _is_table(a: Floats) -> bool:
     return a.ndim == 2 and a.shape[1] == 3 and a.dtype == np.float64 and a.flags.carray
 
 
-@njit()
+@njit("f2 f2")
 def _dots(a, b):  # type: ignore[no-untyped-def]
     result = np.empty(len(a))
     for n in range(len(a)):
@@ -45,7 +45,7 @@ def _dots(a, b):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(error_model="numpy")
+@njit("f2")
 def _units(a):  # type: ignore[no-untyped-def]
     result = np.empty_like(a)
     for n in range(len(a)):
@@ -56,19 +56,11 @@ def _units(a):  # type: ignore[no-untyped-def]
 
 
 def parallel_transport(vectors: Floats, start: Floats, end: Floats) -> Floats:
-    """Rotate vectors by the smallest rotation that takes one unit tangent to another.
+    """Rotate `vectors` (..., 3) by the smallest rotation that takes the unit tangents `start` (..., 3) to `end` (...,
+    3).
 
     It consists of two reflections, which need neither an angle nor an axis. For opposite tangents the smallest rotation
     is not unique, and the result is not finite.
-
-    Parameters
-    ----------
-    vectors : (..., 3) to be rotated.
-    start, end : (..., 3) unit tangents.
-
-    Returns
-    -------
-    (..., 3) the rotated vectors.
     """
     middle = start + end
     share = dot(middle, vectors) / (1.0 + dot(start, end))
@@ -76,16 +68,10 @@ def parallel_transport(vectors: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def adapted(directors: Floats, tangents: Floats) -> Floats:
-    """Make directors perpendicular to tangents, and scale them to length 1.
+    """Directors (..., 3) made perpendicular to unit `tangents` (..., 3), and scaled to length 1.
 
-    Parameters
-    ----------
-    directors : (..., 3).
-    tangents : (..., 3) unit vectors.
-
-    Raises
-    ------
-    InputError : a director is parallel to its tangent, or zero.
+    Raises:
+        InputError: a director is parallel to its tangent, or zero.
     """
     across = directors - dot(directors, tangents)[..., None] * tangents
     flat = np.linalg.norm(across, axis=-1) <= _ALONG * np.linalg.norm(directors, axis=-1)
@@ -97,16 +83,11 @@ def adapted(directors: Floats, tangents: Floats) -> Floats:
 
 
 def directors_along(tangents: Floats, first: Floats) -> Floats:
-    """Transport a director in parallel along a rod: a frame without twist.
+    """Unit directors (n, 3) of a frame without twist: a director transported in parallel along a rod.
 
-    Parameters
-    ----------
-    tangents : (n, 3) unit tangents of the rod's edges, in their order.
-    first : (3,) director of the first edge; its part perpendicular to the edge is used.
-
-    Returns
-    -------
-    (n, 3) unit directors.
+    Args:
+        tangents: (n, 3) unit tangents of the rod's edges, in their order.
+        first: (3,) director of the first edge; its part perpendicular to the edge is used.
     """
     with np.errstate(divide="ignore"):
         weights = 1.0 / (1.0 + dot(tangents[:-1], tangents[1:]))
@@ -120,15 +101,6 @@ def directors_along(tangents: Floats, first: Floats) -> Floats:
 
 
 def signed_angle(start: Floats, end: Floats, axis: Floats) -> Floats:
-    """Signed angles between vectors, about an axis.
-
-    Parameters
-    ----------
-    start, end : (..., 3) vectors perpendicular to the axis.
-    axis : (..., 3) unit vectors.
-
-    Returns
-    -------
-    (...) angles from `start` to `end` in (-pi, pi] [rad].
-    """
+    """Signed angles (...) in (-pi, pi] [rad] from vectors `start` to `end` (..., 3) about unit vectors `axis` (..., 3),
+    to which they are perpendicular."""
     return np.asarray(np.arctan2(dot(axis, cross(start, end)), dot(start, end)))

@@ -10,12 +10,8 @@ from rodshell.geometry.frames import cross
 
 @dataclass(frozen=True, eq=False)
 class PlanarMotion:
-    """A turn about the vertical, and a shift in plan.
-
-    Parameters
-    ----------
-    centre : (3,) which goes to `goal` (3,), both in plan [m]; turn : (2, 2), of rows x, y.
-    """
+    """A turn about the vertical, by `turn` (2, 2) of rows x, y, and a shift that takes `centre` (3,) to `goal` (3,) in
+    plan [m]."""
 
     centre: Floats
     goal: Floats
@@ -23,12 +19,8 @@ class PlanarMotion:
 
     @staticmethod
     def onto(points: Floats, goals: Floats) -> "PlanarMotion":
-        """The motion of the shortest paths in plan, in the least-squares sense: Procrustes' problem [Schönemann 1966].
-
-        Parameters
-        ----------
-        points : (n, 3) that move; goals : (n, 3) where each is to go [m].
-        """
+        """The motion of the shortest paths in plan from points (n, 3) to their goals (n, 3) [m], in the least-squares
+        sense: Procrustes' problem [Schönemann 1966]."""
         centre, goal = points.mean(axis=0), goals.mean(axis=0)
         a, b = (points - centre) * (1.0, 1.0, 0.0), (goals - goal) * (1.0, 1.0, 0.0)
         angle = np.arctan2(cross(a, b)[:, 2].sum(), np.sum(a * b))

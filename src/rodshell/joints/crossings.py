@@ -16,11 +16,12 @@ reversed: its tangent, its second director and its twist angle change sign.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol, Self, TypeVar
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.geometry.frames import adapted, parallel_transport, unit
 from rodshell.kernels import njit
 from rodshell.layout import GridMesh
@@ -28,17 +29,19 @@ from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 
+UP = (0.0, 0.0, 1.0)  # normal of the flat grid
+
 
 @dataclass(frozen=True, eq=False)
 class RodNodes:
-    """A mesh as its rods see it: *rod node* k is entry k of `mesh.rod_nodes`, a node as one of its rods has it.
+    """A mesh as its rods see it: *rod node* k is entry k of `mesh.rod_nodes`, a node as one of its rods has it. Methods
+    take the indices of some, and a side: 0 before them, 1 after.
 
-    Parameters
-    ----------
-    mesh : the mesh, its rods sharing their nodes at joints or lying in layers.
-    blocks : (k,) block of the state that holds each rod node: that of the mesh's node, or the rod's own where rods do
-        not share nodes.
-    first_angle : block of the first edge's twist angle; those of the other edges follow.
+    Args:
+        mesh: the mesh, its rods sharing their nodes at joints or lying in layers.
+        blocks: (k,) block of the state that holds each rod node: that of the mesh's node, or the rod's own where rods
+            do not share nodes.
+        first_angle: block of the first edge's twist angle; those of the other edges follow.
     """
 
     mesh: GridMesh
@@ -59,45 +62,21 @@ class RodNodes:
         return self.mesh.at_crossings
 
     def has_edge(self, rod_nodes: Ints, side: int) -> Bools:
-        """Whether the rod has an edge before (side 0) or after (side 1) each of the `rod_nodes`.
-
-        Parameters
-        ----------
-        rod_nodes : (k,) indices of rod nodes.
-        side : 0 before, 1 after.
-        """
+        """Whether the rod has an edge on this side of each rod node."""
         rods = self.rods[rod_nodes]
         limit = self.mesh.rod_start[rods] if side == 0 else self.mesh.rod_stop[rods] - 1
         return np.asarray(rod_nodes != limit)
 
     def edge(self, rod_nodes: Ints, side: int) -> Ints:
-        """Edge before (side 0) or after (side 1) each rod node, where there is one; edges are counted rod by rod.
-
-        Parameters
-        ----------
-        rod_nodes : (k,) indices of rod nodes.
-        side : 0 before, 1 after.
-        """
+        """Edge on this side of each rod node, where there is one; edges are counted rod by rod."""
         return np.asarray(rod_nodes - self.rods[rod_nodes] - (1 - side))
 
     def angle(self, rod_nodes: Ints, side: int) -> Ints:
-        """Block of that edge's twist angle.
-
-        Parameters
-        ----------
-        rod_nodes : (k,) indices of rod nodes.
-        side : 0 before, 1 after.
-        """
+        """Block of that edge's twist angle."""
         return np.asarray(self.first_angle + self.edge(rod_nodes, side))
 
     def neighbour(self, rod_nodes: Ints, side: int) -> Ints:
-        """Block of the node at that edge's other end.
-
-        Parameters
-        ----------
-        rod_nodes : (k,) indices of rod nodes.
-        side : 0 before, 1 after.
-        """
+        """Block of the node at that edge's other end."""
         return np.asarray(self.blocks[rod_nodes + (1 if side else -1)])
 
     def directions(self, rod_nodes: Ints) -> Floats:
@@ -120,44 +99,53 @@ class RodNodes:
         return state
 
 
-class SectionElements(Protocol):
-    """What every energy of sections has; see `RelativeRotation`."""
+@dataclass(frozen=True, eq=False)
+class OfSections:
+    """What energies of sections have in common: joints, all with the same number of edges. Build them with
+    `starting_at`.
 
-    @property
-    def blocks(self) -> Ints: ...
-    @property
-    def legs(self) -> Ints: ...
-    @property
-    def source_tangents(self) -> Floats: ...
-    @property
-    def source_directors(self) -> Floats: ...
-
-
-T = TypeVar("T", bound=SectionElements)
-
-
-def edge_tangents(state: Floats, blocks: Ints, legs: Ints) -> Floats:
-    """(m, l, 3) unit tangents at `state` (N, 3) of the edges `legs` (l, 4) of the joints on `blocks` (m, k).
-
-    Parameters
-    ----------
-    state : (N, 3) node positions [m] and twist angles [rad].
-    blocks : (m, k) nodes and twist angles of the joints.
-    legs : (l, 4) edges of each joint, see `Stencils`.
+    Args:
+        blocks: (m, k) the nodes and twist angles that a joint touches, each once.
+        legs: (l, 4) edges of each joint, see `Stencils`; they run as they do in their rod.
+        weights: (m, l) share of each edge in its rod's section; those of a rod add up to 1.
+        source_tangents, source_directors: (m, l, 3) t and d1 of each edge in its source frame.
     """
+
+    blocks: Ints
+    legs: Ints
+    weights: Floats
+    source_tangents: Floats
+    source_directors: Floats
+
+    @classmethod
+    def starting_at(
+        cls, blocks: Ints, legs: Ints, state: State, directors: ArrayLike, *, weights: Floats, **rest: Any
+    ) -> Self:
+        """Joints whose source frames are those of `state`.
+
+        Args:
+            blocks, legs, weights: see the class.
+            directors: (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for all.
+            rest: what else the energy has, by name.
+        """
+        tangents = _tangents(state, blocks, legs)
+        wanted = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, legs[:, 2]]]
+        return cls(np.ascontiguousarray(blocks), legs, weights, tangents, adapted(wanted, tangents), **rest)
+
+    @property
+    def angle_columns(self) -> Ints:
+        return self.legs[:, 2]
+
+    def refreshed(self, state: State) -> Self:
+        """The same joints with their source frames at `state` (N, 3)."""
+        tangents = _tangents(state, self.blocks, self.legs)
+        directors = parallel_transport(self.source_directors, self.source_tangents, tangents)
+        return replace(self, source_tangents=tangents, source_directors=adapted(directors, tangents))
+
+
+def _tangents(state: State, blocks: Ints, legs: Ints) -> Floats:
+    """(m, l, 3) unit tangents of the joints' edges."""
     return unit(state[blocks[:, legs[:, 1]]] - state[blocks[:, legs[:, 0]]])
-
-
-def with_source(elements: T, state: Floats) -> T:
-    """An energy of sections with its source frames moved to `state` (N, 3).
-
-    Parameters
-    ----------
-    state : (N, 3) the state of the new source frames.
-    """
-    tangents = edge_tangents(state, elements.blocks, elements.legs)
-    directors = parallel_transport(elements.source_directors, elements.source_tangents, tangents)
-    return replace(elements, source_tangents=tangents, source_directors=adapted(directors, tangents))  # type: ignore[type-var]
 
 
 class Stencils(NamedTuple):
@@ -181,9 +169,8 @@ class Stencils(NamedTuple):
 def stencils(rod_nodes: RodNodes, pairs: Ints) -> Iterator[Stencils]:
     """The joints between the rod nodes `pairs` (m, 2), set by set of those that are alike.
 
-    Parameters
-    ----------
-    pairs : (m, 2) rod nodes that meet, on the first and on the second rod.
+    Args:
+        pairs: (m, 2) rod nodes that meet, on the first and on the second rod.
     """
     sides = np.column_stack([rod_nodes.has_edge(pairs[:, rod], side) for rod in range(2) for side in range(2)])
     for pattern in np.unique(sides, axis=0):
@@ -211,15 +198,14 @@ def _stencil(rod_nodes: RodNodes, pairs: Ints, has_edge: Bools) -> tuple[Ints, I
 def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore[no-untyped-def]
     """Length of an edge; its tangent, material directors, spin w, and (source + t) / (1 + source.t).
 
-    Parameters
-    ----------
-    x : (N, 3) node positions [m] and twist angles [rad].
-    blocks : (k,) nodes and twist angles of the joint.
-    leg : (4,) the edge, see `Stencils`.
-    source, director : (3,) tangent and first director of the edge's source frame.
-    t, m1, m2 : (3,) filled with the unit tangent and the material directors.
-    w : (3,) filled with the spin of the frame by the edge vector [1/m].
-    half : (3,) filled with (source + t) / (1 + source.t).
+    Args:
+        x: (N, 3) node positions [m] and twist angles [rad].
+        blocks: (k,) nodes and twist angles of the joint.
+        leg: (4,) the edge, see `Stencils`.
+        source, director: (3,) tangent and first director of the edge's source frame.
+        t, m1, m2: (3,) filled with the unit tangent and the material directors.
+        w: (3,) filled with the spin of the frame by the edge vector [1/m].
+        half: (3,) filled with (source + t) / (1 + source.t).
     """
     square, both, along = 0.0, 1.0, 0.0
     for k in range(3):
@@ -248,12 +234,11 @@ def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore
 def by_edge(weight, length, t, m1, m2, w, jacobian):  # type: ignore[no-untyped-def]
     """(6, 4) derivatives of the edge's share of T and N by (e, theta); dm1 = -(m1.dt) t + m2 (dtheta - w.de).
 
-    Parameters
-    ----------
-    weight : share of the edge in its rod's section.
-    length : of the edge [m].
-    t, m1, m2, w : (3,) tangent, material directors and spin of the edge, see `frame`.
-    jacobian : (6, 4), filled; its rows are the components of T and N.
+    Args:
+        weight: share of the edge in its rod's section.
+        length: of the edge [m].
+        t, m1, m2, w: (3,) tangent, material directors and spin of the edge, see `frame`.
+        jacobian: (6, 4), filled; its rows are the components of T and N.
     """
     for i in range(3):
         for j in range(3):
@@ -271,13 +256,12 @@ def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ign
     As in `bend_twist`: first for a frame that does not spin, then the spin dtheta -> dtheta - w.de, then the
     symmetric part of the derivative of w; what is antisymmetric cancels.
 
-    Parameters
-    ----------
-    weight : share of the edge in its rod's section.
-    by_t, by_n : (3,) derivatives of the energy by T and N [J].
-    length : of the edge [m].
-    t, m1, m2, w, half : (3,) see `frame`.
-    local : (4, 4), to which is added, by the edge vector and the twist angle.
+    Args:
+        weight: share of the edge in its rod's section.
+        by_t, by_n: (3,) derivatives of the energy by T and N [J].
+        length: of the edge [m].
+        t, m1, m2, w, half: (3,) see `frame`.
+        local: (4, 4), to which is added, by the edge vector and the twist angle.
     """
     tt, nt, n1, n2 = 0.0, 0.0, 0.0, 0.0
     for k in range(3):
@@ -307,11 +291,10 @@ def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ign
 def spread(local, leg, other, hessian):  # type: ignore[no-untyped-def]
     """Add `local` (4, 4), by (e, theta) of two edges, to the rows and columns of their nodes and angles.
 
-    Parameters
-    ----------
-    local : (4, 4) second derivatives by the edge vector and twist angle of one edge (rows) and of another (columns).
-    leg, other : (4,) the edges of the rows and of the columns, see `Stencils`.
-    hessian : (3k, 3k) of the joint, to which is added.
+    Args:
+        local: (4, 4) second derivatives by the edge vector and twist angle of one edge (rows) and of another (columns).
+        leg, other: (4,) the edges of the rows and of the columns, see `Stencils`.
+        hessian: (3k, 3k) of the joint, to which is added.
     """
     for i in range(3):
         for j in range(3):
@@ -327,20 +310,16 @@ def spread(local, leg, other, hessian):  # type: ignore[no-untyped-def]
     hessian[3 * leg[2], 3 * other[2]] += local[3, 3]
 
 
-UP = (0.0, 0.0, 1.0)
-
-
 @dataclass(frozen=True, eq=False)
 class Corners:
     """The corners of crossings in which linkers lie.
 
-    Parameters
-    ----------
-    blocks : (n, 5) outer node and twist angle of e, joint (on the rod of e), twist angle and outer node of f.
-    joints : (n, 2) block of the joint on the rod of e and on that of f: the same where they share it.
-    signs : (n, 2) -1 for a reversed edge.
-    lengths : (n,) Voronoi length of the corner: half of both edges [m].
-    rods : (n, 2) rod of e and of f.
+    Args:
+        blocks: (n, 5) outer node and twist angle of e, joint (on the rod of e), twist angle and outer node of f.
+        joints: (n, 2) block of the joint on the rod of e and on that of f: the same where they share it.
+        signs: (n, 2) -1 for a reversed edge.
+        lengths: (n,) Voronoi length of the corner: half of both edges [m].
+        rods: (n, 2) rod of e and of f.
     """
 
     blocks: Ints
@@ -353,12 +332,10 @@ class Corners:
 
     @staticmethod
     def of(rod_nodes: RodNodes, crossings: Ints, wanted: int) -> "Corners":
-        """Corners of some crossings of the grid.
+        """Corners of some crossings (m,) of the grid.
 
-        Parameters
-        ----------
-        crossings : (m,) their indices.
-        wanted : 2 for two opposite corners, as in the paper, or 4 for all; where a rod ends, all that there are.
+        Args:
+            wanted: 2 for two opposite corners, as in the paper, or 4 for all; where a rod ends, all that there are.
         """
         pairs = rod_nodes.at_crossings[crossings]
         rows = []
@@ -391,11 +368,10 @@ class Corners:
 class LinkerBend:
     """Bends and twists of linkers. Build them with `of`.
 
-    Parameters
-    ----------
-    blocks : (n, 5) as in `BendTwist`.
-    signs : (n, 2) -1 where the twist angle belongs to the reversed edge.
-    bends : the same elements on separate rows, five each, with the signs of the linkers' angles.
+    Args:
+        blocks: (n, 5) as in `BendTwist`.
+        signs: (n, 2) -1 where the twist angle belongs to the reversed edge.
+        bends: the same elements on separate rows, five each, with the signs of the linkers' angles.
     """
 
     blocks: Ints
@@ -409,11 +385,10 @@ class LinkerBend:
     def of(corners: Corners, blocks: Ints, flat: Floats, stiffness: Floats) -> "LinkerBend":
         """Linkers at rest in the flat grid.
 
-        Parameters
-        ----------
-        blocks : (n, 5) their blocks: those of the corners, or copies of them.
-        flat : (N, 3) state of the flat grid [m].
-        stiffness : (n, 3) EI1, EI2 and GJ [N m2].
+        Args:
+            blocks: (n, 5) their blocks: those of the corners, or copies of them.
+            flat: (N, 3) state of the flat grid [m].
+            stiffness: (n, 3) EI1, EI2 and GJ [N m2].
         """
         rows = np.arange(5 * len(blocks)).reshape(-1, 5)
         per_length = stiffness / corners.lengths[:, None]
@@ -423,7 +398,7 @@ class LinkerBend:
         ).relaxed(local)  # fmt: skip
         return LinkerBend(np.ascontiguousarray(blocks), corners.signs, bends)
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         local = _signed(state, self.blocks, self.signs)
         by_local = np.zeros_like(local)
@@ -437,24 +412,19 @@ class LinkerBend:
                 hessians[:, :, column] *= sign
         return energy
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same linkers with their source frames at `state` (N, 3)."""
         return replace(self, bends=self.bends.refreshed(_signed(state, self.blocks, self.signs)))
 
-    def moments(self, state: Floats) -> Floats:
-        """(n, 3) moments of the two bends and of the twist of each linker at `state` (N, 3) [N m].
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def moments(self, state: State) -> Floats:
+        """(n, 3) moments of the two bends and of the twist of each linker at `state` (N, 3) [N m]."""
         bends = self.bends
         strains = bends.strains(_signed(state, self.blocks, self.signs))
         natural = np.column_stack([bends.natural_curvature, bends.natural_twist])
         return np.asarray(np.column_stack([bends.bend_stiffness, bends.twist_stiffness]) * (strains - natural))
 
 
-def _signed(state: Floats, blocks: Ints, signs: Floats) -> Floats:
+def _signed(state: State, blocks: Ints, signs: Floats) -> Floats:
     """(5n, 3) the blocks of each linker, with the signs of its angles."""
     local = state[blocks]
     local[:, 1] *= signs[:, :1]

@@ -21,30 +21,26 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.joints.crossings import RodNodes, stencils
+from rodshell.joints.crossings import UP, RodNodes, stencils
 from rodshell.joints.relative_rotation import RelativeRotation
-from rodshell.rods.joints import Elastic, Joint
+from rodshell.rods.joints import Joint
 
 FIRM = 1e8  # times the half edges next to it: the stiffness of a rigid direction of a joint
-UP = np.array([0.0, 0.0, 1.0])
 
 
-def resists(joint: Elastic) -> bool:
+def resists(joint: Joint) -> bool:
     """Whether a `joint` resists some rotation."""
     return joint.shear + joint.out_of_plane + joint.twist > 0
 
 
 def elastic_joints(
-    rod_nodes: RodNodes, crossings: Ints, joints: Sequence[Elastic], rod_stiffness: Floats, size: int
+    rod_nodes: RodNodes, crossings: Ints, joints: Sequence[Joint], rod_stiffness: Floats, size: int
 ) -> tuple[RelativeRotation, ...]:
-    """The joints that resist some rotation, as elements.
+    """The joints, one at each of some crossings (m,), that resist some rotation, as elements.
 
-    Parameters
-    ----------
-    crossings : (m,) indices of the grid's crossings.
-    joints : m, the joint at each of them.
-    rod_stiffness : (k, 3) EI1, EI2 and GJ at each rod node [N m2].
-    size : number of blocks of the state.
+    Args:
+        rod_stiffness: (k, 3) EI1, EI2 and GJ at each rod node [N m2].
+        size: number of blocks of the state.
     """
     stiff = np.array([resists(joint) for joint in joints], dtype=bool)
     crossings, joints = crossings[stiff], [joint for joint, kept in zip(joints, stiff, strict=True) if kept]
@@ -87,7 +83,7 @@ def _at_rest(rod_nodes: RodNodes, pairs: Ints, rest: Floats) -> Floats:
 
 
 def _between(
-    rod_nodes: RodNodes, pairs: Ints, nodes: Ints, directions: Floats, joints: Sequence[Elastic], rod_stiffness: Floats
+    rod_nodes: RodNodes, pairs: Ints, nodes: Ints, directions: Floats, joints: Sequence[Joint], rod_stiffness: Floats
 ) -> Floats:
     """(m, 3, 3) stiffness between the two rods of each joint, by the strains of `RelativeRotation` [N m]."""
     halves = np.stack(
@@ -126,7 +122,7 @@ def _deviators(
 
 
 def _to_middle(
-    rod_nodes: RodNodes, pairs: Ints, side: int, directions: Floats, joints: Sequence[Elastic], rod_stiffness: Floats
+    rod_nodes: RodNodes, pairs: Ints, side: int, directions: Floats, joints: Sequence[Joint], rod_stiffness: Floats
 ) -> Floats:
     """(m, 3, 3) stiffness between the edges of the joint's rod `side` and the joint's middle, in x, y, z [N m]."""
     compliance = _compliance(rod_nodes, pairs[:, side], directions[:, side], rod_stiffness)
@@ -172,17 +168,8 @@ def _bisectors(rod_nodes: RodNodes, pairs: Ints, directions: Floats) -> tuple[Fl
 
 
 def refuse_mixtures(node: Ints, joints: Sequence[Joint]) -> None:
-    """Refuse nodes at which three rods or more meet with joints of different kinds.
-
-    Parameters
-    ----------
-    node : (c,) node of each crossing.
-    joints : c, the joint at each.
-
-    Raises
-    ------
-    InputError : there is such a node.
-    """
+    """Refuse a node at which three rods or more meet with joints of different kinds; `node` and `joints` are those of
+    each crossing."""
     first: dict[int, Joint] = {}
     for joint_node, joint in zip(node.tolist(), joints, strict=True):
         if first.setdefault(joint_node, joint) != joint:

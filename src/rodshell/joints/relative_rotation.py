@@ -22,75 +22,38 @@ Why not elements from edge to edge, as the paper's linkers are: those also stiff
 by an amount that depends on the mesh. Frames, spin and sources are those of `rods.bend_twist`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
-from typing import Self
+from typing import Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
-from rodshell.geometry.frames import adapted, cross, dot
-from rodshell.joints.crossings import by_edge, edge_tangents, frame, of_edge, spread, with_source
+from rodshell.arrays import Floats, State
+from rodshell.geometry.frames import cross, dot
+from rodshell.joints.crossings import OfSections, by_edge, frame, of_edge, spread
 from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)
-class RelativeRotation:
-    """Elastic joints between two rods, all with the same number of edges. Build them with `starting_at`.
+class RelativeRotation(OfSections):
+    """Elastic joints between two rods.
 
-    Parameters
-    ----------
-    blocks : (m, k) the nodes and twist angles that a joint touches, each once.
-    legs : (l, 4) for each edge of a joint the columns of `blocks` of its first node, its second node and its twist
-        angle, and its rod: 0 for A, 1 for B. Edges run as they do in their rod.
-    weights : (m, l) share of each edge in its rod's section; those of a rod add up to 1.
-    stiffness : (m, 3, 3) of shear and the two tilts at rest, the shear apart from the tilts [N m].
-    deviators : (m, 2) complex, D_A and D_B by the axes of the tilts at rest [1/N m].
-    rest_angle : (m,) angle from TA to TB at rest [rad].
-    source_tangents, source_directors : (m, l, 3) t and d1 of each edge in its source frame.
+    Args:
+        stiffness: (m, 3, 3) of shear and the two tilts at rest, the shear apart from the tilts [N m].
+        deviators: (m, 2) complex, D_A and D_B by the axes of the tilts at rest [1/N m].
+        rest_angle: (m,) angle from TA to TB at rest [rad].
     """
 
-    blocks: Ints
-    legs: Ints
-    weights: Floats
     stiffness: Floats
     deviators: NDArray[np.complex128]
     rest_angle: Floats
-    source_tangents: Floats
-    source_directors: Floats
 
     __repr__ = brief
 
-    @classmethod
-    def starting_at(
-        cls,
-        blocks: Ints,
-        legs: Ints,
-        state: Floats,
-        directors: Floats,
-        *,
-        weights: Floats,
-        stiffness: Floats,
-        deviators: NDArray[np.complex128],
-        rest_angle: Floats,
-    ) -> Self:
-        """Joints whose source frames are those of `state`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        directors : (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for all.
-        blocks, legs, weights, stiffness, deviators, rest_angle : see the class.
-        """
-        tangents = edge_tangents(state, blocks, legs)
-        wanted = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, legs[:, 2]]]
-        rows = np.ascontiguousarray(blocks)
-        return cls(rows, legs, weights, stiffness, deviators, rest_angle, tangents, adapted(wanted, tangents))
-
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _relative_rotation(
@@ -99,21 +62,12 @@ class RelativeRotation:
             )
         )  # fmt: skip
 
-    @property
-    def angle_columns(self) -> Ints:
-        return self.legs[:, 2]
+    def with_stiffness_of(self, other: "RelativeRotation") -> Self:
+        """The same joints as stiff as others."""
+        return replace(self, stiffness=other.stiffness, deviators=other.deviators)
 
-    def refreshed(self, state: Floats) -> Self:
-        """The same joints with their source frames at `state` (N, 3)."""
-        return with_source(self, state)
-
-    def sections(self, state: Floats) -> Floats:
-        """(m, 2, 2, 3) tangent T and normal N of the sections of A and of B at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def sections(self, state: State) -> Floats:
+        """(m, 2, 2, 3) tangent T and normal N of the sections of A and of B at `state` (N, 3)."""
         moved = self.refreshed(state)
         t, d1 = moved.source_tangents, moved.source_directors
         theta = state[self.blocks[:, self.legs[:, 2]], 0][..., None]
@@ -126,32 +80,22 @@ class RelativeRotation:
             result[:, side, 1] = (weights * m1)[:, of_rod].sum(axis=1)
         return result
 
-    def strains(self, state: Floats) -> Floats:
-        """(m, 3) shear, and tilt about minus A's tangent and across it, at `state` (N, 3) [rad].
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def strains(self, state: State) -> Floats:
+        """(m, 3) shear, and tilt about minus A's tangent and across it, at `state` (N, 3) [rad]."""
         full = self._both_tilts(state)
         of_a, of_b = full[:, 1] + 1j * full[:, 2], full[:, 3] + 1j * full[:, 4]
         tilt = 0.5 * (of_a + of_b * np.exp(-1j * (full[:, 0] + self.rest_angle)))
         return np.column_stack([full[:, 0], tilt.real, tilt.imag])
 
-    def moments(self, state: Floats) -> Floats:
-        """(m, 3) moments of the joint, conjugate to the strains [N m]: about its normal, and two in its plane.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def moments(self, state: State) -> Floats:
+        """(m, 3) moments of the joint, conjugate to the strains [N m]: about its normal, and two in its plane."""
         forces, scrap = self._both_tilts(state), np.empty((5, 5))
         parts = (forces, self.rest_angle, self.stiffness, self.deviators)
         for strain, rest_angle, stiffness, deviators in zip(*parts, strict=True):
             _respond(strain.copy(), rest_angle, stiffness, deviators, strain, scrap)
         return forces[:, :3] * [1.0, 2.0, 2.0]  # B's half of the tilt moment is the same, by B's axes
 
-    def _both_tilts(self, state: Floats) -> Floats:
+    def _both_tilts(self, state: State) -> Floats:
         """(m, 5) shear, and the tilts eA and eB [rad]."""
         (ta, na), (tb, nb_) = self.sections(state).transpose(1, 2, 0, 3)
         normal = na + nb_
@@ -161,7 +105,12 @@ class RelativeRotation:
         return np.column_stack([shear, dot(lean, ta), dot(nb_, ta), dot(lean, tb), -dot(na, tb)])
 
 
-@njit(error_model="numpy")
+def is_elastic(element: Elements) -> TypeGuard[RelativeRotation]:
+    """Whether an energy is that of elastic joints."""
+    return isinstance(element, RelativeRotation)
+
+
+@njit("f2 i2 i2 f2 f3 c2 f1 f3 f3 f2 f3")
 def _relative_rotation(  # type: ignore[no-untyped-def]
     x, blocks, legs, weights, stiffness, deviators, rest_angle, tangents, directors, gradient, hessians
 ):
@@ -230,7 +179,7 @@ def _relative_rotation(  # type: ignore[no-untyped-def]
 # are tangent and normal of the section of rod A, then those of rod B; the strains are (s, eA, eB), five numbers.
 
 
-@njit(error_model="numpy")
+@njit("f1 f f2 c1 f1 f2")
 def _respond(strain, rest_angle, stiffness, deviators, force, tangent):  # type: ignore[no-untyped-def]
     """Energy of a joint at the strains (s, eA, eB) (5,); its derivatives by them, `force` (5,) and `tangent` (5, 5).
 

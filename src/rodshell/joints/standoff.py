@@ -8,26 +8,25 @@ needs no frames of the rods; the moment of its force about the crossing acts on 
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.arrays import Floats, Ints, State
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import brief
 
 SIDES = np.kron([[0, 0, 1, 0, -1, 0], [0, 0, 0, 1, 0, -1]], np.eye(3))  # (a, b) of the six nodes' coordinates
 
 
 @dataclass(frozen=True, eq=False)
-class Standoffs:
+class Standoffs(WithoutFrames):
     """Springs between nodes and places above crossings.
 
-    Parameters
-    ----------
-    blocks : (m, 6) nodes x, x_J, x_1, x_2, x_3, x_4; where a rod ends at the crossing, x_J stands for the node missing.
-    distances : (m,) d along the normal [m].
-    stiffness : (m,) C [N/m].
+    Args:
+        blocks: (m, 6) nodes x, x_J, x_1, x_2, x_3, x_4; where a rod ends at the crossing, x_J stands for the node
+            missing.
+        distances: (m,) d along the normal [m].
+        stiffness: (m,) C [N/m].
     """
 
     blocks: Ints
@@ -36,7 +35,7 @@ class Standoffs:
 
     __repr__ = brief
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         x = state[self.blocks]
         a, b = x[:, 2] - x[:, 4], x[:, 3] - x[:, 5]
@@ -57,10 +56,6 @@ class Standoffs:
             curved = _second(pull, n, size, dc, across)
             hessians[:] = self.stiffness[:, None, None] * np.einsum("mij,mik->mjk", dg, dg) + curved
         return 0.5 * float(np.vdot(force, gap))
-
-    def refreshed(self, state: Floats) -> Self:
-        """The same: there are no source frames."""
-        return self
 
 
 def _crossing(v: Floats) -> Floats:

@@ -17,21 +17,11 @@ from typing import Self
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
-from rodshell.geometry.frames import adapted
-from rodshell.joints.crossings import (
-    RodNodes,
-    by_edge,
-    edge_tangents,
-    frame,
-    of_edge,
-    spread,
-    stencils,
-    with_source,
-)
+from rodshell.arrays import Floats, Ints, State
+from rodshell.joints.crossings import UP, OfSections, RodNodes, by_edge, frame, of_edge, spread, stencils
 from rodshell.kernels import njit
 from rodshell.layout.flatgrid import sides
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.rods.section import Rod
 from rodshell.validation import brief, keep, positive
 
@@ -49,14 +39,12 @@ class _Penalty:
 
     ERRATA E7 to HQK Eqs 5, 6: C is a penalty stiffness, not a multiplier; "C1 = C2 = 1e6 EI" mixes N/m and N m/rad.
 
-    Parameters
-    ----------
-    C1 : stiffness of ties of nodes [N/m]; None: derived from the rods.
-    C2 : stiffness of ties of twist angles, which linkers have [N m/rad]; None: derived from the rods.
+    Args:
+        C1: stiffness of ties of nodes [N/m]; None: derived from the rods.
+        C2: stiffness of ties of twist angles, which linkers have [N m/rad]; None: derived from the rods.
 
-    Raises
-    ------
-    InputError : a stiffness is not a positive number.
+    Raises:
+        InputError: a stiffness is not a positive number.
     """
 
     C1: float | None = None
@@ -67,13 +55,7 @@ class _Penalty:
         keep(self, positive, "N m/rad", "C2", what="the penalty stiffness {}")
 
     def with_defaults(self, rod: Rod, edge: float) -> Self:
-        """The same with the defaults for a rod filled in.
-
-        Parameters
-        ----------
-        rod : section and material of the rods.
-        edge : length of their edges [m].
-        """
+        """The same with the defaults for rods with edges of the length `edge` [m] filled in."""
         nodes, angles = self._defaults(rod, edge)
         return replace(self, C1=self.C1 or nodes, C2=self.C2 or angles)
 
@@ -118,14 +100,13 @@ Coupling = SharedDofs | ImplicitPenalty | ExplicitPenalty
 
 
 @dataclass(frozen=True, eq=False)
-class Ties:
+class Ties(WithoutFrames):
     """Springs between pairs of blocks [HQK Eqs 5, 6]: E = C/2 |a - b|^2 of nodes and of twist angles.
 
-    Parameters
-    ----------
-    blocks : (t, 2) the two nodes, or the two twist angles, whose edges must coincide and have the same reference
-        frame (ERRATA E8 to Eq 6).
-    stiffness : (t,) C1 [N/m] of nodes, C2 [N m/rad] of twist angles.
+    Args:
+        blocks: (t, 2) the two nodes, or the two twist angles, whose edges must coincide and have the same reference
+            frame (ERRATA E8 to Eq 6).
+        stiffness: (t,) C1 [N/m] of nodes, C2 [N m/rad] of twist angles.
     """
 
     blocks: Ints
@@ -133,7 +114,7 @@ class Ties:
 
     __repr__ = brief
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         apart = state[self.blocks[:, 0]] - state[self.blocks[:, 1]]
         force = self.stiffness[:, None] * apart
@@ -146,37 +127,24 @@ class Ties:
                 hessians[:, k, k + 3] = hessians[:, k + 3, k] = -self.stiffness
         return 0.5 * float(np.vdot(force, apart))
 
-    def refreshed(self, state: Floats) -> Self:
-        """The same: there are no source frames."""
-        return self
-
-
-UP = np.array([0.0, 0.0, 1.0])
-
 
 @dataclass(frozen=True, eq=False)
-class OffsetTie:
-    """Springs between two rods' nodes; blocks, legs, weights and sources as of `RelativeRotation`.
+class OffsetTie(OfSections):
+    """Springs between two rods' nodes.
 
-    Parameters
-    ----------
-    middles : (2,) columns of `blocks` of the joint's node on A and on B.
-    stiffness : (m,) C [N/m].
-    offsets : (m,) d [m].
+    Args:
+        middles: (2,) columns of `blocks` of the joint's node on A and on B.
+        stiffness: (m,) C [N/m].
+        offsets: (m,) d [m].
     """
 
-    blocks: Ints
-    legs: Ints
     middles: Ints
-    weights: Floats
     stiffness: Floats
     offsets: Floats
-    source_tangents: Floats
-    source_directors: Floats
 
     __repr__ = brief
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _offset_tie(
@@ -185,24 +153,14 @@ class OffsetTie:
             )
         )  # fmt: skip
 
-    @property
-    def angle_columns(self) -> Ints:
-        return self.legs[:, 2]
 
-    def refreshed(self, state: Floats) -> Self:
-        """The same ties with their source frames at `state` (N, 3)."""
-        return with_source(self, state)
+def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: Floats, size: int) -> list[OffsetTie]:
+    """Ties of the eccentric crossings of rods that lie in layers.
 
-
-def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: float, size: int) -> list[OffsetTie]:
-    """Ties of the eccentric crossings.
-
-    Parameters
-    ----------
-    rod_nodes : of the mesh, whose rods lie in layers.
-    eccentricity : (c,) of each crossing of the grid [m]; those with 0 have no such tie.
-    stiffness : C [N/m].
-    size : number of blocks of the state.
+    Args:
+        eccentricity: (c,) of each crossing of the grid [m]; those with 0 have no such tie.
+        stiffness: (c,) C [N/m].
+        size: number of blocks of the state.
     """
     eccentric = np.flatnonzero(eccentricity)
     if len(eccentric) == 0:
@@ -210,16 +168,16 @@ def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: float, siz
     pairs, flat = rod_nodes.at_crossings[eccentric], rod_nodes.flat_state(size)
     layer = sides(rod_nodes.mesh.grid)[rod_nodes.rods[pairs]]
     offsets = 0.5 * eccentricity[eccentric] * (layer[:, 1] - layer[:, 0])
-    sets = []
-    for members, blocks, legs, middles, weights in stencils(rod_nodes, pairs):
-        tangents = edge_tangents(flat, blocks, legs)
-        directors = adapted(np.broadcast_to(UP, tangents.shape), tangents)
-        same = np.full(len(blocks), stiffness)
-        sets.append(OffsetTie(blocks, legs, middles, weights, same, offsets[members], tangents, directors))
-    return sets
+    return [
+        OffsetTie.starting_at(
+            blocks, legs, flat, UP,
+            weights=weights, middles=middles, stiffness=stiffness[eccentric][members], offsets=offsets[members],
+        )
+        for members, blocks, legs, middles, weights in stencils(rod_nodes, pairs)
+    ]  # fmt: skip
 
 
-@njit(error_model="numpy")
+@njit("f2 i2 i2 i1 f2 f1 f1 f3 f3 f2 f3")
 def _offset_tie(  # type: ignore[no-untyped-def]
     x, blocks, legs, middles, weights, stiffness, offsets, tangents, directors, gradient, hessians
 ):

@@ -5,22 +5,29 @@ the processor, and `njit` returns the compiled function of the highest level tha
 needed. Elsewhere Numba compiles a kernel when it is first called. RODSHELL_KERNELS=jit chooses Numba in any case, and
 RODSHELL_KERNELS=FOLDER compiled libraries that are elsewhere.
 
-Kernels that are called from Python have a row in `table`; the others are part of those. One that a single kernel calls
-is declared with inline="always": Numba then compiles it there only, and not on its own as well.
+Kernels that are called from Python are declared with the types of their arguments: those are what is compiled when a
+wheel is built. The others are part of those; one that a single kernel calls is declared with inline="always": Numba
+then compiles it there only, and not on its own as well.
 """
 
 import os
+import re
+from collections import defaultdict
 from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
 from importlib.machinery import ExtensionFileLoader, ModuleSpec
 from importlib.util import module_from_spec
+from pathlib import Path
 from typing import Any
 
 from rodshell.errors import InputError, OutOfMemoryError
-from rodshell.kernels.table import Kernel
+
+Kernel = Callable[..., Any]
 
 PACKAGE = "rodshell."
+KERNELS = defaultdict[str, dict[str, str]](dict)
+"""The types of each kernel that Python calls, by its module and its name: of the modules imported so far."""
 LEVELS = ("x86-64-v3", "generic")  # of processors, from the highest
 NO_MEMORY = "exceptions must derive from BaseException"  # what compiled kernels make of Numba's MemoryError
 UNCHOSEN = ("", "compiled")  # values of RODSHELL_KERNELS: nothing was set, or what counts when a wheel is built
@@ -33,20 +40,23 @@ def levels_here() -> list[str]:
     return [level for level in LEVELS if level == "generic" or wide]
 
 
-def njit(**options: object) -> Callable[[Kernel], Kernel]:
+def njit(types: str = "", /, **options: object) -> Callable[[Kernel], Kernel]:
     """Declare a kernel: its machine code if it was compiled with the wheel, else what Numba makes of it when it is
     called.
 
-    Parameters
-    ----------
-    options : of numba.njit, such as error_model="numpy".
+    Args:
+        types: of its arguments, if Python calls it: each a letter and a number of dimensions, in C order: f float64, i
+            int64, b bool, c complex128; f2 is an array (n, m) of float64, f alone a number; ff is a pair of numbers.
+        options: of numba.njit, such as nogil=True.
     """
 
     def declared(function: Kernel) -> Kernel:
+        if types:
+            KERNELS[function.__module__.removeprefix(PACKAGE)][function.__name__] = types
         if COMPILED is None:
             from rodshell.kernels.jit import dispatcher
 
-            return dispatcher(function, name_of(function), options)
+            return dispatcher(function, options, kept=bool(types))
         kernel = COMPILED.get(name_of(function))
         return function if kernel is None else _taking_any_array(kernel)
 
@@ -90,6 +100,13 @@ def _plain(value: Any) -> Any:
 def name_of(function: Kernel) -> str:
     """Its module and name, within the package."""
     return f"{function.__module__.removeprefix(PACKAGE)}.{function.__name__}"
+
+
+def modules() -> list[str]:
+    """Those of the package, without its name, that declare kernels which Python calls."""
+    root = Path(__file__).parents[1]
+    sources = [path for path in root.rglob("*.py") if re.search(r'^@njit\(\s*"', path.read_text("utf-8"), re.MULTILINE)]
+    return sorted(".".join(path.relative_to(root).with_suffix("").parts) for path in sources)
 
 
 def library_name(level: str, unit: int) -> str:

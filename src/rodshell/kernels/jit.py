@@ -1,13 +1,13 @@
-"""Kernels compiled by Numba when they are first called; those of the table are kept where a folder can be written.
+"""Kernels compiled by Numba when they are first called; those that Python calls are kept where a folder can be written.
 
 All that rests on private names of Numba, for which `pyproject.toml` allows the versions that were tried, is here.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from rodshell.errors import RodshellError
 from rodshell.kernels.cache import kernels_are_kept
-from rodshell.kernels.table import KERNELS, Kernel
 
 try:
     from numba import config, njit, types
@@ -21,18 +21,16 @@ config._config_fname = ""
 config.reload_config()
 
 
-def dispatcher(function: Kernel, kernel_name: str, options: dict[str, object]) -> Kernel:
-    """The kernel of a function, which is compiled at its first call; `kernel_name` is its module and name.
+def dispatcher(function: Callable[..., Any], options: dict[str, object], *, kept: bool) -> Callable[..., Any]:
+    """The kernel of a function, which is compiled at its first call.
 
     Divisions are those of NumPy, and floating-point numbers are rounded as written, unless it has an option for that.
     By Numba's defaults a kernel takes such options from the kernel that calls it first, and its bits would depend on
     the order of calls. Numba refuses to declare a kernel that is to be kept where no folder can be written. Those that
     only kernels call are not kept: they are part of these.
     """
-    module, _, name = kernel_name.rpartition(".")
-    kept = name in KERNELS.get(module, {}) and kernels_are_kept()
-    of_its_own: dict[str, object] = {"error_model": "numpy", "fastmath": False, "cache": kept}
-    kernel: Kernel = njit(**of_its_own | options)(function)
+    of_its_own: dict[str, object] = {"error_model": "numpy", "fastmath": False, "cache": kept and kernels_are_kept()}
+    kernel: Callable[..., Any] = njit(**of_its_own | options)(function)
     return kernel
 
 
@@ -43,9 +41,9 @@ def is_kept(kernel: Any, arguments: tuple[types.Type, ...]) -> bool:
     return key in cache._cache_file._load_index()
 
 
-def arguments_of(row: str) -> tuple[types.Type, ...]:
-    """Numba's types of the arguments in a row of the table."""
-    return tuple(_type_of(code) for code in row.split())
+def arguments_of(codes: str) -> tuple[types.Type, ...]:
+    """Numba's types of arguments that a kernel is declared with."""
+    return tuple(_type_of(code) for code in codes.split())
 
 
 def _type_of(code: str) -> types.Type:

@@ -17,10 +17,9 @@ from rodshell.validation import instance
 class Pattern:
     """Which diagonals of the cells are braced.
 
-    Parameters
-    ----------
-    ways : 2: both diagonals of a cell, 1: one, in all cells the same way.
-    every : 1: all cells, n: continuous lines of diagonals through every n-th joint.
+    Args:
+        ways: 2: both diagonals of a cell, 1: one, in all cells the same way.
+        every: 1: all cells, n: continuous lines of diagonals through every n-th joint.
     """
 
     ways: Literal[1, 2] = 2
@@ -30,9 +29,8 @@ class Pattern:
     def of(words: str) -> "Pattern":
         """ "both", "one" or "every = n".
 
-        Raises
-        ------
-        InputError : it is something else.
+        Raises:
+            InputError: it is something else.
         """
         instance("the pattern of diagonals", words, str, 'text such as "both"')
         if words in ("both", "one"):
@@ -84,9 +82,8 @@ def rim_diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     side by side these are both diagonals of their field; where the rim steps from one rod to the next, both start at
     the joint at the inner corner and divide the field into triangles. A diagonal along a rod is left out.
 
-    Parameters
-    ----------
-    pattern : of two diagonals of a field one is left out, as in cells; with lines the others of its way are.
+    Args:
+        pattern: of two diagonals of a field one is left out, as in cells; with lines the others of its way are.
     """
     rows, rods = _rows(grid), grid.crossings.rods.tolist()
     found = list[tuple[int, int, int]]()  # joint where it starts, the rod's last joint, and the end
@@ -100,7 +97,7 @@ def rim_diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     way = ends[pairs[:, 1]] - joints[pairs[:, 0]]
     along = joints[[last for _, last, _ in found]] - joints[pairs[:, 0]]
     across = np.abs(way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0])
-    kept = across > LEAST_ANGLE * np.linalg.norm(way, axis=1) * np.linalg.norm(along, axis=1)
+    kept = across > _LEAST_ANGLE * np.linalg.norm(way, axis=1) * np.linalg.norm(along, axis=1)
     rising = way.prod(axis=1) > 0
     if pattern.ways == 1:
         between = {(start, last) for (start, last, _), used in zip(found, kept.tolist(), strict=True) if used}
@@ -111,16 +108,15 @@ def rim_diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     return np.asarray(pairs[kept])
 
 
-LEAST_ANGLE = 0.2  # sine of that between a diagonal at the rim and the rod that it starts from
+_LEAST_ANGLE = 0.2  # sine of that between a diagonal at the rim and the rod that it starts from
 
 
 def lines(pairs: Ints, points: Floats) -> list[list[int]]:
     """Crossings along each continuous line of diagonals, from its first to its last.
 
-    Parameters
-    ----------
-    pairs : (d, 2) crossings of each diagonal.
-    points : (c, 2) of the crossings in the flat grid [m]: a line continues where its direction changes least.
+    Args:
+        pairs: (d, 2) crossings of each diagonal.
+        points: (c, 2) of the crossings in the flat grid [m]: a line continues where its direction changes least.
     """
     at: dict[int, list[tuple[int, int]]] = {}
     for k, (a, b) in enumerate(pairs.tolist()):
@@ -186,9 +182,8 @@ def _rising(grid: FlatGrid, pairs: Ints) -> Floats:
 def _lattice(grid: FlatGrid) -> Ints:
     """(c, 2) which line of either family each crossing is on, counted from the axis next to the anchor.
 
-    Raises
-    ------
-    InputError : rods of a table are on no lattice.
+    Raises:
+        InputError: rods of a table are on no lattice.
     """
     if any(rod.family == "free" for rod in grid.rods):
         raise InputError("rods of a table are on no lattice that lines of bracing could be counted on: brace all cells")

@@ -14,13 +14,14 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout.profile import Profile
+from rodshell.layout.rest_curve import RestCurve
 from rodshell.untrusted import limit, raised
 from rodshell.validation import LARGEST, finite, instance, listed, number, short, texts
 
 Family = Literal["u", "v", "free"]
 
 MOST_RODS = 5000  # of a grid, of which all pairs are looked at; they take 0.4 GB
-PARALLEL = 1e-9  # sine of the angle between lines that do not cross
+_PARALLEL = 1e-9  # sine of the angle between lines that do not cross
 TOGETHER = 0.01  # of the usual span: crossings of three rods or more that are nearer to each other are one joint
 
 
@@ -31,16 +32,16 @@ class FlatRod(NamedTuple):
     is measured from the middle of the layout. A rod of family "free" is given by its two ends, and s is measured from
     its first end.
 
-    Parameters
-    ----------
-    name : label such as "U09".
-    family : "u", "v" or "free".
-    offset : of the rod's line; 0 for a free one [m].
-    start, end : material coordinates of the ends [m].
-    origin : point of the rod's line at which s is 0 [m].
-    direction : unit vector along the rod.
-    virtual : whether the line only shapes the net and is not built.
-    profile : how its section changes along it; None: not at all.
+    Args:
+        name: label such as "U09".
+        family: "u", "v" or "free".
+        offset: of the rod's line; 0 for a free one [m].
+        start, end: material coordinates of the ends [m].
+        origin: point of the rod's line at which s is 0 [m].
+        direction: unit vector along the rod.
+        virtual: whether the line only shapes the net and is not built.
+        profile: how its section changes along it; None: not at all.
+        curve: the curvature that it has at rest; None: it is straight.
     """
 
     name: str
@@ -52,17 +53,17 @@ class FlatRod(NamedTuple):
     direction: tuple[float, float]
     virtual: bool = False
     profile: Profile | None = None
+    curve: RestCurve | None = None
 
     @staticmethod
     def u(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
         """A rod of family "u", along x.
 
-        Parameters
-        ----------
-        name : label such as "U09".
-        offset : y of the rod's line [m].
-        start, end : x of the ends [m].
-        virtual : whether the line only shapes the net and is not built.
+        Args:
+            name: label such as "U09".
+            offset: y of the rod's line [m].
+            start, end: x of the ends [m].
+            virtual: whether the line only shapes the net and is not built.
         """
         return FlatRod(name, "u", offset, start, end, (0.0, offset), (1.0, 0.0), virtual)
 
@@ -70,12 +71,11 @@ class FlatRod(NamedTuple):
     def v(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
         """A rod of family "v", along y.
 
-        Parameters
-        ----------
-        name : label such as "V09".
-        offset : x of the rod's line [m].
-        start, end : y of the ends [m].
-        virtual : whether the line only shapes the net and is not built.
+        Args:
+            name: label such as "V09".
+            offset: x of the rod's line [m].
+            start, end: y of the ends [m].
+            virtual: whether the line only shapes the net and is not built.
         """
         return FlatRod(name, "v", offset, start, end, (offset, 0.0), (0.0, 1.0), virtual)
 
@@ -91,28 +91,24 @@ class FlatRod(NamedTuple):
     def cut(self, start: float, end: float) -> "FlatRod":
         """The same rod with other ends.
 
-        Parameters
-        ----------
-        start, end : material coordinates of the new ends [m].
+        Args:
+            start, end: material coordinates of the new ends [m].
         """
         line = self.name, self.family, self.offset, start, end, self.origin, self.direction
-        return FlatRod(*line, self.virtual, self.profile)
+        return FlatRod(*line, self.virtual, self.profile, self.curve)
 
 
 def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
     """Find the rods that pieces of rods belong to.
 
-    Parameters
-    ----------
-    pieces : rods, each of which is one of the whole rods or a piece of one.
+    Args:
+        pieces: rods, each of which is one of the whole rods or a piece of one.
 
-    Returns
-    -------
-    (m,) the index of the whole rod of each piece.
+    Returns:
+        (m,) the index of the whole rod of each piece.
 
-    Raises
-    ------
-    ValueError : a piece belongs to no rod.
+    Raises:
+        ValueError: a piece belongs to no rod.
     """
     on_line: dict[tuple[object, object], list[tuple[int, FlatRod]]] = {}
     for k, rod in enumerate(rods):
@@ -133,10 +129,9 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
 class Crossings:
     """Where rods cross. Two of these are equal if their content is.
 
-    Parameters
-    ----------
-    rods : (c, 2) indices of the two rods.
-    at : (c, 2) material coordinates on each of the two [m].
+    Args:
+        rods: (c, 2) indices of the two rods.
+        at: (c, 2) material coordinates on each of the two [m].
     """
 
     rods: Ints
@@ -156,6 +151,15 @@ class Crossings:
     def __repr__(self) -> str:
         return f"Crossings({len(self)})"
 
+    def and_those(self, others: "Crossings") -> "Crossings":
+        """These and others of the same rods."""
+        return Crossings(np.concatenate([self.rods, others.rods]), np.concatenate([self.at, others.at]))
+
+    def between(self, kept: Bools) -> "Crossings":
+        """Those of the rods marked in `kept` (m,) among each other, numbered as if there were only these rods."""
+        index, pairs = np.cumsum(kept) - 1, self.select(np.asarray(kept[self.rods].all(axis=1)))
+        return Crossings(index[pairs.rods], pairs.at)
+
     def select(self, keep: Bools) -> "Crossings":
         """The crossings marked in `keep` (c,)."""
         return Crossings(self.rods.compress(keep, axis=0), self.at.compress(keep, axis=0))
@@ -165,14 +169,15 @@ class Crossings:
 class FlatGrid:
     """Straight rods and the crossings at which they are joined. Grids with the same content are equal.
 
-    Parameters
-    ----------
-    rods : straight rods in the plane.
-    crossings : of these rods; not all places where lines cross need be joined.
+    Args:
+        rods: straight rods: in the plane, or, where `passed` is given, each for itself.
+        crossings: of these rods; not all places where rods cross need be joined.
+        passed: where rods cross without a joint, or would if they were longer; None: where their lines do.
     """
 
     rods: tuple[FlatRod, ...]
     crossings: Crossings
+    passed: Crossings | None = None
 
     @cached_property
     def ends(self) -> Floats:
@@ -183,14 +188,12 @@ class FlatGrid:
     def of(rods: Sequence[FlatRod], *, margin: float = 0.0) -> "FlatGrid":
         """Join rods wherever they cross.
 
-        Parameters
-        ----------
-        margin : crossings closer to an end of either rod are not joined [m].
+        Args:
+            margin: crossings closer to an end of either rod are not joined [m].
 
-        Raises
-        ------
-        InputError : something else is given; a rod's numbers are not finite, it has no direction, or does not end
-            behind its start.
+        Raises:
+            InputError: something else is given; a rod's numbers are not finite, it has no direction, or does not end
+                behind its start.
         """
         rods = listed("rods", rods, "a list of rodshell.FlatRod")
         refuse_too_many(len(rods))
@@ -210,6 +213,50 @@ class FlatGrid:
                 f"{rod.start:g} m and end {rod.end:g} m"
             )
         return FlatGrid(rods, Crossings(*_crossings(lines, margin)))
+
+    def meetings(self, beyond: float = 0.0) -> Crossings:
+        """Where rods cross, joined or not, or would if each were longer by `beyond` at both ends [m]."""
+        if self.passed is None:
+            return FlatGrid.of(self.rods, margin=-beyond).crossings
+        every = self.crossings.and_those(self.passed)
+        first, last = self.ends[every.rods].transpose(2, 0, 1)
+        near = (first - beyond <= every.at) & (every.at <= last + beyond)
+        return every.select(np.asarray(near.all(axis=1)))
+
+    def cut(self, pieces: Sequence[FlatRod], *, margin: float = 0.0) -> tuple["FlatGrid", Ints]:
+        """The grid of pieces of its rods, joined where these are; and which crossing (c,) of this grid each of its
+        crossings is.
+
+        Args:
+            pieces: each a rod of the grid, or a piece of it.
+            margin: crossings closer to an end of either piece are left out [m].
+
+        Raises:
+            ValueError: a piece belongs to no rod.
+        """
+        whole, ends = whole_rods(self.rods, pieces), np.array([(piece.start, piece.end) for piece in pieces])
+        slack = margin - 1e-9 * np.diff(ends).ravel()  # a crossing exactly at an end is a joint at that end
+        low, high = ends[:, 0] + slack, ends[:, 1] - slack
+        every = self.crossings if self.passed is None else self.crossings.and_those(self.passed)
+        order = np.argsort(whole, kind="stable")
+        first = np.searchsorted(whole[order], np.arange(len(self.rods) + 1))
+        piece_of, inside = np.full(every.rods.shape, -1), np.zeros(every.rods.shape, dtype=bool)
+        for k in range(int(np.diff(first).max(initial=0))):  # the k-th piece of every rod
+            place = first[every.rods] + k
+            piece = order[np.minimum(place, len(order) - 1)]
+            known = place < first[every.rods + 1]
+            within = known & (low[piece] <= every.at) & (every.at <= high[piece])
+            piece_of = np.where(within | (known & ~inside), piece, piece_of)
+            inside |= within
+        joined = inside.all(axis=1) & (np.arange(len(every)) < len(self.crossings))
+        kept, left = np.flatnonzero(joined), ~joined & (piece_of >= 0).all(axis=1)
+        rods = piece_of[kept]
+        at = np.clip(every.at[kept], ends[rods, 0], ends[rods, 1])
+        turned = rods[:, 0] > rods[:, 1]
+        rods[turned], at[turned] = rods[turned, ::-1], at[turned, ::-1]
+        rows = np.lexsort((at[:, 0], rods[:, 1], rods[:, 0]))
+        passed = None if self.passed is None else Crossings(piece_of[left], every.at[left])
+        return FlatGrid(tuple(pieces), Crossings(rods[rows], at[rows]), passed), kept[rows]
 
     def __repr__(self) -> str:
         return f"FlatGrid({len(self.rods)} rods, {len(self.crossings)} crossings)"
@@ -262,13 +309,11 @@ class FlatGrid:
     def with_profiles(self, profiles: Profile | Sequence[Profile | None] | None) -> "FlatGrid":
         """The same rods, whose sections change along them.
 
-        Parameters
-        ----------
-        profiles : the same for all rods, or one for each; None: the section does not change.
+        Args:
+            profiles: the same for all rods, or one for each; None: the section does not change.
 
-        Raises
-        ------
-        InputError : not as many profiles as rods.
+        Raises:
+            InputError: not as many profiles as rods.
         """
         each = profiles if isinstance(profiles, Sequence) else (profiles,) * len(self.rods)
         if len(each) != len(self.rods):
@@ -284,21 +329,18 @@ class FlatGrid:
     def without(self, leave_out: Callable[["FlatGrid"], Bools]) -> tuple["FlatGrid", list[str]]:
         """Remove rods repeatedly, until `leave_out` marks none.
 
-        Parameters
-        ----------
-        leave_out : marks the rods (m,) of a grid that are to be removed.
+        Args:
+            leave_out: marks the rods (m,) of a grid that are to be removed.
 
-        Returns
-        -------
-        The grid, and the names of the rods that were removed.
+        Returns:
+            The grid, and the names of the rods that were removed.
         """
         grid, names = self, list[str]()
         while (out := leave_out(grid)).any():
             names += [rod.name for rod, gone in zip(grid.rods, out, strict=True) if gone]
-            index = np.cumsum(~out) - 1
-            kept = grid.crossings.select(np.logical_not(out[grid.crossings.rods].any(axis=1)))
             rods = tuple(rod for rod, gone in zip(grid.rods, out, strict=True) if not gone)
-            grid = FlatGrid(rods, Crossings(index[kept.rods], kept.at))
+            passed = None if grid.passed is None else grid.passed.between(~out)
+            grid = FlatGrid(rods, grid.crossings.between(~out), passed)
             if not rods:
                 break
         return grid, names
@@ -307,14 +349,12 @@ class FlatGrid:
 def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> FlatGrid:
     """Make a flat grid of straight rods, joined wherever they cross.
 
-    Parameters
-    ----------
-    ends : (m, 2, 2) the two end points of each rod in the plane [m].
-    names : m different labels; default "R01", "R02", ...
+    Args:
+        ends: (m, 2, 2) the two end points of each rod in the plane [m].
+        names: m different labels; default "R01", "R02", ...
 
-    Raises
-    ------
-    InputError : the ends are not finite numbers of that shape; a rod has no length or crosses no other; two overlap.
+    Raises:
+        InputError: the ends are not finite numbers of that shape; a rod has no length or crosses no other; two overlap.
     """
     try:
         points = np.asarray(ends, dtype=float)
@@ -383,7 +423,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-@njit(error_model="numpy")
+@njit("f2 f")
 def _crossings(lines, margin):  # type: ignore[no-untyped-def]
     """Pairs of rods (c, 2) that cross, and where on both (c, 2) [m]; closer to an end than `margin` [m] they do not.
 
@@ -392,12 +432,12 @@ def _crossings(lines, margin):  # type: ignore[no-untyped-def]
     count = 0
     for a in range(len(lines)):
         for b in range(a + 1, len(lines)):
-            count += abs(lines[a, 2] * lines[b, 3] - lines[a, 3] * lines[b, 2]) > PARALLEL
+            count += abs(lines[a, 2] * lines[b, 3] - lines[a, 3] * lines[b, 2]) > _PARALLEL
     rods, at, count = np.empty((count, 2), dtype=np.int64), np.empty((count, 2)), 0
     for a in range(len(lines)):
         for b in range(a + 1, len(lines)):
             sine = lines[a, 2] * lines[b, 3] - lines[a, 3] * lines[b, 2]
-            if abs(sine) > PARALLEL:
+            if abs(sine) > _PARALLEL:
                 x, y, met = lines[b, 0] - lines[a, 0], lines[b, 1] - lines[a, 1], True
                 rods[count, 0], rods[count, 1] = a, b
                 for side in range(2):
@@ -416,13 +456,11 @@ def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> Ints:
     From the first rod of each connected part outwards, each rod gets the lowest layer in which it crosses no rod. Two
     families of rods get two layers; that of the first rod is the lower one.
 
-    Parameters
-    ----------
-    crossings : pairs of indices of rods that cross.
+    Args:
+        crossings: pairs of indices of rods that cross.
 
-    Returns
-    -------
-    (rods,) layer of each rod, 1 the lowest.
+    Returns:
+        (rods,) layer of each rod, 1 the lowest.
     """
     crossed: list[list[int]] = [[] for _ in range(rods)]
     for a, b in crossings:
@@ -443,9 +481,8 @@ def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> Ints:
 def sides(grid: FlatGrid) -> Floats:
     """Side of each rod (m,) of a grid in two layers: -1 for the lower layer, 1 for the upper.
 
-    Raises
-    ------
-    InputError : the rods need more than two layers, such as three that cross each other.
+    Raises:
+        InputError: the rods need more than two layers, such as three that cross each other.
     """
     layer = layers(len(grid.rods), grid.crossings.rods.tolist())
     if layer.max(initial=0) > 2:

@@ -3,45 +3,44 @@
 from dataclasses import dataclass, fields, replace
 from math import degrees, pi
 from numbers import Real
-from typing import Literal
+from string import ascii_lowercase
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod, refuse_too_many
+from rodshell.layout.lattices import EDGES_A_SPAN, Asymptotic, Curves, Geodesic
 from rodshell.units import NUMBER
 from rodshell.validation import flag, instance, is_auto, number, numbers, positive, short, texts, whole
 
 Auto = Literal["auto"]
 
 FLATTEST = pi / 6 - 1e-9  # smallest crossing angle; and its supplement is the largest
-EDGES_A_SPAN = 6  # edges of the mesh per spacing, where the edge is "auto"
 
 
 @dataclass(frozen=True, repr=False)
 class GridLayout:
     """Two orthogonal families of rods [HQK section 3.2]; make one with `GridLayout.orthogonal`.
 
-    Parameters
-    ----------
-    rods : number of rods of family u (along x) and of family v (along y), or "auto" for every line that touches the
-        target.
-    spacing : distance between neighbouring rods of family u (measured along y) and of family v (along x) [m].
-    length : of every rod before trimming [m], or "auto" for the length that is needed.
-    edge : longest edge of the mesh [m].
-    rotate : angle of family u against the target's x axis [rad].
-    offset : shift (x, y) of the lattice against the axes through the anchor [m].
-    lines : ascending offsets of rods of families u and v that are not equally spaced [m]; before the first and after
-        the last of them the spacing continues. Empty for a family whose rods are all equally spaced.
-    left_out : names of rods that are not built; their lines still shape the net.
-    crossing : angle between the families on the target, where its axes cross [rad]; the flat grid stays orthogonal.
-    auto_edge : whether the edge was left to the method of draping, see `with_edges`.
+    Args:
+        rods: number of rods of family u (along x) and of family v (along y), or "auto" for every line that touches the
+            target.
+        spacing: distance between neighbouring rods of family u (measured along y) and of family v (along x) [m].
+        length: of every rod before trimming [m], or "auto" for the length that is needed.
+        edge: longest edge of the mesh [m].
+        rotate: angle of family u against the target's x axis [rad].
+        offset: shift (x, y) of the lattice against the axes through the anchor [m].
+        lines: ascending offsets of rods of families u and v that are not equally spaced [m]; before the first and after
+            the last of them the spacing continues. Empty for a family whose rods are all equally spaced.
+        left_out: names of rods that are not built; their lines still shape the net.
+        crossing: angle between the families on the target, where its axes cross [rad]; the flat grid stays orthogonal.
+        auto_edge: whether the edge was left to the method of draping, see `with_edges`.
 
-    Raises
-    ------
-    InputError : a value of the wrong kind or not finite; a count below 2; a spacing, length or edge that is not
-        positive; an edge longer than the spacing; a crossing angle below 30 or above 150 degrees.
+    Raises:
+        InputError: a value of the wrong kind or not finite; a count below 2; a spacing, length or edge that is not
+            positive; an edge longer than the spacing; a crossing angle below 30 or above 150 degrees.
     """
 
     rods: tuple[int, int] | Auto
@@ -54,6 +53,8 @@ class GridLayout:
     left_out: tuple[str, ...] = ()
     crossing: float = pi / 2
     auto_edge: bool = False
+
+    kind: ClassVar[str] = "chebyshev"
 
     def __post_init__(self) -> None:
         for name in ("spacing", "offset"):
@@ -111,20 +112,18 @@ class GridLayout:
     ) -> "GridLayout":
         """Make a layout of equally spaced rods along x and along y.
 
-        Parameters
-        ----------
-        rods : number of rods along x and along y, or "auto" for every line that touches the target.
-        spacing : between neighbouring rods: one length, or one for each family [m].
-        length : of every rod before trimming [m], or "auto" for the length that is needed.
-        edge : longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing, and half of it for a `Fall`.
-        rotate : angle of family u against the target's x axis [rad].
-        offset : shift (x, y) of the lattice against the axes through the anchor [m].
-        left_out : names of rods that are not built.
-        crossing : angle between the families on the target, where its axes cross [rad].
+        Args:
+            rods: number of rods along x and along y, or "auto" for every line that touches the target.
+            spacing: between neighbouring rods: one length, or one for each family [m].
+            length: of every rod before trimming [m], or "auto" for the length that is needed.
+            edge: longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing, and half of it for a `Fall`.
+            rotate: angle of family u against the target's x axis [rad].
+            offset: shift (x, y) of the lattice against the axes through the anchor [m].
+            left_out: names of rods that are not built.
+            crossing: angle between the families on the target, where its axes cross [rad].
 
-        Raises
-        ------
-        InputError : as `GridLayout` does.
+        Raises:
+            InputError: as `GridLayout` does.
         """
         instance("layout spacing", spacing, tuple | list | Real | np.ndarray, "one or two lengths in m")
         pair = spacing if isinstance(spacing, tuple | list | np.ndarray) else (spacing, spacing)
@@ -135,6 +134,21 @@ class GridLayout:
         return GridLayout(
             rods, pair, length, longest, rotate, offset, left_out=left_out, crossing=crossing, auto_edge=auto
         )
+
+    @property
+    def least_spacing(self) -> float:
+        """The smaller spacing [m]."""
+        return min(self.spacing)
+
+    @property
+    def most_spacing(self) -> float:
+        """The larger spacing [m]."""
+        return max(self.spacing)
+
+    @property
+    def longest_edge(self) -> float:
+        """Of the mesh [m]."""
+        return self.edge
 
     def with_edges(self, a_span: int) -> "GridLayout":
         """The layout with so many edges to the smaller spacing, unless its edge was given."""
@@ -150,10 +164,9 @@ class GridLayout:
     def lattice(self, family: Family, low: float, high: float) -> Floats:
         """Offsets of the lines of a family [m], from at most a spacing below `low` to at most one above `high` [m].
 
-        Parameters
-        ----------
-        family : "u" or "v".
-        low, high : ends of the range of offsets that the lines have to cover [m].
+        Args:
+            family: "u" or "v".
+            low, high: ends of the range of offsets that the lines have to cover [m].
         """
         spacing, given = self.spacing[0 if family == "u" else 1], self.lines[0 if family == "u" else 1]
         if given:
@@ -172,10 +185,6 @@ class GridLayout:
         count = self.rods[side]
         return np.asarray(self.offset[1 - side] + (np.arange(count) - (count - 1) / 2) * self.spacing[side])
 
-    def half_length(self) -> float:
-        """Half the length of every rod [m]; infinite where the length is "auto"."""
-        return np.inf if self.length == "auto" else self.length / 2
-
     def middle(self, family: Family) -> float:
         """Material coordinate of the middle of the rods of a family [m]: the layout moves with its offset."""
         return self.offset[0 if family == "u" else 1]
@@ -183,15 +192,14 @@ class GridLayout:
     def parameters(self) -> dict[str, object]:
         """The layout in SI, as it is written in a case file."""
         keys = (key.name for key in fields(self) if key.name not in ("lines", "left_out", "auto_edge"))
-        return {key: getattr(self, key) for key in keys}
+        return {"kind": self.kind, **{key: getattr(self, key) for key in keys}}
 
     def flat_grid(self, counts: tuple[int, int], length: float) -> FlatGrid:
         """The rectangular grid before trimming.
 
-        Parameters
-        ----------
-        counts : number of rods of families u and v, used instead of those of the layout.
-        length : of every rod, used instead of that of the layout [m].
+        Args:
+            counts: number of rods of families u and v, used instead of those of the layout.
+            length: of every rod, used instead of that of the layout [m].
         """
         whole = GridLayout(counts, self.spacing, length, self.edge, self.rotate, self.offset)
         rods = list[FlatRod]()
@@ -241,9 +249,34 @@ def _counts(rods: object) -> tuple[int, int]:
 def rod_names(family: Family, count: int) -> list[str]:
     """Names of the rods of a family: U01, U02, ... in ascending offset.
 
-    Parameters
-    ----------
-    count : number of rods of the family, which determines the number of digits.
+    Args:
+        count: number of rods of the family, which determines the number of digits.
     """
     letter, digits = family.upper(), max(2, len(str(count)))
     return [letter + str(k + 1).zfill(digits) for k in range(count)]
+
+
+def piece_names(rod: str, count: int) -> list[str]:
+    """Names of the pieces of a rod: U07, or U07a, U07b, ... if there are several.
+
+    Args:
+        rod: name of the whole rod.
+    """
+    return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
+
+
+Layout = GridLayout | Geodesic | Asymptotic | Curves
+"""How the rods of a form are laid out: in the flat grid, or along curves of the target."""
+
+
+def require_chebyshev(layout: Layout, what: str) -> GridLayout:
+    """The layout, which must be of straight rods in the flat grid.
+
+    Raises:
+        InputError: it is another lattice, for which `what` is not offered.
+    """
+    if isinstance(layout, GridLayout):
+        return layout
+    raise InputError(
+        f'{what} need the lattice "chebyshev", not "{layout.kind}": leave them out, or set layout.kind to "chebyshev"'
+    )

@@ -31,15 +31,15 @@ class GridMesh:
     Rods share one node at a joint, or are in two layers (`in_layers`). Two meshes are equal only if they are the same
     object.
 
-    Parameters
-    ----------
-    grid : the rods and joints that were meshed.
-    flat : (n, 3) node positions in the flat, unstressed state [m]; z = 0, or the height of the rod's layer.
-    rod_nodes : (k,) nodes of all rods, one rod after the other in the order of `grid.rods`.
-    rod_start : (m,) where each rod begins in `rod_nodes`.
-    stations : (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
-    joint_nodes : (c,) node of each of the grid's crossings, on its first rod.
-    second_nodes : (c,) the same on its second rod, where rods are in layers and share no nodes; None: the same node.
+    Args:
+        grid: the rods and joints that were meshed.
+        flat: (n, 3) node positions in the flat, unstressed state [m]; z = 0, or the height of the rod's layer.
+        rod_nodes: (k,) nodes of all rods, one rod after the other in the order of `grid.rods`.
+        rod_start: (m,) where each rod begins in `rod_nodes`.
+        stations: (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
+        joint_nodes: (c,) node of each of the grid's crossings, on its first rod.
+        second_nodes: (c,) the same on its second rod, where rods are in layers and share no nodes; None: the same node.
+        side_by_side: the grids that it consists of, in the order of their rods, nodes and crossings; empty: of one.
     """
 
     grid: FlatGrid
@@ -49,6 +49,22 @@ class GridMesh:
     stations: Floats
     joint_nodes: Ints
     second_nodes: Ints | None = None
+    side_by_side: tuple["GridMesh", ...] = ()
+
+    @property
+    def grids(self) -> tuple["GridMesh", ...]:
+        """The meshes of all grids that lie side by side, of which it is the only one or consists."""
+        return self.side_by_side or (self,)
+
+    @cached_property
+    def grid_of_rods(self) -> Ints:
+        """(m,) grid that each rod belongs to."""
+        return np.repeat(np.arange(len(self.grids)), [len(mesh.grid.rods) for mesh in self.grids])
+
+    @cached_property
+    def grid_of_nodes(self) -> Ints:
+        """(n,) grid that each node belongs to."""
+        return np.repeat(np.arange(len(self.grids)), [mesh.node_count for mesh in self.grids])
 
     @cached_property
     def apart(self) -> "GridMesh":
@@ -148,9 +164,8 @@ class GridMesh:
         """Of each entry of `rod_nodes` the crossings before and after it on its rod (k, 2), and how far it is on the
         way from the first to the second (k,), 0 to 1; before a rod's first crossing and past its last both are that.
 
-        Raises
-        ------
-        ValueError : some rod crosses no other.
+        Raises:
+            ValueError: some rod crosses no other.
         """
         if (self.grid.joint_counts() == 0).any():
             raise ValueError("a rod that crosses no other has nothing to interpolate between")
@@ -178,13 +193,11 @@ class GridMesh:
     def in_layers(self, eccentricity: float) -> "GridMesh":
         """The same rods in two layers; node k of the result is entry k of this mesh's `rod_nodes`.
 
-        Parameters
-        ----------
-        eccentricity : distance of the layers [m].
+        Args:
+            eccentricity: distance of the layers [m].
 
-        Raises
-        ------
-        InputError : the rods need more than two layers.
+        Raises:
+            InputError: the rods need more than two layers.
         """
         side, pairs = sides(self.grid)[self.rod_of], self.at_crossings
         flat = self.flat[self.rod_nodes]
@@ -201,6 +214,15 @@ class GridMesh:
         """The same mesh of rods whose sections change along them; arguments as of `FlatGrid.with_profiles`."""
         return replace(self, grid=self.grid.with_profiles(profiles))
 
+    @cached_property
+    def rest_curvatures(self) -> Floats:
+        """(k,) of the rods at rest at each entry of `rod_nodes`, positive to the left in the plane [1/m]."""
+        result = np.zeros(len(self.rod_nodes))
+        for k, rod in enumerate(self.grid.rods):
+            if rod.curve is not None:
+                result[self.rod_slice(k)] = rod.curve.at(self.stations[self.rod_slice(k)])
+        return result
+
     def tributary_lengths(self) -> Floats:
         """Rod length (n,) that each node represents: half of every edge at the node [m]."""
         total = np.zeros(self.node_count)
@@ -210,14 +232,12 @@ class GridMesh:
     def prolong(self, positions: Floats, fine: "GridMesh", *, rods: Sequence[int] | None = None) -> Floats:
         """Interpolate positions on another mesh of the same rods, by local cubics along each rod.
 
-        Parameters
-        ----------
-        positions : (n, 3) of the nodes of this mesh [m].
-        rods : for each rod of `fine` the rod of this mesh that it is a part of; default: the same.
+        Args:
+            positions: (n, 3) of the nodes of this mesh [m].
+            rods: for each rod of `fine` the rod of this mesh that it is a part of; default: the same.
 
-        Returns
-        -------
-        (n, 3) positions of the nodes of `fine` [m].
+        Returns:
+            (n, 3) positions of the nodes of `fine` [m].
         """
         result = np.empty((fine.node_count, 3))
         for k, rod in enumerate(rods if rods is not None else range(len(self.rod_start))):
@@ -238,7 +258,7 @@ class _Stencils(NamedTuple):
     voronoi_lengths: Floats
 
 
-@njit()
+@njit("i1 i1 f1")
 def _edges_and_bends(rod_nodes, rod_start, stations):  # type: ignore[no-untyped-def]
     edge_count, bend_count, stop = 0, 0, len(rod_nodes)
     for rod in range(len(rod_start) - 1, -1, -1):
@@ -264,14 +284,12 @@ def _edges_and_bends(rod_nodes, rod_start, stations):  # type: ignore[no-untyped
 def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
     """Divide a flat grid into edges: each span between joints, and each end of a rod, into the fewest equal edges.
 
-    Parameters
-    ----------
-    edge : longest edge [m]; infinite: as few edges as possible.
-    marks : for each rod the material coordinates of further points that must be nodes [m].
+    Args:
+        edge: longest edge [m]; infinite: as few edges as possible.
+        marks: for each rod the material coordinates of further points that must be nodes [m].
 
-    Raises
-    ------
-    InputError : a value is of the wrong kind; the edge is not positive; not as many marks as rods.
+    Raises:
+        InputError: a value is of the wrong kind; the edge is not positive; not as many marks as rods.
     """
     instance("grid", grid, FlatGrid)
     edge = positive("edge", edge, "m", infinite=True)
@@ -307,7 +325,7 @@ def _fixed_points(grid: FlatGrid, marks: Sequence[Sequence[float]]) -> tuple[Int
     return found
 
 
-@njit()
+@njit("i2 f2 f1 i1")
 def _fixed(crossings, at, given, begin):  # type: ignore[no-untyped-def]
     """See `_fixed_points`: `crossings` (c, 2) and where they are (c, 2); the `given` points, rod by rod, of which those
     of each rod `begin` (m + 1,) there."""
@@ -396,7 +414,7 @@ def _merge_joints(order, rod, s, sides, tiny):  # type: ignore[no-untyped-def]
     return node, joints
 
 
-@njit(error_model="numpy")
+@njit("f2 i1 f1 i1 i1 i")
 def _divided(lines, begin, s, nodes, edges, count):  # type: ignore[no-untyped-def]
     """Node positions, `rod_nodes`, `rod_start` and stations of rods with origin and direction `lines` (m, 4).
 
@@ -425,38 +443,30 @@ def _divided(lines, begin, s, nodes, edges, count):  # type: ignore[no-untyped-d
     return flat, rod_nodes, rod_start, stations
 
 
-def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
+def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float = 0.0) -> tuple[GridMesh, Ints]:
     """Cut a part out of a mesh.
 
     Where a joint of the mesh is not in the part, because it is too close to an end, each rod keeps its own node, unless
     that would be so close to the end that it makes an edge far shorter and stiffer than the other edges.
 
-    Parameters
-    ----------
-    grid : pieces of its rods, cut at nodes, and their joints.
+    Args:
+        rods: pieces of its rods, cut at nodes.
+        margin: joints closer to an end of either rod are not in the part [m].
 
-    Returns
-    -------
-    The part, and its nodes (n,) in `mesh`.
+    Returns:
+        The part, and its nodes (n,) in `mesh`.
     """
-    rods, count = grid.rods, len(mesh.grid.rods)
+    grid, joints = mesh.grid.cut(rods, margin=margin)
     index = whole_rods(mesh.grid.rods, rods)
-    (a, b), (first, second) = index[grid.crossings.rods].T, mesh.grid.crossings.rods.T
-    pairs = count * np.minimum(a, b) + np.maximum(a, b)
-    known = np.append(count * first + second, -1)  # the last is not a pair: there may be none
-    order = np.argsort(known, kind="stable")
-    found = order[np.minimum(np.searchsorted(known, pairs, sorter=order), len(known) - 1)]
-    kept = known[found] == pairs
-    grid = FlatGrid(rods, grid.crossings.select(kept))
     spans, limits = spans_along(mesh, grid.ends, index), np.full(len(rods), CROWDED * mesh.edge_lengths.max())
-    source = spans, mesh.rod_nodes, mesh.stations, grid.crossings.rods, mesh.joint_nodes[found[kept]], mesh.node_count
+    source = spans, mesh.rod_nodes, mesh.stations, grid.crossings.rods, mesh.joint_nodes[joints], mesh.node_count
     nodes, *part, left_out = _cut(*source, limits)
     if left_out:
         nodes, *part, _ = _cut(*source, CROWDED * _usual_edges(mesh)[index])
     return GridMesh(grid, mesh.flat.take(nodes, axis=0), *part), nodes
 
 
-@njit()
+@njit("i2 i1 f1 i2 i1 i f1")
 def _cut(spans, rod_nodes, stations, crossings, crossing_nodes, node_count, limits):  # type: ignore[no-untyped-def]
     """Nodes of the part in the mesh; its `rod_nodes`, `rod_start`, stations and joint nodes; the number of nodes that
     are left out, because they are closer than `limits` (m,) [m] to an end and not at a joint.
@@ -500,15 +510,14 @@ def _cut(spans, rod_nodes, stations, crossings, crossing_nodes, node_count, limi
 def spans_along(mesh: GridMesh, ends: Floats, whole: Ints) -> Ints:
     """(m, 2) the first and the last entry of a mesh's `rod_nodes` on each piece of a rod.
 
-    Parameters
-    ----------
-    ends : (m, 2) material coordinates of start and end of each piece [m].
-    whole : (m,) the rod of the mesh that it belongs to.
+    Args:
+        ends: (m, 2) material coordinates of start and end of each piece [m].
+        whole: (m,) the rod of the mesh that it belongs to.
     """
     return np.asarray(_spans(mesh.rod_start[whole], mesh.rod_stop[whole] - 1, mesh.stations, ends))
 
 
-@njit()
+@njit("i1 i1 f1 f2")
 def _spans(first, last, stations, ends):  # type: ignore[no-untyped-def]
     spans = np.empty((len(ends), 2), dtype=np.int64)
     for k in range(len(ends)):
@@ -532,48 +541,34 @@ def _usual_edges(mesh: GridMesh) -> Floats:
 def edge_counts(lengths: Floats, edge: float) -> Ints:
     """Number of equal edges into which lengths are divided.
 
-    Parameters
-    ----------
-    lengths : (n,) [m].
-    edge : longest edge, which may be exceeded by 1e-6 of it [m].
+    Args:
+        lengths: (n,) [m].
+        edge: longest edge, which may be exceeded by 1e-6 of it [m].
 
-    Returns
-    -------
-    (n,) the smallest possible numbers.
+    Returns:
+        (n,) the smallest possible numbers.
     """
     return np.maximum(1, np.ceil(lengths / edge - 1e-6)).astype(np.intp)
 
 
-@dataclass(frozen=True, eq=False)
-class SideBySide:
-    """Grids in a row along x, each moved but not rotated.
+def side_by_side(meshes: Mapping[str, GridMesh], gap: float) -> GridMesh:
+    """Grids in a row, each moved but not rotated and centred on the x axis, and the row on the origin.
 
-    Parameters
-    ----------
-    mesh : all grids: rods, nodes and joints, one grid after the other; rod U01 of grid A is A-U01.
-    shifts : for each grid the displacement (2,) [m].
-    """
+    Args:
+        gap: between two grids [m].
 
-    mesh: GridMesh
-    shifts: dict[str, Floats]
-
-
-def side_by_side(meshes: Mapping[str, GridMesh], gap: float) -> SideBySide:
-    """Lay grids out in a row, each centred on the x axis, and the row on the origin.
-
-    Parameters
-    ----------
-    gap : between two grids [m].
+    Returns:
+        Rods, nodes and joints of one grid after the other; rod U01 of grid A is A-U01.
     """
     low = {name: mesh.flat[:, :2].min(axis=0) for name, mesh in meshes.items()}
     high = {name: mesh.flat[:, :2].max(axis=0) for name, mesh in meshes.items()}
     width = sum(float(high[name][0] - low[name][0]) + gap for name in meshes) - gap
-    left, shifts = -0.5 * width, dict[str, Floats]()
-    for name in meshes:
-        shifts[name] = np.array([left - low[name][0], -0.5 * (low[name][1] + high[name][1])])
+    left, moved = -0.5 * width, list[GridMesh]()
+    for name, mesh in meshes.items():
+        shift = np.array([left - low[name][0], -0.5 * (low[name][1] + high[name][1])])
+        moved.append(_moved(name, mesh, shift))
         left += float(high[name][0] - low[name][0]) + gap
-    moved = [_moved(name, mesh, shifts[name]) for name, mesh in meshes.items()]
-    return SideBySide(_merged(moved), shifts)
+    return _merged(moved)
 
 
 def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
@@ -581,13 +576,8 @@ def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
     along = np.array([_along(rod, shift) for rod in mesh.grid.rods])
     rods = tuple(_moved_rod(name, rod, shift) for rod in mesh.grid.rods)
     crossings = Crossings(mesh.grid.crossings.rods, mesh.grid.crossings.at + along[mesh.grid.crossings.rods])
-    lengths = np.diff(np.append(mesh.rod_start, len(mesh.rod_nodes)))
-    return replace(
-        mesh,
-        grid=FlatGrid(rods, crossings),
-        flat=mesh.flat + np.append(shift, 0.0),
-        stations=mesh.stations + np.repeat(along, lengths),
-    )
+    flat, stations = mesh.flat + np.append(shift, 0.0), mesh.stations + along[mesh.rod_of]
+    return replace(mesh, grid=FlatGrid(rods, crossings, mesh.grid.passed), flat=flat, stations=stations)
 
 
 def _along(rod: FlatRod, shift: Floats) -> float:
@@ -602,7 +592,7 @@ def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
         return rod._replace(name=label, origin=(float(x), float(y)))
     make, across = (FlatRod.u, shift[1]) if rod.family == "u" else (FlatRod.v, shift[0])
     moved = make(label, rod.offset + float(across), rod.start + by, rod.end + by)
-    return moved._replace(profile=rod.profile)
+    return moved._replace(profile=rod.profile, curve=rod.curve)
 
 
 def _merged(meshes: list[GridMesh]) -> GridMesh:
@@ -624,4 +614,5 @@ def _merged(meshes: list[GridMesh]) -> GridMesh:
         np.concatenate([mesh.joint_pairs[:, 1] + by for mesh, by in zip(meshes, nodes, strict=False)])
         if any(mesh.layered for mesh in meshes)
         else None,
+        tuple(meshes),
     )

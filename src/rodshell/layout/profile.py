@@ -20,26 +20,24 @@ DOUBLE = (0.05, 0.95)  # least and most share of a rod's length that is made dou
 # Gauss and Legendre's five points of a piece, and weights: 1e-5 of the mean of 1/f where f grows eightfold over it
 _NEAR, _FAR = (sqrt(5 + sign * 2 * sqrt(10 / 7)) / 3 for sign in (-1, 1))
 _LIGHT, _HEAVY = ((322 + sign * 13 * sqrt(70)) / 900 for sign in (-1, 1))
-GAUSS_POINTS = np.array([-_FAR, -_NEAR, 0.0, _NEAR, _FAR])
-GAUSS_WEIGHTS = np.array([_LIGHT, _HEAVY, 128 / 225, _HEAVY, _LIGHT])
+_GAUSS_POINTS = np.array([-_FAR, -_NEAR, 0.0, _NEAR, _FAR])
+_GAUSS_WEIGHTS = np.array([_LIGHT, _HEAVY, 128 / 225, _HEAVY, _LIGHT])
 
 
 @dataclass(frozen=True)
 class Profile:
     """Factors on EI, the bending stiffness out of the grid, at stations along a rod; linear between them.
 
-    Parameters
-    ----------
-    stations : shares of the rod's length, ascending from 0 at its start to 1 at its end; where one is given twice, the
-        factor steps from the first value to the second.
-    factors : on the EI of the rod's section, as many [-].
-    varies : what is changed to reach them: "size", all lengths of the section alike; one length of the section by its
-        name, "width" or "height" of a rectangle, "a" or "b" of an ellipse; or "laths", the number of equal laths that
-        lie on each other and slip.
+    Args:
+        stations: shares of the rod's length, ascending from 0 at its start to 1 at its end; where one is given twice,
+            the factor steps from the first value to the second.
+        factors: on the EI of the rod's section, as many [-].
+        varies: what is changed to reach them: "size", all lengths of the section alike; one length of the section by
+            its name, "width" or "height" of a rectangle, "a" or "b" of an ellipse; or "laths", the number of equal
+            laths that lie on each other and slip.
 
-    Raises
-    ------
-    InputError : stations do not ascend from 0 to 1; a factor is not a positive number; not as many of both.
+    Raises:
+        InputError: stations do not ascend from 0 to 1; a factor is not a positive number; not as many of both.
     """
 
     stations: tuple[float, ...]
@@ -68,10 +66,9 @@ class Profile:
     def symmetric(factors: Sequence[float], *, varies: Varies = "size") -> "Profile":
         """A profile that is the same from both ends, with equal distances between its stations.
 
-        Parameters
-        ----------
-        factors : from an end to the middle [-].
-        varies : as of the class.
+        Args:
+            factors: from an end to the middle [-].
+            varies: as of the class.
         """
         half = listed("the factors of a profile", factors, "a sequence of numbers")
         whole = (*half, *half[-2::-1])
@@ -81,13 +78,11 @@ class Profile:
     def double(share: float) -> "Profile":
         """Two laths on each other over the middle of a rod, one elsewhere.
 
-        Parameters
-        ----------
-        share : of the rod's length that is double, between 0 and 1.
+        Args:
+            share: of the rod's length that is double, between 0 and 1.
 
-        Raises
-        ------
-        InputError : the share is not between 0 and 1.
+        Raises:
+            InputError: the share is not between 0 and 1.
         """
         if not 0.0 < number("the share of a rod's length that is double", share) < 1.0:
             raise InputError(f"the share of a rod's length that is double must lie between 0 and 1, not {share}")
@@ -108,10 +103,9 @@ class Profile:
     def laths(self, length: float, allowance: float = 0.0) -> tuple[tuple[float, float], ...]:
         """Where each lath beyond the first begins and ends, from the rod's start [m]; none where no laths vary.
 
-        Parameters
-        ----------
-        length : of the rod [m].
-        allowance : by which every lath that reaches an end of the rod is cut longer there [m].
+        Args:
+            length: of the rod [m].
+            allowance: by which every lath that reaches an end of the rod is cut longer there [m].
         """
         found = list[tuple[float, float]]()
         parts = list(zip(self.stations, self.stations[1:], self.factors, self.factors[1:], strict=False))
@@ -138,17 +132,16 @@ class Profile:
     def mean(self, function: Callable[[Floats], Floats], low: Floats, high: Floats) -> Floats:
         """(n, q) means of functions of the factor over parts of the rod.
 
-        Parameters
-        ----------
-        function : of factors (p,), with values (p, q).
-        low, high : (n,) where each part begins and ends, shares of the length.
+        Args:
+            function: of factors (p,), with values (p, q).
+            low, high: (n,) where each part begins and ends, shares of the length.
         """
         breaks = np.unique(np.concatenate([self.stations, low, high]))
         width = np.diff(breaks)
         middle = 0.5 * (breaks[1:] + breaks[:-1])
-        at = middle[:, None] + 0.5 * width[:, None] * GAUSS_POINTS
+        at = middle[:, None] + 0.5 * width[:, None] * _GAUSS_POINTS
         values = function(self.at(at.ravel())).reshape(*at.shape, -1)
-        pieces = 0.5 * width[:, None] * np.einsum("pgq,g->pq", values, GAUSS_WEIGHTS)
+        pieces = 0.5 * width[:, None] * np.einsum("pgq,g->pq", values, _GAUSS_WEIGHTS)
         total = np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)])
         first, last = np.searchsorted(breaks, low), np.searchsorted(breaks, high)
         return np.asarray((total[last] - total[first]) / (high - low)[:, None])

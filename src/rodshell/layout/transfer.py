@@ -17,9 +17,8 @@ def transferred_nodes(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
 
     Where two rods meet, the values transferred along them differ slightly: the mean is taken, without a kink in either.
 
-    Parameters
-    ----------
-    values : (m, d) at the m nodes of `mesh`, of any unit.
+    Args:
+        values: (m, d) at the m nodes of `mesh`, of any unit.
     """
     total, count = np.zeros((to.node_count, values.shape[1])), np.zeros((to.node_count, 1))
     along_rods = list[tuple[Ints, Floats, Floats]]()
@@ -39,9 +38,8 @@ def transferred_nodes(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
 def transferred_edges(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
     """(e,) values at the edges of the mesh `to`; zero on rods that have no counterpart.
 
-    Parameters
-    ----------
-    values : (f,) at the f edges of `mesh`, of any unit.
+    Args:
+        values: (f,) at the f edges of `mesh`, of any unit.
     """
     result = np.zeros(len(to.edges))
     for rod, old in corresponding_rods(mesh, to):
@@ -55,8 +53,14 @@ def corresponding_rods(mesh: GridMesh, to: GridMesh) -> list[tuple[int, int]]:
 
     Rods correspond by family and by their position in the lattice, points on them by their share of the rod's length.
     """
+    if len(mesh.grids) == len(to.grids) > 1:
+        pairs, shifts = list[tuple[int, int]](), (0, 0)
+        for old, new in zip(mesh.grids, to.grids, strict=True):
+            pairs += [(k + shifts[0], j + shifts[1]) for k, j in corresponding_rods(old, new)]
+            shifts = shifts[0] + len(new.grid.rods), shifts[1] + len(old.grid.rods)
+        return pairs
     before, now = _lattice_coordinates(mesh), _lattice_coordinates(to)
-    pairs = list[tuple[int, int]]()
+    pairs = []
     for k, rod in enumerate(to.grid.rods):
         apart = np.abs(before - now[k])
         same = [j for j, old in enumerate(mesh.grid.rods) if old.family == rod.family and apart[j, 0] < SAME_LINE]

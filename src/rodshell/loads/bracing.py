@@ -4,53 +4,36 @@ from dataclasses import replace
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Ints
 from rodshell.errors import InputError
 from rodshell.layout import GridMesh
 from rodshell.layout.cells import Pattern, diagonals, rim_diagonals
-from rodshell.loads.settings import AcrossOpenings, Cables
+from rodshell.loads.settings import Bracing, Cables
 from rodshell.loads.structure import Structure
 from rodshell.rods.cable import CableStretch
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.targets import Target
 from rodshell.units import percent_text
 
-SHARES = (0.25, 0.5, 0.75)  # of a diagonal, where it is looked whether the shell is under it
+_SHARES = (0.25, 0.5, 0.75)  # of a diagonal, where it is looked whether the shell is under it
 STEPS = 8  # in which a prestress is applied that is too much for one
 
 
 def stressed(cables: Cables, structure: Structure, target: Target) -> Structure:
     """The structure with its cables stressed, in the equilibrium that it then finds.
 
-    Parameters
-    ----------
-    target : whose openings the cables must not cross.
-
-    Raises
-    ------
-    InputError : a cable crosses an opening; the shell does not withstand the prestress.
+    Raises:
+        InputError: a cable crosses an opening of the target; the shell does not withstand the prestress.
     """
     mesh, before = structure.mesh, structure.equilibrium
-    pairs = braced_diagonals(
-        mesh,
-        structure.positions(before),
-        target,
-        cables.pattern,
-        cables.across_openings,
-        to_supports=cables.ends_at == "supports",
-    )
+    pairs = braced_diagonals(cables, structure, target)
     blocks = np.append(outer_nodes(mesh), structure.shell.ends)[pairs]
     lengths = np.linalg.norm(before.state[blocks[:, 1]] - before.state[blocks[:, 0]], axis=1)
     stiffness = np.full(len(blocks), cables.rod.stretch_stiffness)
-
-    def members_of(prestrain: float) -> CableStretch:
-        return CableStretch(blocks, lengths / (1.0 + prestrain), stiffness)
-
-    found = before
     for count in (1, STEPS):
         found = before
         for step in range(1, count + 1):
-            members = members_of(cables.prestrain * step / count)
+            members = CableStretch(blocks, lengths / (1.0 + cables.prestrain * step / count), stiffness)
             elements = (*found.elements[: len(structure.shell.elements)], members)
             problem = replace(before.problem, elements=elements, pattern=found.problem.pattern)
             found = find_equilibrium(problem, found.state, found.forces)
@@ -58,7 +41,7 @@ def stressed(cables: Cables, structure: Structure, target: Target) -> Structure:
                 break
         if found.report.stable:
             break
-    if not found.report.stable:
+    else:
         raise InputError(
             f"the bracing pulls the shell out of its shape: with a prestrain of {percent_text(cables.prestrain)} no "
             "stable equilibrium was found; stress it less (bracing.prestrain), or use thinner cables"
@@ -66,37 +49,27 @@ def stressed(cables: Cables, structure: Structure, target: Target) -> Structure:
     mass = np.zeros(structure.shell.node_count)
     for side in range(2):
         np.add.at(mass, blocks[:, side], 0.5 * lengths * cables.rod.mass_per_length)
-    shell = structure.shell.with_elements(found.elements[: len(structure.shell.elements)])
+    shell = structure.shell_at(found)
     return replace(structure, shell=shell, equilibrium=found, braced=pairs, bracing_mass=mass, cables=members)
 
 
-def braced_diagonals(
-    mesh: GridMesh, positions: Floats, target: Target, pattern: str, across_openings: AcrossOpenings, *,
-    to_supports: bool = False,
-) -> Ints:  # fmt: skip
+def braced_diagonals(bracing: Bracing, structure: Structure, target: Target) -> Ints:
     """(d, 2) crossings that diagonals join; the rod ends, start and end of each in turn, are counted on from them.
 
-    Parameters
-    ----------
-    positions : (n, 3) of its nodes [m].
-    target : whose openings the diagonals must not cross.
-    pattern, across_openings : as of `Cables`.
-    to_supports : whether cables continue to the supports.
-
-    Raises
-    ------
-    InputError : a diagonal crosses an opening, and that is refused; there is no cell.
+    Raises:
+        InputError: a diagonal crosses an opening of the target, and that is refused; there is no cell.
     """
-    pairs = diagonals(mesh.grid, Pattern.of(pattern))
+    mesh, positions, pattern = structure.mesh, structure.positions(structure.equilibrium), Pattern.of(bracing.pattern)
+    pairs = diagonals(mesh.grid, pattern)
     if not len(pairs):
         raise InputError("the grid has no cell of four joints that could be braced: use a smaller spacing")
-    if to_supports:
-        rim = rim_diagonals(mesh.grid, Pattern.of(pattern))
+    if isinstance(bracing, Cables) and bracing.ends_at == "supports":
+        rim = rim_diagonals(mesh.grid, pattern)
         pairs = np.vstack([pairs, rim + [0, len(mesh.joint_pairs)]])
     ends = np.vstack([positions[mesh.joint_pairs].mean(axis=1), positions[mesh.ends.ravel()]])[pairs]
-    points = np.concatenate([(1 - share) * ends[:, 0] + share * ends[:, 1] for share in SHARES])
-    outside = (target.margin(target.retract(points)) < 0).reshape(len(SHARES), -1).any(axis=0)
-    if outside.any() and across_openings == "refuse":
+    points = np.concatenate([(1 - share) * ends[:, 0] + share * ends[:, 1] for share in _SHARES])
+    outside = (target.margin(target.retract(points)) < 0).reshape(len(_SHARES), -1).any(axis=0)
+    if outside.any() and bracing.across_openings == "refuse":
         x, y, _ = ends[np.argmax(outside)].mean(axis=0)
         raise InputError(
             f"{int(outside.sum())} of {len(pairs)} diagonals of the bracing cross an opening of the shell, the first "

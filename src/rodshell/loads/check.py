@@ -7,7 +7,7 @@ at which the path loses its stability, and the smallest of the same of shells wi
 modes. All multiply the whole combination, with the shell's weight if that is in it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
@@ -16,17 +16,15 @@ import numpy as np
 from pydantic import Field
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks.bending import require_known_stress, rod_frames
+from rodshell.checks.bending import require_known_stress
 from rodshell.checks.self_weight import self_weight, shown_limit
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.figures import loads as figures
 from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.loads import Governs, Utilisations
-from rodshell.figures.records import Found
-from rodshell.formfinding import PatchForm, PopUp, pop_up
-from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.popup import Ends
+from rodshell.figures.records import Ends, Found
+from rodshell.formfinding import PopUp, Stages
 from rodshell.layout import GridMesh
 from rodshell.loads.bracing import stressed
 from rodshell.loads.combinations import Loads
@@ -35,7 +33,7 @@ from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
 from rodshell.loads.settings import Cables, Laths
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
-from rodshell.loads.structure import Structure
+from rodshell.loads.structure import NO_PAIRS, Structure
 from rodshell.loads.tributary import LoadedNodes, Tributary, tributary_areas
 from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import Duration
@@ -51,7 +49,6 @@ BRACED: dict[type, Callable[..., Structure]] = {Cables: stressed, Laths: laid}
 
 PERMANENT: Duration = "permanent"
 ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
-SAME_SHAPE = 1e-4  # of the size: patches together are where each is alone
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
@@ -77,25 +74,22 @@ class LoadedShell(figures.LoadedShell):
 class LoadChecks:
     """A form under loads.
 
-    Parameters
-    ----------
-    shells : by combination and end condition; an end condition whose shell did not converge is left out.
-    braced : (d, 2) crossings that each brace joins, the rod ends counted on from them; without bracing there are none.
-    limits : what the rods are judged by.
-    stopped, missing : when a time limit came, or "", and which combinations were not reached.
-    refused : why the form cannot be checked under these loads, or "".
-    frequencies : lowest natural frequencies of the shells without loads, with bracing and locked joints [Hz].
-    self_weight : how much of their own weight braced shells carry; empty without bracing.
+    Args:
+        shells: by combination and end condition; an end condition whose shell did not converge is left out.
+        braced: (d, 2) crossings that each brace joins, the rod ends counted on from them.
+        limits: what the rods are judged by.
+        stopped, missing: when a time limit came, or "", and which combinations were not reached.
+        refused: why the form cannot be checked under these loads, or "".
+        self_weight: how much of their own weight braced shells carry; empty without bracing.
     """
 
     asked: Loads
     shells: Mapping[str, Mapping[Ends, LoadedShell]]
-    braced: Ints
-    limits: Limits
+    braced: Ints = field(default_factory=NO_PAIRS.copy)
+    limits: Limits = field(default_factory=Limits)
     stopped: str = ""
     missing: tuple[str, ...] = ()
     refused: str = ""
-    frequencies: Mapping[Ends, Floats] = field(default_factory=dict)
     self_weight: Mapping[Ends, SelfWeight] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -105,65 +99,55 @@ class LoadChecks:
     @property
     def warnings(self) -> tuple[Said, ...]:
         """Sentences that a user should read."""
+        return tuple(self._warnings())
+
+    def _warnings(self) -> Iterator[Said]:
         if self.refused:
-            return (said("not_checked: refused", why=self.refused),)
-        missing = ", ".join(self.missing)
-        late = (said("not_checked: late", when=self.stopped, missing=missing),) if self.stopped else ()
-        return (*late, *self._unjudged, *self._unjudged_bracing)
-
-    @property
-    def _unjudged(self) -> tuple[Said, ...]:
-        """What strength was not judged by."""
+            yield said("not_checked: refused", why=self.refused)
+            return
+        if self.stopped:
+            yield said("not_checked: late", when=self.stopped, missing=", ".join(self.missing))
         known, wanted = self.limits.bending, {self.asked.duration(name) for name in self.asked.combinations}
+        unknown = [name for name in (PERMANENT, *sorted(wanted - {PERMANENT})) if name not in known]
         if not known:
-            return (said("no_strength: rods"),)
-        missing = [name for name in ("permanent", *sorted(wanted - {"permanent"})) if name not in known]
-        if missing:
-            return (said("no_strength: durations", durations=" and ".join(missing)),)
-        return ()
-
-    @property
-    def _unjudged_bracing(self) -> tuple[Said, ...]:
+            yield said("no_strength: rods")
+        elif unknown:
+            yield said("no_strength: durations", durations=" and ".join(unknown))
         every = [shell for by_ends in self.shells.values() for shell in by_ends.values()]
-        if all(shell.bracing_utilisation is not None or not len(shell.bracing_forces) for shell in every):
-            return ()
-        return (said("no_strength: bracing", place="bracing"),)
+        if any(shell.bracing_utilisation is None and len(shell.bracing_forces) for shell in every):
+            yield said("no_strength: bracing", place="bracing")
 
 
 def check_shells(
-    stages: PatchForm | PatchedForm, loads: Loads, *,
+    stages: Stages, loads: Loads, *,
     limits: Limits = Limits(), progress: Progress = silent,
 ) -> LoadChecks:  # fmt: skip
     """Check every shell of a form that converged under each combination.
 
-    Parameters
-    ----------
-    stages : of the form; of one in patches these are loaded together, their seams held as supports are.
-    progress : called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found until
-        then is returned.
+    Args:
+        stages: of the form; of one in patches these are loaded together, their seams held as supports are.
+        progress: called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found
+            until then is returned.
 
-    Raises
-    ------
-    InputError : a load does not fit the form; a strength is given, and the stress of its rods is not known.
+    Raises:
+        InputError: a load does not fit the form; a strength is given, and the stress of its rods is not known.
     """
-    if isinstance(stages, PatchForm) and stages.from_table:
+    if stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
     if loads.locked_joints is not None:
         loads.locked_joints.require_pins(stages.joint)
     areas = tributary_of(stages)
-    done = {ends: popped for ends, popped in _popped_up(stages).items() if popped.report.converged}
+    done = {ends: popped for ends, popped in stages.popped.items() if popped.report.converged}
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
-    stopped, braced, vibrations = "", np.empty((0, 2), dtype=np.intp), dict[Ends, Floats]()
-    weighed = dict[Ends, SelfWeight]()
+    stopped, braced, weighed = "", NO_PAIRS, dict[Ends, SelfWeight]()
     try:
         for ends, popped in done.items():
             if limits.bending:
-                require_known_stress(stages.rod, twisted=rod_frames(popped.shell) is not None)
+                require_known_stress(stages.rod, twisted=popped.shell.frames is not None)
             structure = _locked(popped, ends, loads, stages)
-            braced = structure.braced
-            vibrations[ends] = structure.frequencies(loads.stability.modes)
-            nodes = LoadedNodes(popped.positions, structure.mass, areas, min(stages.layout.spacing))
+            braced, frequencies = structure.braced, structure.frequencies(loads.stability.modes)
+            nodes = LoadedNodes(popped.positions, structure.mass, areas, stages.layout.least_spacing)
             acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
             for name, load in acting.items():
                 said = partial(_said, progress, f"{name}, {ends} ends")
@@ -171,70 +155,37 @@ def check_shells(
                     shell = loaded_shell(
                         structure, load, loads, limits=limits, duration=loads.duration(name), progress=said
                     )
-                    found[name][ends] = shell.changed(frequencies=vibrations[ends])
+                    found[name][ends] = shell.changed(frequencies=frequencies)
                 except InputError as reason:
                     raise InputError(f"combination {shown(name)}: {reason}") from None
                 missing.pop(0)
             if len(braced):
-                said = partial(_said, progress, f"own weight, {ends} ends")
+                following = partial(_following, partial(_said, progress, f"own weight, {ends} ends"), "")
                 weighed[ends] = self_weight(
-                    structure.shell, structure.equilibrium, mass=structure.mass,
-                    progress=lambda count, factor, said=said: said(f"{factor:.3g} times, {count} factorisations"),  # type: ignore[misc]
-                )  # fmt: skip
+                    structure.shell, structure.equilibrium, mass=structure.mass, progress=following
+                )
     except OutOfTimeError as late:
         stopped = str(late)
-    return LoadChecks(
-        loads, found, braced, limits, stopped, tuple(missing) if stopped else (), frequencies=vibrations,
-        self_weight=weighed,
-    )  # fmt: skip
+    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else (), self_weight=weighed)
 
 
 def unchecked(loads: Loads, *, refused: str = "", stopped: str = "") -> LoadChecks:
-    """No checks of a form under these loads.
-
-    Parameters
-    ----------
-    refused, stopped : why: the loads do not fit the form, or a computation failed.
-    """
+    """No checks of a form under these loads, which do not fit it (`refused`), or a computation failed (`stopped`)."""
     none: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
-    braced = np.empty((0, 2), dtype=np.intp)
-    return LoadChecks(loads, none, braced, Limits(), stopped, tuple(none), refused)
+    return LoadChecks(loads, none, stopped=stopped, missing=tuple(none), refused=refused)
 
 
 def _said(progress: Progress, where: str, what: str) -> None:
     progress("loads", f"{where}, {what}", 0.0)
 
 
-def _popped_up(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
-    """The popped-up shells; those of patches as one model of all, found again from the draped state.
-
-    Raises
-    ------
-    ConvergenceError : the model of all patches has another shape than each of them alone.
-    """
-    if isinstance(stages, PatchForm):
-        return dict(stages.popped)
-    found = dict[Ends, PopUp]()
-    for ends, alone in stages.popped.items():
-        if not alone.report.converged:
-            continue
-        found[ends] = pop_up(stages.footprint, stages.boundary, stages.rod, ends=ends, joint=stages.joint)
-        off = float(np.abs(found[ends].positions - alone.positions).max())
-        if not found[ends].report.converged or off > SAME_SHAPE * stages.target.size:
-            raise ConvergenceError(
-                f"with {ends} ends the patches take another shape together than each alone, and cannot be checked "
-                "under loads: check each patch as a case of its own"
-            )
-    return found
+def _following(progress: Callable[[str], None], what: str, count: int, factor: float) -> None:
+    progress(f"{factor:.3g} times{what}, {count} factorisations")
 
 
-def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm | PatchedForm) -> Structure:
-    """The erected shell with its bracing locked, and then its joints.
-
-    Raises
-    ------
-    InputError : as of the bracing; the supports leave a mechanism.
-    """
+def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: Stages) -> Structure:
+    """The erected shell with its bracing locked, and then its joints; InputErrors are those of the bracing, and that
+    the supports leave a mechanism."""
     structure, bracing = Structure.erected(popped, stages.rod), loads.bracing
     if bracing is not None:
         fitted = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
@@ -267,19 +218,13 @@ def mechanism(structure: Structure) -> str | None:
     )
 
 
-def tributary_of(stages: PatchForm | PatchedForm) -> Tributary:
-    """The areas of the target that each node of a form takes.
-
-    Parameters
-    ----------
-    stages : of a form that has a target.
-    """
+def tributary_of(stages: Stages) -> Tributary:
+    """The areas of the target that each node of a form takes."""
     layout, anchor = stages.layout, stages.target.summit
-    if isinstance(stages, PatchForm):
-        positions, anchor = stages.trimmed.positions, stages.draped.anchor or anchor
-    else:
-        positions = np.concatenate([patch.trimmed.positions for patch in stages.patches.values()])
-    return tributary_areas(stages.target, positions, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing))
+    if stages.seams is None:
+        anchor = stages.draped.anchor or anchor
+    spacing = layout.least_spacing
+    return tributary_areas(stages.target, stages.on_target, anchor=anchor, rotate=layout.rotate, spacing=spacing)
 
 
 def _load(structure: Structure, nodes: LoadedNodes, loads: Loads, factors: Mapping[str, float]) -> Load:
@@ -320,27 +265,18 @@ def loaded_shell(
     limits: Limits = Limits(), duration: Duration = "short",
     progress: Callable[[str], None] = lambda what: None,
 ) -> LoadedShell:  # fmt: skip
-    """A structure under one combination.
+    """A structure under one combination, from its equilibrium without the loads.
 
-    Parameters
-    ----------
-    structure : in equilibrium without the loads.
-    load : what acts at the combination's factor 1.
-    loads : for how stability is looked at, and for holes and slip of joints.
-    progress : called with what is being done.
+    Args:
+        load: what acts at the combination's factor 1.
+        loads: for how stability is looked at, and for holes and slip of joints.
     """
-
-    def following(count: int, factor: float) -> None:
-        progress(f"{factor:.3g} times the loads, {count} factorisations")
-
-    unloaded = structure.equilibrium
+    unloaded, following = structure.equilibrium, partial(_following, progress, " the loads")
     path = load_path(unloaded, load, most=MOST, progress=following)
-    last = path.last_stable
-    at = path.at(1.0)
     factor, found = 0.0, unloaded
-    if at is not None:
+    if (at := path.at(1.0)) is not None:
         factor, found = 1.0, at
-    elif last is not None:
+    elif (last := path.last_stable) is not None:
         factor, found = last.factor, last.equilibrium
     buckling = None
     if path.limit != "unstable unloaded":
@@ -360,14 +296,16 @@ def loaded_shell(
         shell, found.state, forces=forces, duration=duration, bent=bent, moments=moments, slip_moment=slip
     ).with_permanent(alone)
     total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
-    shapes = np.zeros((0, n, 3)) if buckling is None else buckling.shapes[:, :n]
+    shapes, factors = np.zeros((0, n, 3)), np.zeros(0)
+    if buckling is not None:
+        shapes, factors = buckling.shapes[:, :n], buckling.factors
     held, supports = structure.reactions(found), structure.support_forces(found)
     mesh, names = structure.mesh, structure.mesh.grid.joint_names
     return LoadedShell(
         at_factor=factor,
         limit_factor=None if path.limit == "none" else path.factor,
         limit_kind=shown_limit(path.limit),
-        linear_factor=float(buckling.factors[0]) if buckling is not None and len(buckling.factors) else None,
+        linear_factor=float(factors[0]) if len(factors) else None,
         imperfect_factor=imperfect_factor,
         imperfect_kind=None if imperfect_kind is None else shown_limit(imperfect_kind),
         load_sum=total,
@@ -394,7 +332,7 @@ def loaded_shell(
         joint_moment_at=names[int(np.argmax(np.abs(moments)))] if len(moments) else None,
         slipping=tuple(names[k] for k in _slipping(mesh, used)),
         modes=shapes,
-        mode_factors=np.zeros(0) if buckling is None else buckling.factors,
+        mode_factors=factors,
         mode=None if path.mode is None else path.mode[:n],
         factorizations=path.factorizations + more,
     )
@@ -416,26 +354,20 @@ def _of_bracing(
     structure: Structure, found: Equilibrium, loads: Loads, limits: Limits, duration: Duration
 ) -> float | None:
     """Largest utilisation of the bracing; None: there is none, or its strength is not known."""
-    bracing = loads.bracing
-    if structure.cables is not None and isinstance(bracing, Cables):
-        known, area = preset_limits(bracing.rod, loads.strength.service_class).bending, area_of(bracing.rod)
-        pulls = ((found, duration), (structure.equilibrium, PERMANENT))  # prestress stays
-        shares = [
-            float(structure.bracing_forces(state).max(initial=0.0)) / (known[lasting] * area)
-            for state, lasting in pulls
-            if lasting in known
-        ]
-        return max(shares, default=None)
-    if structure.laths is None:
-        return None
-    rod, edges, asked = structure.laths.rod, len(structure.mesh.edges), replace(loads.strength, slip=None)
-    of_laths = limits if rod == structure.rod else preset_limits(rod, loads.strength.service_class)
+    bracing, asked, edges = loads.bracing, loads.strength, len(structure.mesh.edges)
     shares = list[float]()
-    for state, lasting in ((found, duration), (structure.equilibrium, PERMANENT)):  # laths stay bent, as rods do
-        alone = structure.laths_alone(state)
-        assert alone is not None
-        used = utilisation(*alone, rod, forces=state.forces[edges:], limits=of_laths, asked=asked, duration=lasting)
-        shares += used.largest.values()
+    for state, lasting in ((found, duration), (structure.equilibrium, PERMANENT)):  # prestress and bends of laths stay
+        if isinstance(bracing, Cables):
+            strength = preset_limits(bracing.rod, asked.service_class).bending.get(lasting)
+            pull = float(structure.bracing_forces(state).max(initial=0.0))
+            shares += [] if strength is None else [pull / (strength * area_of(bracing.rod))]
+        elif (layer := structure.laths) is not None:
+            used = utilisation(
+                *layer.alone(state, len(structure.shell.elements)), layer.rod, forces=state.forces[edges:],
+                limits=limits if layer.rod == structure.rod else preset_limits(layer.rod, asked.service_class),
+                asked=replace(asked, slip=None), duration=lasting,
+            )  # fmt: skip
+            shares += used.largest.values()
     return max(shares, default=None)
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from rodshell.errors import InputError
-from rodshell.loads.kinds import Load
+from rodshell.loads.kinds import Forces, Load
 from rodshell.loads.settings import Bracing, LockedJoints, Stability, Strength
 from rodshell.rods.design_strength import DURATIONS, Duration
 from rodshell.units import shown
@@ -14,21 +14,19 @@ from rodshell.validation import brief, choice, described, instance, mapping, not
 class Loads:
     """What a shell is checked under.
 
-    Parameters
-    ----------
-    combinations : by name, the factors of loads by their names.
-    bracing : that is put in before the loads act; None: none.
-    locked_joints : how pins are tightened after that, before the loads act; None: they stay free.
-    stability : how stability is looked at.
-    strength : what rods and joints withstand.
-    durations : by a load's name, how long it acts; default: by its kind, see `loads.kinds`.
+    Args:
+        combinations: by name, the factors of loads by their names.
+        bracing: that is put in before the loads act; None: none.
+        locked_joints: how pins are tightened after that, before the loads act; None: they stay free.
+        stability: how stability is looked at.
+        strength: what rods and joints withstand.
+        durations: by a load's name, how long it acts; default: by its kind, see `loads.kinds`.
 
-    Raises
-    ------
-    InputError : a combination names a load that is not there; there is no combination; a factor is not a number.
+    Raises:
+        InputError: a combination names a load that is not there; there is no combination; a factor is not a number.
     """
 
-    loads: dict[str, Load]
+    loads: dict[str, Load | Forces]
     combinations: dict[str, dict[str, float]]
     bracing: Bracing | None = None
     locked_joints: LockedJoints | None = None
@@ -47,39 +45,36 @@ class Loads:
     def __post_init__(self) -> None:
         instance("strength", self.strength, Strength)
         instance("stability", self.stability, Stability)
-        mapping("loads", self.loads, 'loads by their names, such as {"snow": rodshell.Snow(500.0)}')
-        by_name = 'factors by the names of loads, such as {"winter": {"snow": 1.5}}'
-        for name, factors in mapping("combinations", self.combinations, by_name).items():
-            mapping(f"the combination {shown(name)}", factors, 'factors by the names of loads, such as {"snow": 1.5}')
-        mapping("durations", self.durations, 'durations by the names of loads, such as {"snow": "short"}')
-        for name, duration in self.durations.items():
-            if name not in self.loads:
-                raise InputError(
-                    f"durations has {shown(name)}, which is not a load: the loads are {', '.join(self.loads)}"
-                )
-            choice(f"the duration of {shown(name)}", duration, DURATIONS)
-        if not self.loads or not self.combinations:
-            missing, example = "loads", 'name = "own", kind = "self_weight"'
-            if self.loads:
-                missing, example = "combinations", 'name = "winter", factors = { snow = 1.5 }'
-            raise InputError(f"the shell has no {missing} to be checked under: give [[{missing}]], {{ {example} }}")
         if self.bracing is not None:
             instance("bracing", self.bracing, Bracing, "rodshell.Cables(...) or rodshell.Laths(...)")
         if self.locked_joints is not None:
             instance("locked_joints", self.locked_joints, LockedJoints, "rodshell.LockedJoints(...)")
-        for name, load in self.loads.items():
-            if not isinstance(load, Load):
+        for name, load in mapping(
+            "loads", self.loads, 'loads by their names, such as {"snow": rodshell.Snow(500.0)}'
+        ).items():
+            if not isinstance(load, Load | Forces):
                 raise InputError(
                     f"the load {shown(name)} must be a load such as rodshell.Snow(500.0), not {described(load)}"
                 )
-        for name, factors in self.combinations.items():
+        by_name = 'factors by the names of loads, such as {"winter": {"snow": 1.5}}'
+        combinations = mapping("combinations", self.combinations, by_name)
+        if not self.loads or not combinations:
+            missing, example = "loads", 'name = "own", kind = "self_weight"'
+            if self.loads:
+                missing, example = "combinations", 'name = "winter", factors = { snow = 1.5 }'
+            raise InputError(f"the shell has no {missing} to be checked under: give [[{missing}]], {{ {example} }}")
+        for name, factors in combinations.items():
+            mapping(f"the combination {shown(name)}", factors, 'factors by the names of loads, such as {"snow": 1.5}')
             if not factors:
                 raise InputError(f"the combination {shown(name)} has no loads: give factors such as {{ snow = 1.5 }}")
             for load_name, factor in factors.items():
-                if load_name not in self.loads:
-                    known = ", ".join(self.loads)
-                    raise InputError(
-                        f"the combination {shown(name)} has a factor for {shown(load_name)}, which is not a load: the "
-                        f"loads are {known}"
-                    )
+                self._require(load_name, f"the combination {shown(name)} has a factor for")
                 not_negative(f"the factor of {shown(load_name)} in the combination {shown(name)}", factor)
+        mapping("durations", self.durations, 'durations by the names of loads, such as {"snow": "short"}')
+        for name, duration in self.durations.items():
+            self._require(name, "durations has")
+            choice(f"the duration of {shown(name)}", duration, DURATIONS)
+
+    def _require(self, name: str, what: str) -> None:
+        if name not in self.loads:
+            raise InputError(f"{what} {shown(name)}, which is not a load: the loads are {', '.join(self.loads)}")

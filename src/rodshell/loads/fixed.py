@@ -4,9 +4,8 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.pipeline import PatchForm
-from rodshell.formfinding.popup import Ends
+from rodshell.figures.records import Ends
+from rodshell.formfinding.pipeline import Stages
 from rodshell.loads.check import tributary_of
 from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, SelfWeight
@@ -14,26 +13,22 @@ from rodshell.loads.tributary import LoadedNodes
 from rodshell.units import shown
 
 
-def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, combination: str) -> tuple[float, Floats]:
+def fixed_forces(stages: Stages, ends: Ends, loads: Loads, combination: str) -> tuple[float, Floats]:
     """What a shell carries under one combination.
 
-    Parameters
-    ----------
-    stages : of a form in one piece, popped up with these ends.
-    ends : how the rods' ends are held.
+    Args:
+        stages: of a form in one piece, popped up with these ends.
 
-    Returns
-    -------
-    The factor on the weight of rods and joints, which changes with a design, and (n, 3) all other forces on the mesh's
-    nodes [N].
+    Returns:
+        The factor on the weight of rods and joints, which changes with a design, and (n, 3) all other forces on the
+        mesh's nodes [N].
 
-    Raises
-    ------
-    InputError : the form is in patches, braced, or has joints that are locked; a load is not a force; the rods have
-        no mass.
+    Raises:
+        InputError: the form is in patches, braced, or has joints that are locked; a load is not a force; the rods have
+            no mass.
     """
     wish = f"refine.under = {shown(combination)}"
-    if isinstance(stages, PatchedForm):
+    if stages.patches:
         raise InputError(f'{wish}: a form in patches is refined without loads, or under = "weight"')
     if loads.bracing is not None:
         raise InputError(f"{wish}: a shell is refined without its bracing, which is fitted to it later: leave one out")
@@ -41,7 +36,7 @@ def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, comb
         raise InputError(f"{wish}: a shell is refined before its joints are locked: leave one out")
     popped = stages.popped[ends]
     mass = popped.shell.mass[: popped.shell.node_count, 2]
-    nodes = LoadedNodes(popped.positions, mass, tributary_of(stages), min(stages.layout.spacing))
+    nodes = LoadedNodes(popped.positions, mass, tributary_of(stages), stages.layout.least_spacing)
     weight, forces = 0.0, np.zeros((len(mass), 3))
     for name, factor in loads.combinations[combination].items():
         load = loads.loads[name]

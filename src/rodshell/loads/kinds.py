@@ -10,8 +10,11 @@ A new kind is a class here and a member of `Load`. How long each acts where that
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
+import numpy as np
+
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.quantities import (
     Angle,
@@ -32,13 +35,12 @@ from rodshell.units import read_quantity, shown
 from rodshell.validation import listed, number, point, texts
 
 if TYPE_CHECKING:
-    from rodshell.arrays import Floats
     from rodshell.loads.tributary import LoadedNodes
     from rodshell.targets.heightfield import Formula
 
 GRAVITY = 9.81  # [m/s2]
 SAMPLES = 400  # parts of a line load
-LARGEST_COEFFICIENT = 20.0  # of wind on a surface; codes have up to about 3
+_LARGEST_COEFFICIENT = 20.0  # of wind on a surface; codes have up to about 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,12 +54,11 @@ class SelfWeight:
     def __post_init__(self) -> None:
         checked(self, "the {}")
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
 
-        Raises
-        ------
-        InputError : the rods have no mass.
+        Raises:
+            InputError: the rods have no mass.
         """
         if not nodes.mass.all():
             raise InputError("the rods have no mass, so that their weight is not known: give rod.section.mass")
@@ -68,11 +69,11 @@ class SelfWeight:
 class Snow:
     """Snow on the plan.
 
-    Parameters
-    ----------
-    distribution : "uniform"; "half": on the half of the plan that lies towards `direction`, none on the other;
-        "drifted": on both halves a triangle, from 0 at the edge and the middle to the value at the quarter towards
-        `direction`, to half of it at the other quarter, as the drifted load of cylindrical roofs [EN 1991-1-3, 5.3.5].
+    Args:
+        distribution: "uniform"; "half": on the half of the plan that lies towards `direction`, none on the other;
+            "drifted": on both halves a triangle, from 0 at the edge and the middle to the value at the quarter towards
+            `direction`, to half of it at the other quarter, as the drifted load of cylindrical roofs [EN 1991-1-3,
+            5.3.5].
     """
 
     kind: ClassVar = "snow"
@@ -86,10 +87,8 @@ class Snow:
     def __post_init__(self) -> None:
         checked(self, "the snow's {}")
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N]."""
-        import numpy as np  # here, so that the command line's help need not wait for it
-
         if self.distribution == "uniform":
             return nodes.downwards(self.value * nodes.tributary.plan)
         along = nodes.along(self.direction)[:, 0]
@@ -116,10 +115,9 @@ def _coefficient(value: object) -> float | str:
 class Wind:
     """Wind pressure along the surface's normal.
 
-    Parameters
-    ----------
-    coefficient : pressure coefficient, positive towards the surface from above: a number, or a formula in x along the
-        wind and y across it, from the middle of the plan's extent in both [m], such as "-1.2 + 0.1*x".
+    Args:
+        coefficient: pressure coefficient, positive towards the surface from above: a number, or a formula in x along
+            the wind and y across it, from the middle of the plan's extent in both [m], such as "-1.2 + 0.1*x".
     """
 
     kind: ClassVar = "wind"
@@ -140,29 +138,26 @@ class Wind:
 
     def _require_usual(self, largest: float, where: str) -> None:
         """InputError where that is not the pressure coefficient of any surface."""
-        if largest > LARGEST_COEFFICIENT:
+        if largest > _LARGEST_COEFFICIENT:
             raise InputError(
                 f"the wind's coefficient {shown(self.coefficient)} reaches {largest:.4g}{where}: pressure coefficients "
-                f"lie between -3 and 3, and none above {LARGEST_COEFFICIENT:g} is taken"
+                f"lie between -3 and 3, and none above {_LARGEST_COEFFICIENT:g} is taken"
             )
 
     @cached_property
     def _formula(self) -> "Formula | None":
         if not isinstance(self.coefficient, str):
             return None
-        from rodshell.targets.heightfield import parse_formula  # here, as it needs NumPy
+        from rodshell.targets.heightfield import parse_formula  # here, as it needs SciPy
 
         return parse_formula(self.coefficient)
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
 
-        Raises
-        ------
-        InputError : the formula is not finite at a node.
+        Raises:
+            InputError: the formula is not finite at a node.
         """
-        import numpy as np
-
         coefficient = np.full(len(nodes.positions), 0.0 if self._formula else float(self.coefficient))
         if self._formula is not None:
             x, y = nodes.along(self.direction).T
@@ -191,14 +186,13 @@ class PointLoad:
     def __post_init__(self) -> None:
         checked(self, {"at": "the point of a load", "force": "the force of a point load"})
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
 
-        Raises
-        ------
-        InputError : no rod is near.
+        Raises:
+            InputError: no rod is near.
         """
-        result = 0.0 * nodes.positions
+        result = np.zeros_like(nodes.positions)
         result[nodes.nearest(self.at, "a point load")] = self.force
         return result
 
@@ -219,15 +213,12 @@ class LineLoad:
         object.__setattr__(self, "line", tuple(point("a point of a line load", place) for place in line))
         checked(self, "the {} of a line load")
 
-    def forces(self, nodes: "LoadedNodes") -> "Floats":
+    def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
 
-        Raises
-        ------
-        InputError : a part of the line is away from every rod.
+        Raises:
+            InputError: a part of the line is away from every rod.
         """
-        import numpy as np
-
         result, line = np.zeros_like(nodes.positions), np.array(self.line)
         lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
         for a, b, length in zip(line[:-1], line[1:], lengths, strict=True):
@@ -281,6 +272,15 @@ class Temperature:
         return self.change * self.expansion
 
 
+@runtime_checkable
+class Forces(Protocol):
+    """Loads that are forces; one's own, which no case file names, need no more than this (`examples/own_load.py`)."""
+
+    lasting: ClassVar[Duration]
+
+    def forces(self, nodes: "LoadedNodes") -> Floats:
+        """(n, 3) on each node [N]."""
+        ...
+
+
 Load = SelfWeight | Snow | Wind | PointLoad | LineLoad | Settlement | Temperature
-Forces = SelfWeight | Snow | Wind | PointLoad | LineLoad
-"""Loads that are forces."""

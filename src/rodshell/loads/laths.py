@@ -6,7 +6,7 @@ laid without axial force, its ends are free, and at each joint it is held over t
 outer layer, free to turn there as on a bolt. Between joints it can buckle: it has nodes there.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
@@ -36,90 +36,77 @@ SAMPLES = 32  # of a lath's curve from joint to joint, for its length
 def laid(laths: Laths, structure: Structure, target: Target) -> Structure:
     """The structure with its laths laid, in the equilibrium that both find.
 
-    Parameters
-    ----------
-    target : whose openings the laths must not cross.
-
-    Raises
-    ------
-    InputError : a lath crosses an opening; no stable equilibrium of both is found; the laths have no rod.
+    Raises:
+        InputError: a lath crosses an opening of the target; no stable equilibrium of both is found; the laths have no
+            rod.
     """
     mesh, before = structure.mesh, structure.equilibrium
     if laths.rod is None:
         raise InputError("these laths have no rod of their own: give one, such as that of the grid")
-    pairs = braced_diagonals(mesh, structure.positions(before), target, laths.pattern, laths.across_openings)
+    pairs = braced_diagonals(laths, structure, target)
     rows = lines(pairs, flat_joints(mesh.grid))
     normals = joint_normals(mesh, structure.positions(before))
     over = before.state[outer_nodes(mesh)] + laths.eccentricity * normals
-    over_joints = _Laid.over(rows, over, normals, np.median(mesh.edge_lengths))
-    shell = Shell.of(over_joints.mesh, laths.rod)
+    of_laths, positions, tilts, entries, crossings = _laid_over(rows, over, normals, np.median(mesh.edge_lengths))
+    shell = Shell.of(of_laths, laths.rod)
     blocks = structure.size + np.arange(len(shell.like))
     if not laths.eccentricity:
-        joints = over_joints.mesh.rod_nodes[over_joints.entries]
-        blocks[joints] = outer_nodes(mesh)[over_joints.crossings]
+        joints = of_laths.rod_nodes[entries]
+        blocks[joints] = outer_nodes(mesh)[crossings]
         kept = np.setdiff1d(np.arange(len(blocks)), joints)
         blocks[kept] = structure.size + np.arange(len(kept))
-    layer = LathLayer(shell, blocks, laths.rod, tuple(tuple(row) for row in rows), over_joints.entries)
-    ties = _ties(structure, layer, over_joints.crossings, laths.eccentricity) if laths.eccentricity else ()
-    return _joined(structure, layer, over_joints, ties)
+    layer = LathLayer(shell, blocks, laths.rod, entries, crossings)
+    ties = _ties(structure, layer, laths.eccentricity) if laths.eccentricity else ()
+    return _joined(structure, layer, shell.state(positions, normals=tilts), ties)
 
 
-@dataclass(frozen=True, eq=False)
-class _Laid:
-    """Laths on their way over the joints of a shell.
+def _laid_over(
+    rows: list[list[int]], joints: Floats, normals: Floats, edge: float
+) -> tuple[GridMesh, Floats, Floats, Ints, Ints]:
+    """Laths over the crossings `rows` at `joints` (c, 3) [m] with `normals` (c, 3), of edges about as long as `edge`.
 
-    mesh : each lath straight, free of stress. positions, normals : (n, 3) of its nodes, bent over the joints.
-    entries : entries of the mesh's `rod_nodes` at joints; crossings : which crossing each of them is at.
+    Returns:
+        The mesh, each lath straight and free of stress; (n, 3) positions and normals of its nodes, bent over the
+        joints; entries of its `rod_nodes` at joints, and which crossing each of them is at.
     """
-
-    mesh: GridMesh
-    positions: Floats
-    normals: Floats
-    entries: Ints
-    crossings: Ints
-
-    @staticmethod
-    def over(rows: list[list[int]], joints: Floats, normals: Floats, edge: float) -> "_Laid":
-        """Over the crossings `rows` at `joints` (c, 3) [m] with `normals` (c, 3), of edges about as long as `edge`."""
-        rods, marks, curves = list[FlatRod](), list[Floats](), []
-        digits = len(str(len(rows)))
-        for k, row in enumerate(rows):
-            points = joints[row]
-            chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-            curve = CubicSpline(chord, points, bc_type="natural")  # its ends are free
-            fine = np.interp(np.arange(SAMPLES * (len(row) - 1) + 1) / SAMPLES, np.arange(len(row)), chord)
-            along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(curve(fine), axis=0), axis=1)))
-            at = np.interp(chord, fine, along)
-            rods.append(FlatRod.u(f"B{k + 1:0{digits}d}", float(k), 0.0, float(at[-1])))
-            marks.append(at)
-            curves.append((curve, fine, along, chord, normals[row]))
-        spans = np.concatenate([np.diff(at) for at in marks])
-        longest = max(edge, float(spans.max()) / FINEST)
-        spans_edge = float(spans.max()) / ceil(float(spans.max()) / longest)
-        grid = FlatGrid(tuple(rods), Crossings(np.empty((0, 2), dtype=np.intp), np.empty((0, 2))))
-        mesh = mesh_grid(grid, spans_edge, marks=[at[1:-1].tolist() for at in marks])
-        positions, bent = np.empty((mesh.node_count, 3)), np.empty((mesh.node_count, 3))
-        entries, crossings = list[int](), list[int]()
-        for k, ((curve, fine, along, chord, tilts), row) in enumerate(zip(curves, rows, strict=True)):
-            here = mesh.rod_slice(k)
-            t = np.interp(mesh.stations[here], along, fine)
-            positions[mesh.rod_nodes[here]] = curve(t)
-            bent[mesh.rod_nodes[here]] = np.column_stack([np.interp(t, chord, tilts[:, axis]) for axis in range(3)])
-            for crossing, at in zip(row, marks[k].tolist(), strict=True):
-                entries.append(here.start + int(np.argmin(np.abs(mesh.stations[here] - at))))
-                crossings.append(crossing)
-        return _Laid(mesh, positions, bent, np.array(entries), np.array(crossings))
+    rods, marks, curves = list[FlatRod](), list[Floats](), []
+    digits = len(str(len(rows)))
+    for k, row in enumerate(rows):
+        points = joints[row]
+        chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+        curve = CubicSpline(chord, points, bc_type="natural")  # its ends are free
+        fine = np.interp(np.arange(SAMPLES * (len(row) - 1) + 1) / SAMPLES, np.arange(len(row)), chord)
+        along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(curve(fine), axis=0), axis=1)))
+        at = np.interp(chord, fine, along)
+        rods.append(FlatRod.u(f"B{k + 1:0{digits}d}", float(k), 0.0, float(at[-1])))
+        marks.append(at)
+        curves.append((curve, fine, along, chord, normals[row]))
+    spans = np.concatenate([np.diff(at) for at in marks])
+    longest = max(edge, float(spans.max()) / FINEST)
+    spans_edge = float(spans.max()) / ceil(float(spans.max()) / longest)
+    grid = FlatGrid(tuple(rods), Crossings(np.empty((0, 2), dtype=np.intp), np.empty((0, 2))))
+    mesh = mesh_grid(grid, spans_edge, marks=[at[1:-1].tolist() for at in marks])
+    positions, bent = np.empty((mesh.node_count, 3)), np.empty((mesh.node_count, 3))
+    entries, crossings = list[int](), list[int]()
+    for k, ((curve, fine, along, chord, tilts), row) in enumerate(zip(curves, rows, strict=True)):
+        here = mesh.rod_slice(k)
+        t = np.interp(mesh.stations[here], along, fine)
+        positions[mesh.rod_nodes[here]] = curve(t)
+        bent[mesh.rod_nodes[here]] = np.column_stack([np.interp(t, chord, tilts[:, axis]) for axis in range(3)])
+        for crossing, at in zip(row, marks[k].tolist(), strict=True):
+            entries.append(here.start + int(np.argmin(np.abs(mesh.stations[here] - at))))
+            crossings.append(crossing)
+    return mesh, positions, bent, np.array(entries), np.array(crossings)
 
 
-def _joined(structure: Structure, layer: LathLayer, laid: _Laid, ties: tuple[Elements, ...]) -> Structure:
-    """Grid and laths as one structure, in equilibrium."""
+def _joined(structure: Structure, layer: LathLayer, placed: Floats, ties: tuple[Elements, ...]) -> Structure:
+    """Grid and laths as one structure, in equilibrium; the state of the laths is first the one `placed`."""
     before, shell, blocks = structure.equilibrium, layer.shell, layer.blocks
     problem, count = before.problem, int(blocks.max()) + 1
-    placed = shell.state(laid.positions, normals=laid.normals)
     state = np.zeros((count, 3))
     state[blocks] = placed
     state[: structure.size] = before.state
-    edges, free = laid.mesh.edges, shell.freedom()
+    edges, free = shell.mesh.edges, shell.freedom()
     rest = np.linalg.norm(placed[edges[:, 1]] - placed[edges[:, 0]], axis=1)  # laid without axial force
     laths = replace(shell.stretch, blocks=blocks[shell.stretch.blocks], rest_lengths=rest)
     stretch = _both(problem.stretch, laths)
@@ -130,7 +117,7 @@ def _joined(structure: Structure, layer: LathLayer, laid: _Laid, ties: tuple[Ele
     main = problem.constraint.freedom(before.state)
     directions[: structure.size], dofs[: structure.size] = main.directions, main.count
     elements = [replace(element, blocks=blocks[element.blocks]) for element in shell.elements]  # type: ignore[type-var]
-    flat = _flat(structure, laid, shell)
+    flat = _flat(structure, layer)
     joined = replace(
         problem,
         elements=(*before.elements, *elements, *ties),
@@ -147,11 +134,10 @@ def _joined(structure: Structure, layer: LathLayer, laid: _Laid, ties: tuple[Ele
             "thinner ones (bracing.section), or another pattern"
         )
     mass = np.zeros(structure.shell.node_count)
-    rods = np.searchsorted(laid.mesh.rod_start, laid.entries, side="right") - 1
-    half = np.where(np.diff(rods) == 0, np.diff(laid.mesh.stations[laid.entries]), 0.0) / 2
+    half = np.where(layer.same_lath, np.diff(shell.mesh.stations[layer.entries]), 0.0) / 2
     reach = np.append(half, 0.0) + np.append(0.0, half)  # the load of a lath goes to its nearest joint
-    np.add.at(mass, outer_nodes(structure.mesh)[laid.crossings], layer.rod.mass_per_length * reach)
-    grid = structure.shell.with_elements(found.elements[: len(structure.shell.elements)])
+    np.add.at(mass, outer_nodes(structure.mesh)[layer.crossings], layer.rod.mass_per_length * reach)
+    grid = structure.shell_at(found)
     return replace(structure, shell=grid, equilibrium=found, braced=layer.pairs, bracing_mass=mass, laths=layer)
 
 
@@ -169,16 +155,16 @@ def _held_angles(shell: Shell) -> Ints:
     return np.asarray(shell.first_angle + np.cumsum(count) - count + count // 2)
 
 
-def _flat(structure: Structure, laid: _Laid, shell: Shell) -> Floats:
+def _flat(structure: Structure, layer: LathLayer) -> Floats:
     """(N, 2) where the laths' blocks lie in the flat grid [m], by the joints on either side."""
-    joints, mesh = flat_joints(structure.mesh.grid), laid.mesh
+    joints, mesh = flat_joints(structure.mesh.grid), layer.shell.mesh
     nodes = np.empty((mesh.node_count, 2))
-    rods = np.searchsorted(mesh.rod_start, laid.entries, side="right") - 1
+    rods = mesh.rod_of[layer.entries]
     for k in range(len(mesh.grid.rods)):
         here, on = mesh.rod_slice(k), rods == k
-        at, flat = mesh.stations[laid.entries[on]], joints[laid.crossings[on]]
+        at, flat = mesh.stations[layer.entries[on]], joints[layer.crossings[on]]
         nodes[mesh.rod_nodes[here]] = np.column_stack([np.interp(mesh.stations[here], at, flat[:, a]) for a in (0, 1)])
-    middles = nodes[mesh.edges].mean(axis=1)[: shell.angles]
+    middles = nodes[mesh.edges].mean(axis=1)[: layer.shell.angles]
     return np.vstack([nodes, middles])
 
 
@@ -202,8 +188,8 @@ def _neighbours(mesh: GridMesh) -> Ints:
     return np.asarray(found)
 
 
-def _ties(structure: Structure, layer: LathLayer, crossings: Ints, eccentricity: float) -> tuple[Elements, ...]:
-    mesh = structure.mesh
+def _ties(structure: Structure, layer: LathLayer, eccentricity: float) -> tuple[Elements, ...]:
+    mesh, crossings = structure.mesh, layer.crossings
     held = layer.blocks[layer.shell.mesh.rod_nodes[layer.entries]]
     blocks = np.column_stack([held, outer_nodes(mesh)[crossings], _neighbours(mesh)[crossings]])
     edge = np.median(mesh.edge_lengths)

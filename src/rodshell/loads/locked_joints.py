@@ -14,19 +14,14 @@ from rodshell.arrays import Ints
 from rodshell.joints import Spring
 from rodshell.joints.crossings import RodNodes, stencils
 from rodshell.joints.joint import elastic_joints
-from rodshell.joints.relative_rotation import RelativeRotation
+from rodshell.joints.relative_rotation import is_elastic
 from rodshell.loads.settings import LockedJoints
 from rodshell.loads.structure import Structure
 from rodshell.model.rod_sections import RodSections
 
 
 def locked(joints: LockedJoints, structure: Structure) -> Structure:
-    """The structure with its joints locked as it stands, in the same equilibrium.
-
-    Parameters
-    ----------
-    structure : erected and braced, its joints pins.
-    """
+    """The structure, erected, braced and with pins, with its joints locked as it stands, in the same equilibrium."""
     shell, before = structure.shell, structure.equilibrium
     mesh = shell.mesh
     rod_nodes = RodNodes(mesh, shell.node_blocks, shell.first_angle)
@@ -34,7 +29,7 @@ def locked(joints: LockedJoints, structure: Structure) -> Structure:
     sections = RodSections.of(mesh, [structure.rod] * len(mesh.grid.rods)).nodes
     wanted = [Spring(shear=joints.shear)] * len(crossings)
     springs = elastic_joints(rod_nodes, crossings, wanted, sections, len(shell.like))
-    pins = [element for element in shell.between if isinstance(element, RelativeRotation)]
+    pins = filter(is_elastic, shell.between)
     locks = tuple(
         replace(
             pin,  # with its source frames, in which the twist angles are
@@ -43,7 +38,7 @@ def locked(joints: LockedJoints, structure: Structure) -> Structure:
         )
         for pin, spring in zip(pins, springs, strict=True)
     )
-    count = len(shell.elements)
+    count = len(shell.within) + len(shell.between)
     elements = (*before.elements[:count], *locks, *before.elements[count:])
     problem = replace(before.problem, elements=elements)
     return replace(

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 from rodshell.errors import InputError
 from rodshell.quantities import Distance, Factor, Force, Share, SlipMoment, Stiffness, Stress, Value, Whole
 from rodshell.rods.design_strength import DURATIONS, Duration
-from rodshell.rods.joints import Joint, Pin
+from rodshell.rods.joints import Joint
 from rodshell.rods.section import Rod
 from rodshell.schema import Inline, checked
 from rodshell.units import read_quantity, shown
@@ -17,7 +17,7 @@ AcrossOpenings = Literal["refuse", "leave out"]
 
 def _pattern(value: str) -> str:
     """ "both", "one" or "every = n"."""
-    from rodshell.layout.cells import Pattern  # here, as it needs NumPy
+    from rodshell.layout.cells import Pattern  # here, as it needs SciPy
 
     Pattern.of(value)
     return value
@@ -33,16 +33,9 @@ OnOpenings = Annotated[AcrossOpenings, "what becomes of diagonals across an open
 class Cables:
     """Cables that carry tension alone, straight from joint to joint, in the outer layer of rods.
 
-    Parameters
-    ----------
-    rod : section and material of the cables; of their stiffnesses EA counts.
-    pattern : "both" diagonals of every cell, "one", or "every = n": lines of both through every n-th joint.
-    prestrain : by which the erected shell's cables are shorter, free of stress, than where they go [-]. Slack cables
-        brace nothing: factors without prestress are small.
-    ends_at : where lines of cables end: at the outermost "joints", so that the fields at the rim are not braced, or at
-        the "supports" beyond.
-    across_openings : what becomes of diagonals that leave the shell, across an opening: the bracing is refused, or they
-        are left out.
+    Of the stiffnesses of their rod EA counts. A pattern of "every = n" has lines of both diagonals through every n-th
+    joint. Slack cables brace nothing: factors without a prestrain are small. Lines that end at the outermost joints
+    leave the fields at the rim without bracing.
     """
 
     kind: ClassVar = "cables"
@@ -63,14 +56,8 @@ class Cables:
 
 @dataclass(frozen=True, kw_only=True)
 class Laths:
-    """A third layer of laths.
-
-    Parameters
-    ----------
-    rod : section and material; None: those of the grid's rods.
-    pattern, across_openings : as of `Cables`.
-    eccentricity : 0: they share the joints' nodes.
-    """
+    """A third layer of laths: by default of the grid's rods, which share the joints' nodes where they have no
+    eccentricity."""
 
     kind: ClassVar = "laths"
     pattern: Diagonals = "one"
@@ -93,12 +80,9 @@ Bracing = Cables | Laths
 class LockedJoints:
     """Pins that are tightened before loads act.
 
-    Parameters
-    ----------
-    shear : stiffness of a tightened joint about its normal [N m/rad]; `inf` is rigid.
-    slip : moment about the normal that it transfers before it slips [N m]; None: not known. With `Strength.slip` both
-        count together.
-
+    Args:
+        shear: [N m/rad]; `inf` is rigid.
+        slip: [N m]; with `Strength.slip` both count together.
     """
 
     shear: Annotated[Stiffness, "stiffness about the normal of pins tightened after erection"]
@@ -113,7 +97,7 @@ class LockedJoints:
 
     def require_pins(self, joint: Joint) -> None:
         """Raise InputError where joints of a kind cannot be locked."""
-        if not isinstance(joint, Pin):
+        if not joint.locks:
             raise InputError(
                 f"locked_joints: {joint.name} joints cannot be locked: pins are free about their normal until they are "
                 'tightened: set joint.kind = "pin", or leave locked_joints out'
@@ -133,13 +117,10 @@ def _imperfection(value: object) -> str | float:
 
 @dataclass(frozen=True, kw_only=True)
 class Stability:
-    """How stability is looked at.
+    """How stability is looked at: of the perfect shell, and with an imperfection in each mode, of either sign.
 
-    Parameters
-    ----------
-    imperfection : largest displacement of the geometry with imperfections [m], or a part of the span such as
-        "span/500"; None: the perfect geometry alone.
-    modes : lowest buckling modes that are looked for; an imperfection in each of them is tried, with either sign.
+    Args:
+        imperfection: largest displacement [m], or a part of the span such as "span/500"; None: the perfect shell alone.
     """
 
     imperfection: Annotated[
@@ -153,12 +134,7 @@ class Stability:
         whole("the number of modes", self.modes, 1, 1000)
 
     def amplitude(self, span: float) -> float | None:
-        """Largest displacement of the geometry with imperfections [m]; None: the perfect geometry alone.
-
-        Parameters
-        ----------
-        span : of the shell [m].
-        """
+        """Largest displacement of an imperfect shell of a `span` [m], in m; None: the perfect one alone."""
         given = self.imperfection
         if not isinstance(given, str):
             return None if given is None else positive("the imperfection", given, "m")
@@ -180,12 +156,11 @@ def _service_class(value: object) -> int:
 class Strength:
     """What rods and joints withstand, where it is not that of the material's preset.
 
-    Parameters
-    ----------
-    permanent, long, medium, short, instantaneous : design strength in bending for loads that act so long [Pa]. Given
-        ones stand in place of all of the preset's; one that is missing is that of the next longer duration.
-    erection : the same while the shell is erected [Pa]; None: the short one.
-    effective_length : for the Euler load of a span.
+    Args:
+        permanent, long, medium, short, instantaneous: design strength in bending for loads that act so long [Pa]. Given
+            ones stand in place of all of the preset's; one that is missing is that of the next longer duration.
+        erection: the same while the shell is erected [Pa]; None: the short one.
+        effective_length: for the Euler load of a span.
     """
 
     permanent: Annotated[Stress | None, "design strength under permanent loads; default: a preset's"] = None

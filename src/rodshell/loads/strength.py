@@ -27,7 +27,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints, State
 from rodshell.checks.bending import VON_MISES, Bending, bending_of
 from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
@@ -38,8 +38,8 @@ from rodshell.layout import GridMesh
 from rodshell.loads.settings import Strength
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
-from rodshell.rods.design_strength import DESIGN, DURATIONS, Duration
-from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Section, Tube
+from rodshell.rods.design_strength import DESIGN, DURATIONS, DesignFactors, Duration
+from rodshell.rods.section import GivenSection, Rod, Section
 from rodshell.validation import brief
 
 By = Literal["bending", "shear", "slip", "permanent", "slip_unloaded"]
@@ -59,33 +59,28 @@ class Limits(DesignStrength):
         return {name: strength for name, strength in known.items() if strength is not None}
 
     @staticmethod
-    def of(
-        rod: Rod, asked: Strength, *,
-        characteristic: float | None = None, of_preset: bool = True, shear_weight: float = VON_MISES,
-    ) -> "Limits":  # fmt: skip
-        """The limits of a rod.
+    def of(rod: Rod, asked: Strength, *, given: float | None = None, shear_weight: float | None = None) -> "Limits":
+        """The limits of a rod: what is `asked`, or else one strength for every duration of load, or else the preset's.
 
-        Parameters
-        ----------
-        asked : what was given for it.
-        characteristic : bending strength [Pa]; None: not known.
-        of_preset : whether it is the preset's; a given one is taken as it is, for every duration.
-        shear_weight : bending strength over shear strength.
+        Args:
+            given: bending strength [Pa] in place of that of the rod's preset.
+            shear_weight: bending strength over shear strength; default: the preset's.
 
-        Raises
-        ------
-        InputError : a service class is given, and nothing depends on it.
+        Raises:
+            InputError: a service class is given, and nothing depends on it.
         """
-        name = rod.material.name if rod.material is not None else None
-        factors = DESIGN.get(name) if name is not None else None
+        factors, service = _factors(rod), asked.service_class or 2
         moist = factors is not None and len(factors.factors) > 1
-        judged = not asked.given and of_preset and factors is not None and characteristic is not None
-        if asked.service_class is not None and not (moist and (judged or not asked.given)):
+        if asked.service_class is not None and (asked.given or not moist):
             raise InputError(
                 f"strength.service_class = {asked.service_class}: only the strengths of timber presets depend on it: "
                 "leave it out"
             )
-        service = asked.service_class or 2
+        characteristic, shear = None, None
+        if (material := rod.material) is not None:
+            characteristic, shear = material.bending_strength, material.shear_strength
+        if shear_weight is None:
+            shear_weight = characteristic / shear if characteristic and shear else VON_MISES
         bending: dict[Duration, float] = {}
         source = "no design strength is known"
         if asked.given:
@@ -95,12 +90,12 @@ class Limits(DesignStrength):
                 if known is not None:
                     bending[duration] = known
             source = "design strengths as given"
-        elif not of_preset and characteristic is not None:
-            bending = dict.fromkeys(DURATIONS, characteristic)
+        elif given is not None:
+            bending = dict.fromkeys(DURATIONS, given)
             source = "the strength as given, for every duration of load"
-        elif judged and factors is not None and characteristic is not None:
+        elif factors is not None and characteristic is not None and material is not None:
             bending = {key: share * characteristic for key, share in factors.by_duration(service).items()}
-            source = f"{name}, characteristic {1e-6 * characteristic:.4g} MPa; {factors.source}"
+            source = f"{material.name}, characteristic {1e-6 * characteristic:.4g} MPa; {factors.source}"
             source += f"; service class {service}" if moist else ""
         creep = None
         if factors is not None and factors.creep:
@@ -114,35 +109,29 @@ class Limits(DesignStrength):
             cracked=factors.cracked if factors is not None else 1.0,
             creep=creep,
             source=source,
-            given=bool(asked.given) or not of_preset,
+            given=bool(asked.given) or given is not None,
         )
 
 
 def preset_limits(rod: Rod, service_class: int | None) -> Limits:
-    """The limits of a rod by its material's preset; of other materials none is known.
+    """The limits of a rod by its material's preset; of other materials none is known."""
+    factors = _factors(rod)
+    moist = factors is not None and len(factors.factors) > 1
+    return Limits.of(rod, Strength(service_class=service_class if moist else None))
 
-    Parameters
-    ----------
-    service_class : of timber, as of `Strength`.
-    """
-    material = rod.material
-    factors = None if material is None or material.name is None else DESIGN.get(material.name)
-    if material is None or factors is None:
-        return Limits()
-    moist, bending, shear = len(factors.factors) > 1, material.bending_strength, material.shear_strength
-    weight = VON_MISES if bending is None or shear is None else bending / shear
-    asked = Strength(service_class=service_class if moist else None)
-    return Limits.of(rod, asked, characteristic=bending, shear_weight=weight)
+
+def _factors(rod: Rod) -> DesignFactors | None:
+    """What building codes make of the strengths of the rod's preset, if it has one that they know."""
+    return None if rod.material is None or rod.material.name is None else DESIGN.get(rod.material.name)
 
 
 @dataclass(frozen=True, eq=False)
 class Utilisation:
     """What the rods and joints of a shell use of their strength, at each entry (k,) of `rod_nodes`.
 
-    Parameters
-    ----------
-    uses : by what; what is not known is missing.
-    euler : largest compression of the spans next to each entry, over their Euler load.
+    Args:
+        uses: by what; what is not known is missing.
+        euler: largest compression of the spans next to each entry, over their Euler load.
     """
 
     uses: dict[By, Floats]
@@ -162,12 +151,8 @@ class Utilisation:
         return None if by is None else (by, int(np.argmax(self.uses[by])))
 
     def with_permanent(self, permanent: "Utilisation") -> "Utilisation":
-        """The same, where the erected shell's own utilisation counts too, and the slip of its joints.
-
-        Parameters
-        ----------
-        permanent : of the erected shell by the permanent strength.
-        """
+        """The same, where the erected shell's own utilisation counts too, by the permanent strength, and the slip of
+        its joints."""
         uses = dict(self.uses)
         if "slip" in permanent.uses:
             uses["slip_unloaded"] = permanent.uses["slip"]
@@ -178,26 +163,21 @@ class Utilisation:
 
 
 def utilisation(
-    shell: Shell, state: Floats, rod: Rod, *,
+    shell: Shell, state: State, rod: Rod, *,
     forces: Floats, limits: Limits, asked: Strength, duration: Duration, bent: Bending | None = None,
     moments: Floats | None = None, slip_moment: float | None = None,
 ) -> Utilisation:  # fmt: skip
-    """Utilisation of a shell in equilibrium.
+    """Utilisation of a shell in equilibrium, its source frames being at the state.
 
-    Parameters
-    ----------
-    shell : with its source frames at the state.
-    state : (N, 3) node positions [m] and twist angles [rad].
-    rod : section and material of every rod.
-    forces : (e,) axial force of each edge, tension positive [N].
-    asked : holes, slip and effective lengths.
-    bent : the shell's bending, where it is known.
-    moments : (c,) of locked joints about their normals [N m]; None or empty: none is locked.
-    slip_moment : at which locked joints slip [N m]; None: not known.
+    Args:
+        forces: (e,) axial force of each edge, tension positive [N].
+        asked: holes, slip and effective lengths.
+        bent: the shell's bending, where it is known.
+        moments: (c,) of locked joints about their normals [N m]; None or empty: none is locked.
+        slip_moment: at which locked joints slip [N m]; None: not known.
 
-    Raises
-    ------
-    InputError : holes in rods whose section varies or is not known.
+    Raises:
+        InputError: holes in rods whose section varies or is not known.
     """
     mesh, section = shell.mesh, rod.section
     bent = bent or bending_under(shell, state, rod, forces, limits)
@@ -223,7 +203,7 @@ def utilisation(
         drawn = np.abs(bent.axial_strain) * rod.stretch_stiffness / area_of(rod)
         stress = bent.stress + drawn * (1.0 / (limits.axial or 1.0) - 1.0)
         uses["bending"] = net * stress / strength
-        if bent.torsion_stress is not None and (peak := _shear_peak(section)) is not None:
+        if bent.torsion_stress is not None and (peak := section.shear_peak) is not None:
             sheared = spans.on_entries(across) * peak / (limits.cracked * area_of(rod) * areas)
             uses["shear"] = net * limits.shear_weight * (bent.torsion_stress + sheared) / strength
     slips = [] if asked.slip is None else [spans.jumps(forces) / asked.slip]
@@ -235,12 +215,7 @@ def utilisation(
 
 def bending_under(shell: Shell, state: Floats, rod: Rod, forces: Floats, limits: Limits) -> Bending:
     """Bending and stress of a shell whose axial forces (e,) [N] are known: where rods are warm their lengths do not say
-    them.
-
-    Parameters
-    ----------
-    shell, state, rod, forces, limits : as of `utilisation`.
-    """
+    them."""
     strains = forces / shell.stretch.stiffness
     return bending_of(shell, state, rod, shear_weight=limits.shear_weight, edge_strains=strains)
 
@@ -252,40 +227,20 @@ def area_of(rod: Rod) -> float:
     return rod.section.area
 
 
-def _shear_peak(section: Section | GivenSection) -> float | None:
-    """Largest shear stress of a shear force over its mean; None: not known."""
-    if isinstance(section, Tube):
-        return 2.0
-    if isinstance(section, RectangularSection):
-        return 1.5
-    return 4.0 / 3.0 if isinstance(section, Circle | Ellipse) else None
-
-
 def net_section(section: Section | GivenSection, hole: float) -> float:
     """Largest stress at a hole through the section along its first axis, over that of the full section.
 
-    Parameters
-    ----------
-    hole : diameter [m].
+    Args:
+        hole: diameter [m].
 
-    Raises
-    ------
-    InputError : the hole is as wide as the rod; the section is a given one.
+    Raises:
+        InputError: the hole is as wide as the rod; the section is a given one.
     """
     if isinstance(section, GivenSection):
         raise InputError("strength.hole: the net section of a given section is not known: leave it out")
-    first, _ = section.second_moments
-    if isinstance(section, Tube):
-        outer, inner = section.outer_radius, section.inner_radius
-        wide, area, cut = 2 * outer, 2 * hole * section.thickness, 2 * hole * (outer**3 - inner**3) / 3
-    elif isinstance(section, Ellipse):
-        wide, area, cut = 2 * section.b, 2 * hole * section.a, hole * (2 * section.a) ** 3 / 12
-    elif isinstance(section, Circle):
-        wide, area, cut = 2 * section.radius, 2 * hole * section.radius, hole * (2 * section.radius) ** 3 / 12
-    else:
-        wide, area, cut = section.height, hole * section.width, hole * section.width**3 / 12
-    left = min(1.0 - area / section.area, 1.0 - cut / first)
-    if hole >= wide or left <= 0:
+    area, cut = section.hole(hole)
+    left = min(1.0 - area / section.area, 1.0 - cut / section.second_moments[0])
+    if hole >= 2 * section.half_widths[1] or left <= 0:
         raise InputError(
             f"strength.hole = {hole:g} m: a hole of that diameter leaves nothing of the rod: make it smaller"
         )
@@ -293,12 +248,8 @@ def net_section(section: Section | GivenSection, hole: float) -> float:
 
 
 def net_factors(mesh: GridMesh, section: Section | GivenSection, hole: float) -> Floats:
-    """(k,) stress of the net section over that of the full one, at each entry of `rod_nodes`: 1 but at joints.
-
-    Parameters
-    ----------
-    section, hole : as of `net_section`; 0: there is no hole.
-    """
+    """(k,) stress of the net section over that of the full one, at each entry of `rod_nodes`: 1 but at joints with
+    a `hole` [m]."""
     factors = np.ones(len(mesh.rod_nodes))
     if hole:
         factors[_at_joints(mesh)] = net_section(section, hole)
@@ -322,11 +273,10 @@ def _shear_forces(shell: Shell, state: Floats) -> Floats:
 class Spans:
     """The s spans between neighbouring joints, and between the last joints and the ends, rod by rod.
 
-    Parameters
-    ----------
-    first, last : (s,) entries of `rod_nodes` at their ends.
-    middle : (s,) edge in the middle of each.
-    lengths : (s,) [m].
+    Args:
+        first, last: (s,) entries of `rod_nodes` at their ends.
+        middle: (s,) edge in the middle of each.
+        lengths: (s,) [m].
     """
 
     first: Ints
@@ -340,7 +290,7 @@ class Spans:
         stops = _at_joints(mesh)
         stops[mesh.rod_start] = stops[mesh.rod_stop - 1] = True
         entries = np.flatnonzero(stops)
-        rods = np.searchsorted(mesh.rod_start, entries, side="right") - 1
+        rods = mesh.rod_of[entries]
         same = rods[1:] == rods[:-1]
         first, last = entries[:-1][same], entries[1:][same]
         middle = (first + last - 1) // 2 - rods[:-1][same]  # edges are counted rod by rod

@@ -7,15 +7,14 @@ to that, and in the equilibrium that it finds its joints are locked, where they 
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.errors import ConvergenceError
 from rodshell.formfinding.popup import PopUp
-from rodshell.joints.relative_rotation import RelativeRotation
+from rodshell.joints.relative_rotation import is_elastic
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.rod_sections import RodSections
@@ -24,65 +23,67 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.modes import frequencies
 
+NO_PAIRS: Ints = np.empty((0, 2), dtype=np.intp)  # of crossings that bracing joins
+
 
 @dataclass(frozen=True, eq=False)
 class LathLayer:
     """A third layer of laths.
 
-    Parameters
-    ----------
-    shell : the model of the laths alone, each straight when it is free of stress.
-    blocks : (N,) the structure's block that holds each of its blocks.
-    rows : crossings that each lath runs over.
-    entries : entries of its mesh's `rod_nodes` at these crossings, lath by lath.
+    Args:
+        shell: the model of the laths alone, each straight when it is free of stress.
+        blocks: (N,) the structure's block that holds each of its blocks.
+        entries: entries of its mesh's `rod_nodes` at crossings, lath by lath; `crossings` which each of them is at.
     """
 
     shell: Shell
     blocks: Ints
     rod: Rod
-    rows: tuple[tuple[int, ...], ...]
     entries: Ints
+    crossings: Ints
 
     @property
     def pairs(self) -> Ints:
         """(d, 2) neighbouring crossings on each lath."""
-        return np.array([pair for row in self.rows for pair in pairwise(row)], dtype=np.intp).reshape(-1, 2)
+        return np.column_stack([self.crossings[:-1], self.crossings[1:]])[self.same_lath]
 
     def forces(self, axial: Floats) -> Floats:
-        """(d,) mean axial force from crossing to crossing [N], tension positive.
-
-        Parameters
-        ----------
-        axial : (e,) forces of the laths' edges [N].
-        """
-        first = self.entries - (np.searchsorted(self.shell.mesh.rod_start, self.entries, side="right") - 1)
+        """(d,) mean axial force from crossing to crossing [N], tension positive, of those (e,) of the edges."""
+        edges = self.entries - self.shell.mesh.rod_of[self.entries]  # which are counted lath by lath
         sums = np.append(0.0, np.cumsum(axial))
-        stops = np.concatenate([np.ones(len(row), dtype=bool) for row in self.rows])
-        ends = np.cumsum([len(row) for row in self.rows]) - 1
-        stops[ends] = False
-        begin = np.flatnonzero(stops)
-        return np.asarray((sums[first[begin + 1]] - sums[first[begin]]) / (first[begin + 1] - first[begin]))
+        return np.asarray(np.diff(sums[edges])[self.same_lath] / np.diff(edges)[self.same_lath])
+
+    @property
+    def same_lath(self) -> Bools:
+        """Which crossings are on one lath with the next."""
+        return np.asarray(np.diff(self.shell.mesh.rod_of[self.entries]) == 0)
+
+    def alone(self, found: Equilibrium, first: int) -> tuple[Shell, Floats]:
+        """The model and the state of the laths alone, of whose elements an equilibrium of grid and laths has the first
+        after `first` others."""
+        elements = zip(found.elements[first:], self.shell.elements, strict=False)
+        alone = tuple(replace(there, blocks=here.blocks) for there, here in elements)  # type: ignore[type-var]
+        return self.shell.with_elements(alone), found.state[self.blocks]
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
     """A shell as loads find it.
 
-    Parameters
-    ----------
-    shell : the model of the grid, its source frames being at the equilibrium.
-    equilibrium : of grid and bracing without loads, its ends held.
-    braced : (d, 2) crossings that its bracing joins, the rod ends counted on from them.
-    bracing_mass : (n,) mass of the bracing whose weight the mesh's nodes carry [kg]; None: there is no bracing.
-    cables : its energy; None: there are no cables.
-    laths : its third layer; None: there is none.
-    locked : crossings of the joints of each of the shell's last elements, which lock them; empty: none is locked.
+    Args:
+        shell: the model of the grid, its source frames being at the equilibrium.
+        equilibrium: of grid and bracing without loads, its ends held.
+        braced: (d, 2) crossings that its bracing joins, the rod ends counted on from them.
+        bracing_mass: (n,) mass of the bracing whose weight the mesh's nodes carry [kg]; None: there is no bracing.
+        cables: its energy; None: there are no cables.
+        laths: its third layer; None: there is none.
+        locked: crossings of the joints of each of the shell's last elements, which lock them; empty: none is locked.
     """
 
     shell: Shell
     equilibrium: Equilibrium
     rod: Rod
-    braced: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.intp))
+    braced: Ints = field(default_factory=NO_PAIRS.copy)
     bracing_mass: Floats | None = None
     cables: CableStretch | None = None
     laths: LathLayer | None = None
@@ -124,29 +125,20 @@ class Structure:
 
     def locked_moments(self, found: Equilibrium) -> Floats:
         """(c,) moment of each locked joint about its normal in an equilibrium of the structure [N m], positive where
-        the angle from the first rod to the second has grown; empty where none is locked.
-
-        Parameters
-        ----------
-        found : an equilibrium of this structure.
-        """
+        the angle from the first rod to the second has grown; empty where none is locked."""
         if not self.locked:
             return np.zeros(0)
-        result, elements = np.zeros(len(self.mesh.grid.crossings)), self.shell_at(found).elements
-        for crossings, element in zip(self.locked, elements[-len(self.locked) :], strict=True):
-            assert isinstance(element, RelativeRotation)
+        result, joints = np.zeros(len(self.mesh.grid.crossings)), [*filter(is_elastic, self.shell_at(found).between)]
+        for crossings, element in zip(self.locked, joints[-len(self.locked) :], strict=True):
             result[crossings] = element.moments(found.state)[:, 0]
         return result
 
     def frequencies(self, count: int) -> Floats:
-        """(k,) the lowest natural frequencies without loads, ascending [Hz]; none where they are not known.
+        """(k,) the lowest `count` natural frequencies without loads, at most, ascending [Hz]; none where they are not
+        known.
 
         The mass of rods and laths is spread along their edges, so that the frequencies of bending are of fourth order
         in their length (see `solve.modes.frequencies`); joints and cables are at the nodes.
-
-        Parameters
-        ----------
-        count : so many, or as many as there are.
         """
         shell, mass = self.shell, np.zeros((self.size, 3))
         mass[: len(shell.mass)] = shell.mass
@@ -168,46 +160,16 @@ class Structure:
         except ConvergenceError:  # one figure of many: it is missing, and the others stand
             return np.zeros(0)
 
-    def laths_alone(self, found: Equilibrium) -> tuple[Shell, Floats] | None:
-        """The model of the laths of a third layer alone and its state; None: there are none.
-
-        Parameters
-        ----------
-        found : an equilibrium of this structure.
-        """
-        if self.laths is None:
-            return None
-        layer, count = self.laths, len(self.shell.elements)
-        of_laths = found.elements[count : count + len(layer.shell.elements)]
-        blocks = [element.blocks for element in layer.shell.elements]
-        alone = tuple(replace(element, blocks=at) for element, at in zip(of_laths, blocks, strict=True))  # type: ignore[type-var]
-        return layer.shell.with_elements(alone), found.state[layer.blocks]
-
     def shell_at(self, found: Equilibrium) -> Shell:
-        """The grid's model with its source frames at an equilibrium of the structure.
-
-        Parameters
-        ----------
-        found : an equilibrium of this structure, loaded or not.
-        """
+        """The grid's model with its source frames at an equilibrium of the structure, loaded or not."""
         return self.shell.with_elements(found.elements[: len(self.shell.elements)])
 
     def support_forces(self, found: Equilibrium) -> Reactions:
-        """What the supports exert in an equilibrium, with the springing of the bent rods.
-
-        Parameters
-        ----------
-        found : an equilibrium of this structure, loaded or not.
-        """
+        """What the supports exert in an equilibrium, with the springing of the bent rods."""
         return reactions(self.shell, found)
 
     def reactions(self, found: Equilibrium) -> Reactions:
-        """What the supports exert in an equilibrium in addition to what they exert without loads.
-
-        Parameters
-        ----------
-        found : an equilibrium of this structure under loads.
-        """
+        """What the supports exert in an equilibrium in addition to what they exert without loads."""
         loaded, before = self.support_forces(found), self.support_forces(self.equilibrium)
         points = found.state[self.shell.ends]
         return Reactions.at(points, loaded.forces - before.forces, loaded.moments - before.moments)

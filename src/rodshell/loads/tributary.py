@@ -6,10 +6,10 @@ parts where several are as near. So the areas add up to those of the surface and
 triangles' size, and those of a symmetric shell are symmetric: the triangles are laid along its rods from its anchor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import cos, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -22,17 +22,14 @@ from rodshell.targets.freeform import Freeform
 from rodshell.units import length_text
 from rodshell.validation import brief
 
-if TYPE_CHECKING:
-    from rodshell.targets.freeform import Freeform
-
 ACROSS = 240  # triangles' sides across the surface's larger width, at least
-A_SPACING = 24.0  # sides on the distance of two rods, at least
-MOST_ACROSS = 900
-BISECTIONS = 40
-ON_THE_EDGE = 1e-6  # of the size: a vertex of a mesh so near to its end is inside
+_A_SPACING = 24.0  # sides on the distance of two rods, at least
+_MOST_ACROSS = 900
+_BISECTIONS = 40
+_ON_THE_EDGE = 1e-6  # of the size: a vertex of a mesh so near to its end is inside
 STEEP, MOST_HALVINGS = 2.5, 8  # of the step: where the surface is steep longer sides are halved, so many times
-NEEDLE = 4.0  # a triangle's longest side over its height: longer ones are cut across first
-NEIGHBOURS, AS_NEAR = 4, 1e-6  # nodes that may share a corner, and by what share of the size their distances differ
+_NEEDLE = 4.0  # a triangle's longest side over its height: longer ones are cut across first
+_NEIGHBOURS, _AS_NEAR = 4, 1e-6  # nodes that may share a corner, and by what share of the size their distances differ
 
 REACH = 1.0  # distances of two rods: a point load farther from every rod is refused
 
@@ -41,12 +38,11 @@ REACH = 1.0  # distances of two rods: a point load farther from every rod is ref
 class Tributary:
     """What each of the n nodes of a mesh takes of a surface.
 
-    Parameters
-    ----------
-    area : (n,) of the surface [m2].
-    plan : (n,) of its plan [m2].
-    vectors : (n, 3) areas times the unit normals that point up [m2].
-    plan_positions : (n, 2) middle of each node's part of the plan [m]; of a node without one its own place.
+    Args:
+        area: (n,) of the surface [m2].
+        plan: (n,) of its plan [m2].
+        vectors: (n, 3) areas times the unit normals that point up [m2].
+        plan_positions: (n, 2) middle of each node's part of the plan [m]; of a node without one its own place.
     """
 
     area: Floats
@@ -61,12 +57,11 @@ class Tributary:
 class LoadedNodes:
     """The nodes of a shell that loads act on.
 
-    Parameters
-    ----------
-    positions : (n, 3) of the unloaded shell [m].
-    mass : (n,) of rods and joints, lumped [kg].
-    tributary : areas of the target that each node takes.
-    spacing : distance of two neighbouring rods [m].
+    Args:
+        positions: (n, 3) of the unloaded shell [m].
+        mass: (n,) of rods and joints, lumped [kg].
+        tributary: areas of the target that each node takes.
+        spacing: distance of two neighbouring rods [m].
     """
 
     positions: Floats
@@ -86,9 +81,8 @@ class LoadedNodes:
     def nearest(self, at: Sequence[float], what: str) -> int:
         """The node that is nearest to a point of the plan [m].
 
-        Raises
-        ------
-        InputError : `what` acts there, and no rod is near.
+        Raises:
+            InputError: `what` acts there, and no rod is near.
         """
         away = np.linalg.norm(self.positions[:, :2] - np.asarray(at), axis=1)
         nearest = int(np.argmin(away))
@@ -111,13 +105,12 @@ def tributary_areas(
 ) -> Tributary:
     """The areas of a surface that the nodes on it take.
 
-    Parameters
-    ----------
-    target : the surface, up to its end; where parts lie one above the other, the uppermost.
-    positions : (n, 3) of the nodes, on the surface or next to it [m].
-    anchor : point of the plan from which the triangles are laid [m].
-    rotate : angle of their sides [rad].
-    spacing : smallest distance of two neighbouring rods [m].
+    Args:
+        target: the surface, up to its end; where parts lie one above the other, the uppermost.
+        positions: (n, 3) of the nodes, on the surface or next to it [m].
+        anchor: point of the plan from which the triangles are laid [m].
+        rotate: angle of their sides [rad].
+        spacing: smallest distance of two neighbouring rods [m].
     """
     step = _step(target, spacing)
     if isinstance(target, Freeform):
@@ -128,9 +121,9 @@ def tributary_areas(
     vector = 0.5 * cross(b - a, c - a)
     shares = np.column_stack([np.sqrt(dot(vector, vector)), vector]) / 3.0
     at_corners = _sums(faces.T, [shares] * 3, len(corners))
-    wanted = range(1, 1 + min(NEIGHBOURS, len(positions)))
+    wanted = range(1, 1 + min(_NEIGHBOURS, len(positions)))
     distance, nearest = map(np.asarray, cKDTree(positions).query(corners, k=list(wanted)))
-    as_near = distance <= distance[:, :1] + AS_NEAR * target.size
+    as_near = distance <= distance[:, :1] + _AS_NEAR * target.size
     weight = as_near / as_near.sum(axis=1, keepdims=True)
     parts = [weight[:, k, None] * at_corners for k in range(nearest.shape[1])]
     result = _sums(nearest.T, parts, len(positions))
@@ -152,11 +145,10 @@ def surface_triangles(
 ) -> tuple[Floats, Ints]:
     """A surface up to its end in triangles: corners (k, 3) [m], and faces (m, 3), upwards.
 
-    Parameters
-    ----------
-    anchor : point of the plan that is a corner, where it lies inside [m].
-    rotate : angle of the sides [rad].
-    step : their length in plan [m].
+    Args:
+        anchor: point of the plan that is a corner, where it lies inside [m].
+        rotate: angle of the sides [rad].
+        step: their length in plan [m].
     """
     reach = 2.5 * target.size + float(np.hypot(*(np.array(anchor) - target.summit)))
     count = int(np.ceil(reach / step))
@@ -164,62 +156,72 @@ def surface_triangles(
     along, across = (side.ravel() for side in np.meshgrid(ticks, ticks, indexing="ij"))
     cos, sin = np.cos(rotate), np.sin(rotate)
     plan = np.column_stack([cos * along - sin * across, sin * along + cos * across]) + anchor
-    z, inside = _lifted(target, plan)
+    points, inside = _lifted(target, plan)
     index = np.arange(len(plan)).reshape(len(ticks), len(ticks))
     sw, se, nw, ne = index[:-1, :-1], index[1:, :-1], index[:-1, 1:], index[1:, 1:]
     used = (inside[sw] | inside[se] | inside[nw] | inside[ne]).ravel()
     sw, se, nw, ne = (part.ravel()[used] for part in (sw, se, nw, ne))
     # four triangles a square, about its middle: no direction is preferred
     middle = len(plan) + np.arange(len(sw))
-    plan = np.vstack([plan, 0.25 * (plan[sw] + plan[se] + plan[nw] + plan[ne])])
-    of_middles, within = _lifted(target, plan[len(z) :])
-    z, inside = np.append(z, of_middles), np.append(inside, within)
+    middles, within = _lifted(target, 0.25 * (plan[sw] + plan[se] + plan[nw] + plan[ne]))
+    points, inside = np.vstack([points, middles]), np.append(inside, within)
     rim = [(sw, se), (se, ne), (ne, nw), (nw, sw)]
     faces = np.concatenate([np.column_stack([p, q, middle]) for p, q in rim])
-    return _halved(target, *_cut(target, plan, z, inside, faces), longest=STEEP * step)
+    cut = _cut(target, points, inside, faces, partial(_lifted, target))
+    return _halved(target, *cut, longest=STEEP * step)
 
 
-def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
-    """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end.
-
-    Parameters
-    ----------
-    step : longest side [m].
-    """
+def mesh_triangles(target: Freeform, *, step: float) -> tuple[Floats, Ints]:
+    """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end; `step` is
+    the longest side [m]."""
     points, faces = _divided(target, target.surface.vertices, target.surface.faces, longest=step)
-    inside = target.margin(points) >= -ON_THE_EDGE * target.size
-    single, double, sides = _across(inside, faces)
-    low, high = points[sides[:, 0]], points[sides[:, 1]]
-    for _ in range(BISECTIONS):
-        middle = target.retract(0.5 * (low + high))
-        within = target.margin(middle)[:, None] >= 0
-        low, high = np.where(within, middle, low), np.where(within, high, middle)
-    points, faces = _stitched(target, points, low, faces[inside[faces].all(axis=1)], single, double)
+    inside = target.margin(points) >= -_ON_THE_EDGE * target.size
+
+    def on_surface(points: Floats) -> tuple[Floats, Bools]:
+        there = target.retract(points)
+        return there, target.margin(there) >= 0
+
+    points, faces = _cut(target, points, inside, faces, on_surface)
     a, b, c = (points[faces[:, k]] for k in range(3))
     upwards = np.cross(b - a, c - a)[:, 2].sum() >= 0
     return points, faces if upwards else faces[:, ::-1]
 
 
 def _step(target: Target, spacing: float) -> float:
-    finest = 2.0 * target.size / MOST_ACROSS
-    return max(finest, min(2.0 * target.size / ACROSS, spacing / A_SPACING))
+    finest = 2.0 * target.size / _MOST_ACROSS
+    return max(finest, min(2.0 * target.size / ACROSS, spacing / _A_SPACING))
 
 
-def _lifted(target: Target, plan: Floats) -> tuple[Floats, Bools]:
-    """Height (k,) of the surface over points of the plan, and whether they lie inside its end."""
+def _lifted(target: Target, points: Floats) -> tuple[Floats, Bools]:
+    """The points (k, 3) of the surface over points (k, 2 or more) of the plan, and whether they lie inside its end."""
+    plan = points[:, :2]
     z = target.height_at(plan)
-    known = np.isfinite(z)
-    inside = known.copy()
-    inside[known] = target.margin(np.column_stack([plan[known], z[known]])) >= 0
-    return np.where(known, z, 0.0), inside
+    inside = np.isfinite(z)
+    lifted = np.column_stack([plan, np.where(inside, z, 0.0)])
+    inside[inside] = target.margin(lifted[inside]) >= 0
+    return lifted, inside
 
 
-def _cut(target: Target, plan: Floats, z: Floats, inside: Bools, faces: Ints) -> tuple[Floats, Ints]:
-    """The faces inside the end, those across it cut; corners are counted again."""
+def _cut(
+    target: Target, points: Floats, inside: Bools, faces: Ints, placed: Callable[[Floats], tuple[Floats, Bools]]
+) -> tuple[Floats, Ints]:
+    """The faces inside the end, those across it cut; corners are counted again. `placed` gives points on the surface,
+    and whether they lie inside: with it the sides that lead out are cut by bisection."""
     single, double, sides = _across(inside, faces)
-    ends, height = _ends_of(target, plan, z, sides[:, 0], sides[:, 1])
-    points, there = np.column_stack([plan, z]), np.column_stack([ends, height])
-    return _stitched(target, points, there, faces[inside[faces].all(axis=1)], single, double)
+    low, high = points[sides[:, 0]], points[sides[:, 1]]
+    for _ in range(_BISECTIONS):
+        between, there = placed(0.5 * (low + high))
+        low, high = np.where(there[:, None], between, low), np.where(there[:, None], high, between)
+    a, b, c, d = np.split(len(points) + np.arange(len(low)), np.cumsum([len(single), len(single), len(double)]))
+    p, q = double[:, 1:].T
+    points = np.vstack([points, low])
+    middle = len(points) + np.arange(len(double))  # of what is left of a face with two corners inside
+    points = np.vstack([points, target.retract(0.25 * (points[p] + points[q] + points[c] + points[d]))])
+    around = [np.column_stack([*side, middle]) for side in ((p, q), (q, d), (d, c), (c, p))]
+    faces = np.concatenate([faces[inside[faces].all(axis=1)], np.column_stack([single[:, 0], a, b]), *around])
+    used = np.zeros(len(points), dtype=bool)
+    used[faces] = True
+    return points[used], (np.cumsum(used) - 1)[faces]
 
 
 def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
@@ -230,25 +232,6 @@ def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
     single = np.take_along_axis(single, (inside[single].argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     double = np.take_along_axis(double, ((~inside[double]).argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     return single, double, np.concatenate([single[:, [0, 1]], single[:, [0, 2]], double[:, [1, 0]], double[:, [2, 0]]])
-
-
-def _stitched(
-    target: Target, points: Floats, ends: Floats, whole: Ints, single: Ints, double: Ints
-) -> tuple[Floats, Ints]:
-    """Whole faces, and what is left of those that were cut at the `ends` of their sides."""
-    a, b, c, d = np.split(len(points) + np.arange(len(ends)), np.cumsum([len(single), len(single), len(double)]))
-    points = np.vstack([points, ends])
-    around = [(double[:, 1], double[:, 2]), (double[:, 2], d), (d, c), (c, double[:, 1])]
-    middle = len(points) + np.arange(len(double))
-    points = np.vstack(
-        [points, target.retract(0.25 * (points[double[:, 1]] + points[double[:, 2]] + points[c] + points[d]))]
-    )
-    faces = np.concatenate(
-        [whole, np.column_stack([single[:, 0], a, b]), *(np.column_stack([p, q, middle]) for p, q in around)]
-    )
-    used = np.zeros(len(points), dtype=bool)
-    used[faces] = True
-    return points[used], (np.cumsum(used) - 1)[faces]
 
 
 def _divided(target: Target, points: Floats, faces: Ints, *, longest: float) -> tuple[Floats, Ints]:
@@ -272,7 +255,7 @@ def _without_needles(corners: Floats, longest: float) -> Floats:
     would be needlessly small."""
     sides, (a, b, c) = _sides(corners), corners.transpose(1, 0, 2)
     length, double_area = sides.max(axis=1), np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    needle = (length**2 > NEEDLE * double_area) & (length > longest)
+    needle = (length**2 > _NEEDLE * double_area) & (length > longest)
     turned = (sides[needle].argmax(axis=1)[:, None] + np.arange(3)) % 3  # the longest side comes first
     a, b, c = np.take_along_axis(corners[needle], turned[:, :, None], axis=1).transpose(1, 0, 2)
     foot = a + (dot(c - a, b - a) / dot(b - a, b - a))[:, None] * (b - a)  # of the height on the longest side
@@ -323,14 +306,3 @@ def _halved(target: Target, points: Floats, faces: Ints, *, longest: float) -> t
         quarters = [np.column_stack(corners) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
         faces = np.concatenate([faces[~long], *quarters])
     return points, faces
-
-
-def _ends_of(target: Target, plan: Floats, z: Floats, inner: Ints, outer: Ints) -> tuple[Floats, Floats]:
-    """Where the sides from inner to outer points meet the surface's end: the last points (k, 2) inside, and heights."""
-    low, high, height = plan[inner].copy(), plan[outer].copy(), z[inner].copy()
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        there, within = _lifted(target, middle)
-        low[within], height[within] = middle[within], there[within]
-        high[~within] = middle[~within]
-    return low, height

@@ -7,12 +7,14 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csc_matrix, diags
 
 from rodshell.arrays import Floats, Ints, Longs
 from rodshell.kernels import njit
 from rodshell.threads import in_threads, threads
 from rodshell.validation import brief
 
+ANGLE = (1.0, 0.0, 0.0)  # the direction of a twist angle's block that is used
 WORTHWHILE = 300_000  # values from which on threads share the assembly
 
 
@@ -26,10 +28,9 @@ class Freedom:
     A direction of zero length is blocked: it stays among the unknowns, where a solver puts 1 on the diagonal, so that
     nodes that touch and leave at each step of a motion need no new pattern of the matrix.
 
-    Parameters
-    ----------
-    directions : (n, 3, 3); `directions[i, k]` is the k-th free direction of block i, orthonormal.
-    count : (n,) number of free directions, 0 to 3.
+    Args:
+        directions: (n, 3, 3); `directions[i, k]` is the k-th free direction of block i, orthonormal.
+        count: (n,) number of free directions, 0 to 3.
     """
 
     directions: Floats
@@ -46,13 +47,7 @@ class Freedom:
         return Freedom(directions, np.full(blocks, 3, dtype=np.intp))
 
     def with_directions(self, blocks: Ints, *directions: tuple[float, float, float]) -> "Freedom":
-        """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed).
-
-        Parameters
-        ----------
-        blocks : (k,) indices of blocks.
-        directions : orthonormal vectors, up to three.
-        """
+        """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed)."""
         table, count = self.directions.copy() if directions else self.directions, self.count.copy()
         for k, direction in enumerate(directions):
             table[blocks, k] = direction
@@ -81,39 +76,19 @@ class Freedom:
         return np.flatnonzero(~self.directions[block, k].any(axis=1))
 
     def expand(self, q: Floats) -> Floats:
-        """Displacements (n, 3) of reduced DOFs (size,).
-
-        Parameters
-        ----------
-        q : (size,) values of the reduced DOFs.
-        """
+        """Displacements (n, 3) of reduced DOFs (size,)."""
         return np.asarray(_expand(np.ascontiguousarray(q), self.directions, self.count))
 
     def reduce(self, gradient: Floats) -> Floats:
-        """Components (size,) of a gradient (n, 3) in the free directions.
-
-        Parameters
-        ----------
-        gradient : (n, 3) [N].
-        """
+        """Components (size,) of a gradient (n, 3) in the free directions."""
         return np.asarray(_reduce(np.ascontiguousarray(gradient), self.directions, self.count, self.size))
 
     def within(self, gradient: Floats) -> Floats:
-        """The part (n, 3) of a gradient that acts along the free directions.
-
-        Parameters
-        ----------
-        gradient : (n, 3) [N].
-        """
+        """The part of a gradient (n, 3) that acts along the free directions."""
         return self.expand(self.reduce(gradient))
 
     def reduce_diagonal(self, diagonal: Floats) -> Floats:
-        """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses.
-
-        Parameters
-        ----------
-        diagonal : (n, 3) components of d.
-        """
+        """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses."""
         block, k = self._slots
         return np.asarray(np.einsum("ij,ij->i", diagonal[block], self.directions[block, k] ** 2))
 
@@ -134,9 +109,8 @@ class Assembly:
     The pattern depends on which blocks the elements touch and on how many free directions each block has, not on the
     directions. Compressed columns, rows ascending, every diagonal present.
 
-    Parameters
-    ----------
-    indptr, indices : the pattern (CSC, upper triangle).
+    Args:
+        indptr, indices: the pattern (CSC, upper triangle).
     """
 
     indptr: Longs
@@ -150,13 +124,7 @@ class Assembly:
 
     @staticmethod
     def of(element_blocks: Sequence[Ints], freedom: Freedom) -> "Assembly":
-        """Plan the assembly of element sets on `element_blocks`, (m, k) each, in the directions of `freedom`.
-
-        Parameters
-        ----------
-        element_blocks : of each element set, (m, k) blocks of its elements.
-        freedom : free directions of all blocks.
-        """
+        """Plan the assembly of element sets on `element_blocks`, (m, k) each, in the directions of `freedom`."""
         widths = np.array([blocks.shape[1] for blocks in element_blocks], dtype=np.int64)
         numbers = np.array([len(blocks) for blocks in element_blocks], dtype=np.int64)
         flat = np.concatenate([np.arange(0), *(blocks.ravel() for blocks in element_blocks)])
@@ -175,11 +143,9 @@ class Assembly:
     def assemble(self, hessians: Sequence[Floats], element_blocks: Sequence[Ints], freedom: Freedom) -> Floats:
         """(nnz,) values of the reduced Hessian, from the element Hessians (m, 3k, 3k) and blocks (m, k) of each set.
 
-        Parameters
-        ----------
-        hessians : of each element set, (m, 3k, 3k) element Hessians; empty: none of this set.
-        element_blocks : of each element set, (m, k) blocks of its elements.
-        freedom : free directions, as many of each block as in the plan.
+        Args:
+            hessians: of each set; empty: none of this set.
+            freedom: free directions, as many of each block as in the plan.
         """
         data, every = np.zeros(len(self.indices)), zip(hessians, element_blocks, self._slots, strict=True)
         sets = [(hessian, blocks, slots) for hessian, blocks, slots in every if len(hessian)]
@@ -193,15 +159,8 @@ class Assembly:
         return data
 
     def add(self, index: int, hessian: Floats, blocks: Ints, freedom: Freedom, data: Floats) -> None:
-        """Add the Hessians (m, 3k, 3k) of the element set `index`, on `blocks` (m, k), to the values `data` (nnz,).
-
-        Parameters
-        ----------
-        hessian : (m, 3k, 3k) element Hessians.
-        blocks : (m, k) blocks of the elements.
-        freedom : free directions, as many of each block as in the plan.
-        data : (nnz,) values to which theirs are added.
-        """
+        """Add the Hessians (m, 3k, 3k) of the element set `index`, on `blocks` (m, k), to the values `data` (nnz,);
+        `freedom` as of `assemble`."""
         if len(blocks):
             every = 0, len(self._count)
             _scatter(hessian, blocks, self._slots[index], self._count, self._above, freedom.directions, *every, data)
@@ -216,13 +175,23 @@ class Assembly:
         stops = np.searchsorted(np.cumsum(self._count), columns).tolist()
         return list(pairwise([0, *stops[1:-1], len(self._count)]))
 
+    def upper(self, data: Floats) -> csc_matrix:
+        """The upper triangle (dofs, dofs) of the matrix with the values `data` (nnz,)."""
+        size = len(self.indptr) - 1
+        return csc_matrix((data, self.indices, self.indptr), shape=(size, size))
+
+    def matrix(self, data: Floats) -> csc_matrix:
+        """Both triangles (dofs, dofs) of the matrix with the values `data` (nnz,)."""
+        upper = self.upper(data)
+        return csc_matrix(upper + upper.T - diags(upper.diagonal()))
+
     @property
     def diagonal(self) -> Ints:
         """Positions of the diagonal in the values."""
         return np.asarray(self.indptr[1:] - 1)
 
 
-@njit()
+@njit("i1 i1 i1 i1")
 def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
     """The pattern by unknowns, every diagonal present; rows above each diagonal block; where the values of each pair of
     an element's blocks begin, those of all elements in a row, (k, k) of each, -1 if they are not stored; and the
@@ -322,7 +291,7 @@ def _pattern(flat, numbers, widths, count):  # type: ignore[no-untyped-def]
     return indptr, indices, above, slots, begins, starts, ascending
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("f3 i2 i3 i1 i1 f3 i i f1", nogil=True)
 def _scatter(hessians, blocks, slots, count, above, directions, low, high, data):  # type: ignore[no-untyped-def]
     """Add T' H T of every element, in the columns of blocks from `low` to before `high`; T holds the free directions of
     its blocks as columns."""
@@ -359,7 +328,7 @@ def _scatter(hessians, blocks, slots, count, above, directions, low, high, data)
                     base += above[j] + c + 1
 
 
-@njit()
+@njit("f1 f3 i1")
 def _expand(q, directions, count):  # type: ignore[no-untyped-def]
     result, at = np.zeros((len(count), 3)), 0
     for i in range(len(count)):
@@ -370,7 +339,7 @@ def _expand(q, directions, count):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit()
+@njit("f2 f3 i1 i")
 def _reduce(gradient, directions, count, size):  # type: ignore[no-untyped-def]
     result, at = np.empty(size), 0
     for i in range(len(count)):

@@ -18,14 +18,12 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from rodshell.arrays import Floats, Ints
-from rodshell.joints import Joint, Linker
+from rodshell.joints import Joint
 from rodshell.joints.crossings import RodNodes, stencils
 from rodshell.joints.joint import elastic_joints, resists
-from rodshell.joints.relative_rotation import RelativeRotation
+from rodshell.joints.relative_rotation import RelativeRotation, is_elastic
 from rodshell.model.shell import Shell
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements, each_curvature, each_gradient
-from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
+from rodshell.rods.elements import Elements, each_curvature, each_gradient, is_bends
 
 EA, EI1, EI2, GJ, LENGTH = range(5)
 PROPERTIES = 5
@@ -36,13 +34,12 @@ PROBE = 1e-4  # of a stiffness next to a joint: its forces' change is then exact
 class EdgeProperties:
     """How a shell's energies follow from the properties of its edges. Build it with `of`.
 
-    Parameters
-    ----------
-    shell : the shell; its blocks and source frames stay as they are.
-    joint : one for all crossings, or one for each.
-    before, after : (b,) edge before and after each bend; of a clamp the last edge, twice.
-    table : (e, 5) its own properties, in the order EA, EI1, EI2, GJ, length.
-    weight : (e,) weight per length over EA of each edge, which loads its nodes [1/m]; None: rods have no weight.
+    Args:
+        shell: the shell; its blocks and source frames stay as they are.
+        joint: one for all crossings, or one for each.
+        before, after: (b,) edge before and after each bend; of a clamp the last edge, twice.
+        table: (e, 5) its own properties, in the order EA, EI1, EI2, GJ, length.
+        weight: (e,) weight per length over EA of each edge, which loads its nodes [1/m]; None: rods have no weight.
     """
 
     shell: Shell
@@ -56,10 +53,9 @@ class EdgeProperties:
     def of(shell: Shell, joint: Joint | Sequence[Joint], table: Floats) -> "EdgeProperties":
         """Of a shell whose rods share their nodes or lie in layers.
 
-        Parameters
-        ----------
-        joint : one for all its crossings, or one for each.
-        table : (e, 5) its edges' EA [N], EI1, EI2, GJ [N m2] and rest length [m].
+        Args:
+            joint: one for all its crossings, or one for each.
+            table: (e, 5) its edges' EA [N], EI1, EI2, GJ [N m2] and rest length [m].
         """
         rods = shell.mesh.edge_rods
         inner = np.flatnonzero(rods[1:] == rods[:-1])
@@ -69,12 +65,7 @@ class EdgeProperties:
         return EdgeProperties(shell, joint, np.append(inner, ends), np.append(inner + 1, ends), table)
 
     def varied(self, table: Floats) -> "EdgeProperties":
-        """The shell whose edges have other properties.
-
-        Parameters
-        ----------
-        table : (e, 5) the properties of the edges.
-        """
+        """The shell whose edges have other properties (e, 5)."""
         joints = iter(self._joints(self._at_nodes(table)))
         elements = tuple(self._with_stiffness(element, table, joints) for element in self.shell.elements)
         edges = self.shell.stretch
@@ -82,21 +73,11 @@ class EdgeProperties:
         return replace(self, shell=replace(self.shell.with_elements(elements), stretch=stretch), table=table)
 
     def at(self, elements: Sequence[Elements]) -> "EdgeProperties":
-        """The same with other source frames.
-
-        Parameters
-        ----------
-        elements : those of the shell, with their source frames at another state.
-        """
+        """The same with the shell's `elements` as they are with their source frames at another state."""
         return replace(self, shell=self.shell.with_elements(tuple(elements)))
 
     def load(self, size: int) -> Floats:
-        """(size, 3) weight of the edges, half at either node, downwards [N].
-
-        Parameters
-        ----------
-        size : number of blocks of the state.
-        """
+        """(size, 3) weight of the edges on the blocks, half at either node, downwards [N]."""
         result = np.zeros((size, 3))
         if self.weight is not None:
             half = 0.5 * self.weight * self.table[:, EA] * self.table[:, LENGTH]
@@ -107,9 +88,8 @@ class EdgeProperties:
     def gradient_slopes(self, state: Floats) -> csr_array:
         """(3N, 5e) derivatives of the gradient, less the weight, by the logarithms of the properties [N, N m].
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad], at or near the source frames.
+        Args:
+            state: (N, 3) node positions [m] and twist angles [rad], at or near the source frames.
         """
         stretch, edges = self.shell.stretch, np.arange(len(self.table))
         total = csr_array((state.size, self.table.size))
@@ -131,10 +111,9 @@ class EdgeProperties:
     def curvature_slopes(self, state: Floats, motion: Floats) -> Floats:
         """(5e,) derivatives of v'Hv by the logarithms of the properties [J], H being the Hessian.
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad], at or near the source frames.
-        motion : (N, 3) displacements v [m, rad].
+        Args:
+            state: (N, 3) node positions [m] and twist angles [rad], at or near the source frames.
+            motion: (N, 3) displacements v [m, rad].
         """
         stretch, result = self.shell.stretch, np.zeros(self.table.shape)
         for part, by_edge in self._parts():
@@ -147,18 +126,10 @@ class EdgeProperties:
         return result.ravel()
 
     def _with_stiffness(self, element: Elements, table: Floats, joints: Iterator[RelativeRotation]) -> Elements:
-        if isinstance(element, IsotropicBend):
-            return replace(element, stiffness=self._in_series(table, EI1, len(element.blocks)))
-        if isinstance(element, BendTwist):
-            count = len(element.blocks)
-            bend = np.column_stack([self._in_series(table, kind, count) for kind in (EI1, EI2)])
-            if not element.bend_stiffness.any():  # its bending is another's, see `Shell`
-                bend[:] = 0.0
-            return replace(element, bend_stiffness=bend, twist_stiffness=self._in_series(table, GJ, count))
-        if isinstance(element, RelativeRotation):
-            now = next(joints)
-            return replace(element, stiffness=now.stiffness, deviators=now.deviators)
-        return element
+        if is_bends(element):
+            per_length = [self._in_series(table, kind, len(element.blocks)) for kind in (EI1, EI2, GJ)]
+            return element.with_stiffness(np.column_stack(per_length))
+        return element.with_stiffness_of(next(joints)) if is_elastic(element) else element
 
     def _in_series(self, table: Floats, kind: int, count: int) -> Floats:
         """(count,) stiffness of the half edges at the first bends [N m]."""
@@ -168,18 +139,9 @@ class EdgeProperties:
 
     def _parts(self) -> Iterator[tuple[Elements, csr_array]]:
         """Energies with one stiffness each, and the derivatives (b, 5e) of the logarithms of their stiffnesses."""
-        for element in self.shell.elements:
-            if isinstance(element, IsotropicBend):
-                kinds: tuple[int, ...] = (EI1,)
-            elif isinstance(element, IsotropicBendTwist):
-                kinds = (EI1, GJ)
-            elif isinstance(element, BendTwist):
-                kinds = (EI1, EI2, GJ)
-            else:
-                continue
-            parts: tuple[Elements, ...] = element.parts
-            for part, kind in zip(parts, kinds, strict=True):
-                yield part, self._by_properties(kind, len(element.blocks))
+        for element in filter(is_bends, self.shell.elements):
+            for part, modulus in zip(element.parts, element.moduli, strict=True):
+                yield part, self._by_properties(EI1 + modulus, len(element.blocks))
 
     def _by_properties(self, kind: int, count: int) -> csr_array:
         half, before, after = 0.5 * self.table[:, LENGTH] / self.table[:, kind], self.before[:count], self.after[:count]
@@ -217,29 +179,23 @@ class EdgeProperties:
         return np.asarray(length / compliance)
 
     @property
-    def _of_crossings(self) -> tuple[Ints, list[Joint]]:
-        """The crossings whose joints are not linkers, and these joints."""
-        count = len(self.shell.mesh.grid.crossings)
-        each = self.joint if isinstance(self.joint, Sequence) else (self.joint,) * count
-        kept = [k for k, joint in enumerate(each) if not isinstance(joint, Linker)]
-        return np.array(kept, dtype=np.intp), [each[k] for k in kept]
+    def _every_joint(self) -> Sequence[Joint]:
+        """That of each crossing."""
+        return self.joint if isinstance(self.joint, Sequence) else (self.joint,) * len(self.shell.mesh.grid.crossings)
 
     def _joints(self, at_nodes: Floats) -> tuple[RelativeRotation, ...]:
         """The elastic joints of rods with these stiffnesses (k, 3) at their nodes."""
-        if not any(isinstance(element, RelativeRotation) for element in self.shell.elements):
-            return ()
-        crossings, joints = self._of_crossings
-        return elastic_joints(self._rod_nodes, crossings, joints, at_nodes, len(self.shell.like))  # type: ignore[arg-type]
+        joints = self._every_joint
+        return elastic_joints(self._rod_nodes, np.arange(len(joints)), joints, at_nodes, len(self.shell.like))
 
     def _of_joints(self, evaluate: Callable[[RelativeRotation], Floats]) -> Iterator[tuple[Floats, Ints, csr_array]]:
         """Derivatives (m, ..) of what is evaluated of each joint by the logarithm of one stiffness of one of its
         sections; the joints' blocks; and the derivatives (m, 5e) of that logarithm by those of the properties."""
-        present = [element for element in self.shell.elements if isinstance(element, RelativeRotation)]
+        present = [*filter(is_elastic, self.shell.elements)]
         if not present:
             return
         nodes, at_nodes = self._rod_nodes, self._at_nodes(self.table)
-        crossings, joints = self._of_crossings
-        pairs = nodes.at_crossings[[k for k, joint in zip(crossings, joints, strict=True) if resists(joint)]]  # type: ignore[arg-type]
+        pairs = nodes.at_crossings[[resists(joint) for joint in self._every_joint]]
         rows = [pairs[stencil.members] for stencil in stencils(nodes, pairs)]
         for side in range(2):
             for kind in range(3):
@@ -250,10 +206,7 @@ class EdgeProperties:
                     probed.append(self._joints(changed))
                 by_edge = self._of_nodes(kind, at_nodes)
                 for element, at, ahead, behind in zip(present, rows, *probed, strict=True):
-                    values = [
-                        evaluate(replace(element, stiffness=there.stiffness, deviators=there.deviators))
-                        for there in (ahead, behind)
-                    ]
+                    values = [evaluate(element.with_stiffness_of(there)) for there in (ahead, behind)]
                     yield (values[0] - values[1]) / (2.0 * PROBE), element.blocks, by_edge[at[:, side]]
 
     def _of_nodes(self, kind: int, at_nodes: Floats) -> csr_array:

@@ -16,30 +16,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csc_matrix
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
-from rodshell.model.assembly import Freedom
+from rodshell.model.assembly import ANGLE, Freedom
 from rodshell.model.potential import Potential
-from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements, Stretch
+from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods, ghost_position
+from rodshell.rods.bend_twist import BendTwist, frames_among
+from rodshell.rods.elements import BendElements, Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.validation import brief, described, direction, finite, flag, short, vector
 
 Natural = Literal["straight", "rest"] | ArrayLike
-_ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
 
 
 @dataclass(frozen=True, eq=False)
 class RodStrains:
     """Strains of a rod; its b bends are those of the inner nodes in turn, then those of the clamped ends.
 
-    Parameters
-    ----------
-    axial : (edges,) [-].
-    curvature : (b, 2) towards m1 and m2, per unit length [1/m].
-    twist : (b,) per unit length [rad/m].
+    Args:
+        axial: (edges,) [-].
+        curvature: (b, 2) towards m1 and m2, per unit length [1/m].
+        twist: (b,) per unit length [rad/m].
     """
 
     axial: Floats
@@ -57,22 +55,21 @@ class ElasticRod:
     frame is transported from its source, at first the rest shape, to a state by the smallest rotation; `refreshed`
     moves the source and is called after each accepted step.
 
-    Parameters
-    ----------
-    rest : (n, 3) rest positions of the nodes [m].
-    closed : a ring; its last edge leads back to the first node.
-    elements : bending and twist: `BendTwist`; where the rod is isotropic and naturally straight
-        `IsotropicBendTwist`, or `IsotropicBend` if it has no twist angles.
-    mass : (N, 3) lumped mass of each block's components: of a node [kg]; of a twist angle the rotary inertia
-        [kg m2] in component 0, else 0. Ghosts have none.
-    bend_lengths : (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
-    clamp_tangents : (c, 3) unit tangents along the rod there at rest.
-    free_spin : the energy does not change when the rod spins about itself together with its ends.
+    Args:
+        rest: (n, 3) rest positions of the nodes [m].
+        closed: a ring; its last edge leads back to the first node.
+        elements: bending and twist: `BendTwist`; where the rod is isotropic and naturally straight
+            `IsotropicBendTwist`, or `IsotropicBend` if it has no twist angles.
+        mass: (N, 3) lumped mass of each block's components: of a node [kg]; of a twist angle the rotary inertia
+            [kg m2] in component 0, else 0. Ghosts have none.
+        bend_lengths: (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
+        clamp_tangents: (c, 3) unit tangents along the rod there at rest.
+        free_spin: the energy does not change when the rod spins about itself together with its ends.
     """
 
     rest: Floats
     closed: bool
-    elements: tuple[Elements, ...]
+    elements: tuple[BendElements, ...]
     stretch: Stretch
     mass: Floats
     bend_lengths: Floats
@@ -98,26 +95,24 @@ class ElasticRod:
     ) -> "ElasticRod":
         """A rod through given nodes, whose edges have their rest lengths there.
 
-        Parameters
-        ----------
-        rest : (n, 3) nodes [m].
-        rod : the same for all edges, one for each, or a function of the arc length [m] of the edge's middle. Between
-            two edges the compliances of their halves add up.
-        closed : a ring: a last edge leads back to the first node.
-        natural : "straight"; "rest", free of stress at rest, frames included; or (b, 2) curvatures towards m1
-            and m2 per unit length [1/m] at the inner nodes (of a ring: at all nodes), or (2,) for all.
-        natural_twist : per unit length [rad/m], (b,) or one for all; added to that of the rest shape if natural.
-        twist : give the rod twist angles. An open, isotropic, naturally straight and untwisted rod does not need them
-            as long as nothing holds or loads its frames (it may spin in its clamps): it bends in the same way, at
-            less cost.
-        director : first material director m1, (3,) of the first edge, transported along without twist, or (edges, 3);
-            its part across the edge is used. By default z, or x where the rod starts within 25 degrees of z.
-        clamped : ends that are clamped, ("start", "end"), or the tangent along the rod at each as it is at rest,
-            {"start": (1, 0, 0)}; by default that of the two edges next to the end, to second order.
+        Args:
+            rest: (n, 3) nodes [m].
+            rod: the same for all edges, one for each, or a function of the arc length [m] of the edge's middle. Between
+                two edges the compliances of their halves add up.
+            closed: a ring: a last edge leads back to the first node.
+            natural: "straight"; "rest", free of stress at rest, frames included; or (b, 2) curvatures towards m1
+                and m2 per unit length [1/m] at the inner nodes (of a ring: at all nodes), or (2,) for all.
+            natural_twist: per unit length [rad/m], (b,) or one for all; added to that of the rest shape if natural.
+            twist: give the rod twist angles. An open, isotropic, naturally straight and untwisted rod does not need
+                them as long as nothing holds or loads its frames (it may spin in its clamps): it bends in the same way,
+                at less cost.
+            director: first material director m1, (3,) of the first edge, transported along without twist, or (edges,
+                3); its part across the edge is used. By default z, or x where the rod starts within 25 degrees of z.
+            clamped: ends that are clamped, ("start", "end"), or the tangent along the rod at each as it is at rest,
+                {"start": (1, 0, 0)}; by default that of the two edges next to the end, to second order.
 
-        Raises
-        ------
-        InputError : an argument is of the wrong kind or shape, or they exclude each other.
+        Raises:
+            InputError: an argument is of the wrong kind or shape, or they exclude each other.
         """
         closed, twist = flag("closed", closed), flag("twist", twist)
         line = RodLine.of(rest, closed=closed, clamped=clamped)
@@ -127,7 +122,7 @@ class ElasticRod:
         rate = finite("natural_twist", natural_twist, int(bends.like.max()) + 1)[bends.like]
         straight = isinstance(natural, str) and natural == "straight"
         free_spin = straight and bool((bends.stiffness[:, 0] == bends.stiffness[:, 1]).all())
-        elements: Elements
+        elements: BendElements
         if twist:
             elements = _bend_twist(line, bends, line.directors(director), natural, rate, isotropic=free_spin)
         elif closed or not free_spin or rate.any():
@@ -172,14 +167,13 @@ class ElasticRod:
     @property
     def bend_energy(self) -> float:
         """EI/L [J] of the softer direction, the mean along the rod: about the energy of a bend by a radian."""
-        bends = self.elements[0]
-        stiffness = bends.stiffness if isinstance(bends, IsotropicBend) else self._bend_twist.bend_stiffness.min(axis=1)
+        stiffness = self.elements[0].bend_stiffness.min(axis=1)
         return float((stiffness * self.bend_lengths).mean() / self.length)
 
     @property
     def twists(self) -> bool:
         """Whether the rod has twist angles."""
-        return isinstance(self.elements[0], BendTwist)
+        return bool(self.elements[0].angle_columns)
 
     @property
     def nodes(self) -> slice:
@@ -208,7 +202,7 @@ class ElasticRod:
 
     def freedom(self) -> Freedom:
         """Nodes free in space, angles in their component; clamps fixed: the end, its ghost and their angle."""
-        free = Freedom.free(self.block_count).with_directions(np.arange(self.block_count)[self.angles], _ANGLE)
+        free = Freedom.free(self.block_count).with_directions(np.arange(self.block_count)[self.angles], ANGLE)
         return free.with_directions(np.concatenate([self.clamped_nodes, self.ghosts, self.ghost_angles]))
 
     # States
@@ -221,15 +215,13 @@ class ElasticRod:
     ) -> Floats:
         """(N, 3) state of the rod.
 
-        Parameters
-        ----------
-        positions : (n, 3) of the nodes [m]; by default those at rest.
-        angles : (edges,) twist angles [rad]; by default 0.
-        tangents : of the clamps, along the rod; by default those at rest. Their twist angles are 0.
+        Args:
+            positions: (n, 3) of the nodes [m]; by default those at rest.
+            angles: (edges,) twist angles [rad]; by default 0.
+            tangents: of the clamps, along the rod; by default those at rest. Their twist angles are 0.
 
-        Raises
-        ------
-        InputError : an array has another shape; the rod has no twist angles; a tangent is for an end not clamped.
+        Raises:
+            InputError: an array has another shape; the rod has no twist angles; a tangent is for an end not clamped.
         """
         for end in tangents or {}:
             if end not in self.clamps:
@@ -245,64 +237,33 @@ class ElasticRod:
             state[self.angles, 0] = finite("the twist angles of this rod", angles, self.edge_count)
         for k, end in enumerate(self.clamps):
             tangent = direction(f'the tangent at the "{end}"', (tangents or {}).get(end, self.clamp_tangents[k]))
-            state[self.ghosts[k]] = self.ghost_position(end, state[self.clamped_nodes[k]], tangent)
+            at = state[self.clamped_nodes[k]]
+            state[self.ghosts[k]] = ghost_position(end, at, self.stretch.rest_lengths, tangent)
         return state
-
-    def ghost_position(self, end: End, position: Floats, tangent: Floats) -> Floats:
-        """(3,) position of the ghost node of a clamp [m].
-
-        Parameters
-        ----------
-        position : (3,) of the end [m].
-        tangent : (3,) unit tangent along the rod there.
-        """
-        edge = 0 if end == "start" else self.edge_count - 1
-        return np.asarray(position + (-1 if end == "start" else 1) * self.stretch.rest_lengths[edge] * tangent)
 
     def refreshed(self, state: Floats) -> "ElasticRod":
         """The same rod with its source frames moved to `state`: no strain and no angle changes."""
         return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
 
-    def reference_directors(self, state: Floats) -> Floats:
-        """(edges + clamps, 3) first reference director of each edge, then of each ghost edge, at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def reference_directors(self, state: State) -> Floats:
+        """(edges + clamps, 3) first reference director of each edge, then of each ghost edge, at `state` (N, 3)."""
         bends = self._bend_twist.refreshed(state)
         directors = np.empty((self.block_count, 3))
         for side in range(2):
             directors[bends.blocks[:, 1 + 2 * side]] = bends.source_directors[:, side]
         return np.vstack([directors[self.angles], directors[self.ghost_angles]])
 
-    def material_frames(self, state: Floats) -> Floats:
-        """(edges, 3, 3) rows m1, m2, t of each edge at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def material_frames(self, state: State) -> Floats:
+        """(edges, 3, 3) rows m1, m2, t of each edge at `state` (N, 3)."""
         edge = state[self.stretch.blocks[:, 1]] - state[self.stretch.blocks[:, 0]]
         d1, t = self.reference_directors(state)[: self.edge_count], unit(edge)
         theta = state[self.angles, :1]
         m1 = np.cos(theta) * d1 + np.sin(theta) * cross(t, d1)
         return np.stack([m1, cross(t, m1), t], axis=1)
 
-    def strains(self, state: Floats) -> RodStrains:
-        """Strains at `state` (N, 3); without twist angles there are no directors: curvatures are (size, 0).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
-        bends = self.elements[0]
-        if isinstance(bends, IsotropicBend):
-            curvature = bends.curvatures(state)
-            strains = np.column_stack([curvature, 0 * curvature, 0 * curvature])
-        else:
-            strains = self._bend_twist.strains(state)
-        strains = strains / self.bend_lengths[:, None]
+    def strains(self, state: State) -> RodStrains:
+        """Strains at `state` (N, 3); without twist angles there are no directors: curvatures are (size, 0)."""
+        strains = self.elements[0].strains(state) / self.bend_lengths[:, None]
         return RodStrains(self.stretch.strains(state), strains[:, :2], strains[:, 2])
 
     def energy(self, state: Floats) -> float:
@@ -313,23 +274,12 @@ class ElasticRod:
         """(N, 3) gradient of the energy at `state` (N, 3) [N, for angles N m]."""
         return self._potential.gradient(state)
 
-    def hessian(self, state: Floats, freedom: Freedom | None = None) -> csc_matrix:
-        """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        freedom : free directions of the blocks.
-        """
+    def hessian(self, state: State, freedom: Freedom | None = None) -> csc_matrix:
+        """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's."""
         return self._potential.matrix(state, self.freedom() if freedom is None else freedom)
 
     def weight(self, gravity: ArrayLike) -> Floats:
-        """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2].
-
-        Parameters
-        ----------
-        gravity : (3,) acceleration [m/s2].
-        """
+        """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2]."""
         load = np.zeros_like(self.mass)
         load[self.nodes] = self.mass[self.nodes] * vector("gravity", gravity)
         return load
@@ -340,8 +290,7 @@ class ElasticRod:
 
     @property
     def _bend_twist(self) -> BendTwist:
-        bends = self.elements[0]
-        if not isinstance(bends, BendTwist):
+        if (bends := frames_among(self.elements)) is None:
             raise InputError("this rod has no frames: build it with twist=True")
         return bends
 
@@ -351,10 +300,9 @@ def _bend_twist(
 ) -> BendTwist:
     """Bending and twist with the natural strains that are asked for.
 
-    Parameters
-    ----------
-    directors : (edges, 3) first material directors at rest.
-    twist_rate : (b,) natural twist per length [rad/m].
+    Args:
+        directors: (edges, 3) first material directors at rest.
+        twist_rate: (b,) natural twist per length [rad/m].
     """
     state, frames = bends.rest_state(line, directors)
     elements = (IsotropicBendTwist if isotropic else BendTwist).starting_at(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.sparse import csc_matrix, diags
+from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats, Ints
 from rodshell.kernels import njit
@@ -51,12 +51,7 @@ class Potential:
         return result
 
     def product(self, state: Floats, motion: Floats) -> Floats:
-        """(N, 3) product of the Hessian with displacements.
-
-        Parameters
-        ----------
-        motion : (N, 3) displacements [m, rad].
-        """
+        """(N, 3) product of the Hessian with displacements (N, 3) [m, rad]."""
         result = np.zeros_like(motion)
         for of_set, blocks in zip(self.hessians(state), self.blocks, strict=True):  # summed by rows: fewer digits lost
             forces = np.einsum("mij,mj->mi", of_set, motion[blocks].reshape(len(blocks), 3 * blocks.shape[1]))
@@ -70,9 +65,7 @@ class Potential:
     def matrix(self, state: Floats, free: Freedom) -> csc_matrix:
         """(dofs, dofs) Hessian in the free directions, both triangles."""
         assembly = Assembly.of(self.blocks, free)
-        data = assembly.assemble(self.hessians(state), self.blocks, free)
-        upper = csc_matrix((data, assembly.indices, assembly.indptr), shape=(free.size, free.size))
-        return csc_matrix(upper + upper.T - diags(upper.diagonal()))
+        return assembly.matrix(assembly.assemble(self.hessians(state), self.blocks, free))
 
 
 def room_for(sets: Sequence[Ints]) -> list[Floats]:
@@ -81,20 +74,14 @@ def room_for(sets: Sequence[Ints]) -> list[Floats]:
 
 
 def product(hessians: Sequence[Floats], sets: Sequence[Ints], motion: Floats) -> Floats:
-    """(N, 3) product of a sum of element Hessians with displacements.
-
-    Parameters
-    ----------
-    hessians, sets : of each set, (m, 3k, 3k) and its blocks (m, k).
-    motion : (N, 3) displacements [m, rad].
-    """
+    """(N, 3) product of a sum of element Hessians, (m, 3k, 3k) on blocks (m, k) of each set, with displacements."""
     result = np.zeros_like(motion)
     for of_set, blocks in zip(hessians, sets, strict=True):
         _add_product(of_set, blocks, motion, result)
     return result
 
 
-@njit()
+@njit("f3 i2 f2 f2")
 def _add_product(hessians, blocks, motion, result):  # type: ignore[no-untyped-def]
     """Add to `result` (n, 3) what elements with `hessians` (m, 3k, 3k) on `blocks` (m, k) make of displacements."""
     for m in range(blocks.shape[0]):

@@ -25,14 +25,13 @@ _FOLDED = -1 + 1e-9  # cosine of a turn that has no curvature
 class RodLine:
     """Nodes in a row and what follows from them. Build it with `of`.
 
-    Parameters
-    ----------
-    nodes : (n, 3) [m].
-    closed : a ring: the last edge leads back to the first node.
-    edges : (e, 2) nodes of each edge.
-    tangents : (e, 3) unit tangents of the edges.
-    lengths : (e,) of the edges [m].
-    clamps : (3,) unit tangent along the rod at each clamped end.
+    Args:
+        nodes: (n, 3) [m].
+        closed: a ring: the last edge leads back to the first node.
+        edges: (e, 2) nodes of each edge.
+        tangents: (e, 3) unit tangents of the edges.
+        lengths: (e,) of the edges [m].
+        clamps: (3,) unit tangent along the rod at each clamped end.
     """
 
     nodes: Floats
@@ -46,19 +45,15 @@ class RodLine:
 
     @staticmethod
     def of(rest: ArrayLike, *, closed: bool, clamped: Clamps) -> "RodLine":
-        """The line through nodes, clamped at some ends.
+        """The line through the nodes (n, 3) of an unloaded rod [m], or a ring, clamped at some ends.
 
-        Parameters
-        ----------
-        rest : (n, 3) nodes of the unloaded rod [m].
-        closed : a ring: the last edge leads back to the first node.
-        clamped : "start" and "end" as far as they are clamped, or these with a tangent (3,) along the rod; without, the
-            tangent is extrapolated from the last two edges.
+        Args:
+            clamped: "start" and "end" as far as they are clamped, or these with a tangent (3,) along the rod; without,
+                the tangent is extrapolated from the last two edges.
 
-        Raises
-        ------
-        InputError : there are fewer than 3 nodes, an edge has no length, the rod folds back on itself, or a clamp is
-            not an end or points against the rod.
+        Raises:
+            InputError: there are fewer than 3 nodes, an edge has no length, the rod folds back on itself, or a clamp is
+                not an end or points against the rod.
         """
         count = _points(rest)
         nodes = finite("the positions of a rod's nodes", rest, count, 3).copy()
@@ -79,13 +74,8 @@ class RodLine:
     def rods(self, rod: Rods) -> list[Rod]:
         """The rod of each edge: the same for all, one for each, or a function of the arc length of its middle [m].
 
-        Parameters
-        ----------
-        rod : one rod, a sequence of them, or a function.
-
-        Raises
-        ------
-        InputError : they are not rods, or not as many as there are edges.
+        Raises:
+            InputError: they are not rods, or not as many as there are edges.
         """
         count = len(self.lengths)
         if isinstance(rod, Rod):
@@ -103,10 +93,9 @@ class RodLine:
     def directors(self, director: ArrayLike | None) -> Floats:
         """(e, 3) first material directors of the edges.
 
-        Parameters
-        ----------
-        director : (3,) of the first edge, transported along the rod without twist; (e, 3) of each edge; None: z, or x
-            where the rod starts within 25 degrees of z.
+        Args:
+            director: (3,) of the first edge, transported along the rod without twist; (e, 3) of each edge; None: z, or
+                x where the rod starts within 25 degrees of z.
         """
         if director is None:
             director = (0.0, 0.0, 1.0) if abs(self.tangents[0, 2]) < 0.9 else (1.0, 0.0, 0.0)
@@ -119,18 +108,9 @@ class RodLine:
         nodes = np.arange(len(self.nodes)) if self.closed else np.arange(1, len(self.nodes) - 1)
         return nodes, np.column_stack([(nodes - 1) % len(self.nodes), nodes])
 
-    def ghost(self, end: End) -> Floats:
-        """(3,) position of the ghost node of a clamped end, one last edge past it [m]."""
-        edge, node, outward = (0, 0, -1.0) if end == "start" else (-1, -1, 1.0)
-        return np.asarray(self.nodes[node] + outward * self.lengths[edge] * self.clamps[end])
-
     def end_director(self, directors: Floats, end: End) -> Floats:
-        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges.
-
-        Parameters
-        ----------
-        directors : (e, 3) first material directors of the edges.
-        """
+        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges, by
+        the directors (e, 3) of the edges."""
         order = slice(0, 2) if end == "start" else slice(-1, -3, -1)
         (d0, d1), (t0, t1), (l0, l1) = directors[order], self.tangents[order], self.lengths[order]
         twist = signed_angle(parallel_transport(d1, t1, t0), d0, t0)  # from the inner edge to the last
@@ -139,12 +119,8 @@ class RodLine:
         return np.asarray(np.cos(turn) * moved + np.sin(turn) * cross(tangent, moved))
 
     def mass(self, size: int, rods: list[Rod], angles: slice) -> Floats:
-        """(size, 3) lumped mass of each block: half of each edge's at either node [kg]; rotary inertia [kg m2].
-
-        Parameters
-        ----------
-        angles : blocks of the twist angles, or empty.
-        """
+        """(size, 3) lumped mass of each block: half of each edge's at either node [kg]; rotary inertia [kg m2] in those
+        of the twist angles, if there are any."""
         mass = np.zeros((size, 3))
         half = 0.5 * self.lengths * [rod.mass_per_length for rod in rods]
         for side in range(2):
@@ -158,14 +134,13 @@ class RodLine:
 class RodBends:
     """The bends of a rod: at its inner nodes in turn, then at its clamps. Build them with `of`.
 
-    Parameters
-    ----------
-    size : number of blocks of the rod.
-    angles : blocks of the edges' twist angles.
-    blocks : (b, 5) as of `BendTwist`; without twist angles the numbers of angles mean nothing.
-    lengths : (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
-    stiffness : (b, 3) EI1, EI2 and GJ over that length [N m].
-    like : (b,) the inner node whose natural strains it shares, counted from the first.
+    Args:
+        size: number of blocks of the rod.
+        angles: blocks of the edges' twist angles.
+        blocks: (b, 5) as of `BendTwist`; without twist angles the numbers of angles mean nothing.
+        lengths: (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
+        stiffness: (b, 3) EI1, EI2 and GJ over that length [N m].
+        like: (b,) the inner node whose natural strains it shares, counted from the first.
     """
 
     size: int
@@ -181,11 +156,10 @@ class RodBends:
     def of(line: RodLine, stiffness: Floats, twist: bool) -> "RodBends":
         """The bends of a line.
 
-        Parameters
-        ----------
-        stiffness : (e, 3) EI1, EI2 and GJ of the edges [N m2]; the compliances of the half edges on either side of a
-            node add up.
-        twist : the rod has twist angles.
+        Args:
+            stiffness: (e, 3) EI1, EI2 and GJ of the edges [N m2]; the compliances of the half edges on either side of a
+                node add up.
+            twist: the rod has twist angles.
         """
         n, (middles, edges) = len(line.nodes), line.inner_bends()
         angles = slice(n, n + (len(line.edges) if twist else 0))
@@ -206,19 +180,25 @@ class RodBends:
         return RodBends(size, angles, blocks, lengths, at_bends, like)
 
     def rest_state(self, line: RodLine, directors: Floats) -> tuple[Floats, Floats]:
-        """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges.
-
-        Parameters
-        ----------
-        directors : (e, 3) first material directors of its edges.
-        """
+        """(size, 3) state at rest, and in the rows of the twist angles the directors (e, 3) of their edges."""
         state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))
         state[: len(line.nodes)], frames[self.angles] = line.nodes, directors
-        for k, end in enumerate(line.clamps):
+        for k, (end, tangent) in enumerate(line.clamps.items()):
             ghost = self.angles.stop + k
-            state[ghost] = line.ghost(end)
+            state[ghost] = ghost_position(end, line.nodes[0 if end == "start" else -1], line.lengths, tangent)
             frames[ghost + len(line.clamps)] = line.end_director(directors, end)
         return state, frames
+
+
+def ghost_position(end: End, position: Floats, lengths: Floats, tangent: Floats) -> Floats:
+    """(3,) position of the ghost node of a clamped end, one last edge of the rod past it [m].
+
+    Args:
+        position, tangent: (3,) of the end, and along the rod there.
+        lengths: (e,) of the rod's edges [m].
+    """
+    edge, outward = (0, -1.0) if end == "start" else (-1, 1.0)
+    return np.asarray(position + outward * lengths[edge] * tangent)
 
 
 def _points(rest: ArrayLike) -> int:

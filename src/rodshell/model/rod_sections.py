@@ -21,13 +21,12 @@ from rodshell.validation import brief
 class RodSections:
     """What the elements of a shell are made from; rod node k is entry k of `mesh.rod_nodes`. Build it with `of`.
 
-    Parameters
-    ----------
-    edges : (e, 3) EI1, EI2 and GJ of each edge [N m2].
-    nodes : (k, 3) the same at each rod node; at a rod's end that of its last edge.
-    stretch : (e,) EA of each edge [N].
-    mass : (e,) per length [kg/m].
-    rotary_inertia : (e,) about the tangent, per length [kg m].
+    Args:
+        edges: (e, 3) EI1, EI2 and GJ of each edge [N m2].
+        nodes: (k, 3) the same at each rod node; at a rod's end that of its last edge.
+        stretch: (e,) EA of each edge [N].
+        mass: (e,) per length [kg/m].
+        rotary_inertia: (e,) about the tangent, per length [kg m].
     """
 
     edges: Floats
@@ -42,14 +41,11 @@ class RodSections:
     def of(mesh: GridMesh, rods: Sequence[Rod]) -> "RodSections":
         """The sections of a mesh.
 
-        Parameters
-        ----------
-        mesh : of m rods, with their profiles.
-        rods : m, what each is where its factor is 1.
+        Args:
+            rods: of each of its rods what it is where the factor of its profile is 1.
 
-        Raises
-        ------
-        InputError : a profile changes a length that the section does not have.
+        Raises:
+            InputError: a profile changes a length that the section does not have.
         """
         rod_of, of_rods = mesh.rod_of, _uniform(rods)
         nodes = of_rods[:3].T.take(rod_of, axis=0)
@@ -96,9 +92,8 @@ def _inverse(rod: Rod, varies: str, factors: Floats) -> Floats:
 def varied_rods(mesh: GridMesh, rods: Rod | Sequence[Rod]) -> Iterator[tuple[Rod, Profile, Ints]]:
     """The rods whose sections change, those that are alike together: rod, profile, and their entries of `rod_nodes`.
 
-    Parameters
-    ----------
-    rods : the same for all, or m.
+    Args:
+        rods: the same for all, or m.
     """
     each = rods if isinstance(rods, Sequence) else (rods,) * len(mesh.grid.rods)
     alike: dict[tuple[Rod, Profile], list[Ints]] = {}
@@ -118,13 +113,8 @@ def shares(mesh: GridMesh, entries: Ints) -> Floats:
 
 
 def varied_at_nodes(mesh: GridMesh, rod: Rod) -> Varied | None:
-    """What the sections change at each entry (k,) of `rod_nodes`; None where all rods are uniform.
-
-    Parameters
-    ----------
-    mesh : the rods, with their profiles.
-    rod : what each is where its factor is 1.
-    """
+    """What the sections change at each entry (k,) of `rod_nodes`, from rods that are all the same where their factor is
+    1; None where all rods are uniform."""
     found = list(varied_rods(mesh, rod))
     if not found:
         return None

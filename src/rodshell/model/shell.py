@@ -10,7 +10,7 @@ mass of that block is divided equally among its copies, so that none is counted 
 Eccentric joints lay the rods in two layers, whose mesh gives each rod its own nodes (`GridMesh.in_layers`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle, unit
 from rodshell.joints import (
@@ -27,28 +27,26 @@ from rodshell.joints import (
     ExplicitPenalty,
     ImplicitPenalty,
     Joint,
-    Linker,
     SharedDofs,
     Ties,
     require_joint,
 )
-from rodshell.joints.crossings import Corners, LinkerBend, RodNodes
+from rodshell.joints.crossings import UP, Corners, LinkerBend, RodNodes
 from rodshell.joints.joint import elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
-from rodshell.model.assembly import Freedom
+from rodshell.model.assembly import ANGLE, Freedom
 from rodshell.model.potential import Potential
 from rodshell.model.rod_sections import RodSections
-from rodshell.rods.bend_twist import BendTwist
+from rodshell.rods.bend_twist import BendTwist, frames_among
 from rodshell.rods.elements import Elements, Stretch, turned, with_frames
 from rodshell.rods.isotropic import IsotropicBend
-from rodshell.rods.joints import Elastic
 from rodshell.rods.section import Rod
+from rodshell.rods.supports import CLAMPED, PINNED
 from rodshell.validation import flag, instance
 
-UP = (0.0, 0.0, 1.0)
 OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
-ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
+Direction = tuple[float, float, float]
 Item = TypeVar("Item")
 COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
 
@@ -57,22 +55,23 @@ COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
 class Shell:
     """The assembled shell. Build it with `of`.
 
-    Parameters
-    ----------
-    mesh : its nodes and edges, rods sharing their nodes at joints.
-    coupling : how rods that meet at a joint are tied.
-    node_count : number of the rods' nodes: the mesh's, or more where rods do not share them.
-    within : energies of single rods and linkers: bending, and twist where needed.
-    between : energies between rods and linkers: joints and ties.
-    ends : (2m,) block of each rod end, start and end of each rod in turn.
-    ghosts : (2m,) block of the ghost node past each end, or empty if the ends are pinned.
-    angles : number of twist angles, or 0.
-    spinning : (s,) block of one twist angle of each rod that could otherwise spin about itself.
-    like : (N,) the block of the shared form that each block copies: with shared DOFs the block itself.
-    edge_mass : (e,) mass of each edge [kg].
-    edge_inertia : (e,) moment of inertia of each edge about its tangent [kg m2].
-    joint_mass : (c,) mass of each crossing's joint [kg].
-    turn : (2, 2) how the flat grid, from which frames are transported, is turned in its plane, of rows x, y.
+    Args:
+        mesh: its nodes and edges, rods sharing their nodes at joints.
+        coupling: how rods that meet at a joint are tied.
+        node_count: number of the rods' nodes: the mesh's, or more where rods do not share them.
+        within: energies of single rods and linkers: bending, and twist where needed.
+        between: energies between rods and linkers: joints and ties.
+        ends: (2m,) block of each rod end, start and end of each rod in turn.
+        ghosts: (2m,) block of the ghost node past each end, or empty if the ends are pinned.
+        angles: number of twist angles, or 0.
+        spinning: (s,) block of one twist angle of each rod that could otherwise spin about itself.
+        like: (N,) the block of the shared form that each block copies: with shared DOFs the block itself.
+        edge_mass: (e,) mass of each edge [kg].
+        edge_inertia: (e,) moment of inertia of each edge about its tangent [kg m2].
+        joint_mass: (c,) mass of each crossing's joint [kg].
+        springs: energies of the supports, which act on the rods' ends.
+        slides: orthonormal directions along which rod ends may move, by the number of the end; others are held.
+        turns: (g, 2, 2) how each flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
 
     mesh: GridMesh
@@ -89,10 +88,12 @@ class Shell:
     edge_mass: Floats
     edge_inertia: Floats
     joint_mass: Floats
-    turn: Floats = field(default_factory=lambda: np.eye(2))
+    springs: tuple[Elements, ...] = ()
+    slides: Mapping[int, Sequence[Direction]] = field(default_factory=dict)
+    turns: Floats = field(default_factory=lambda: np.eye(2)[None])
 
     def __repr__(self) -> str:
-        ends = "clamped" if len(self.ghosts) else "pinned"
+        ends = CLAMPED if len(self.ghosts) else PINNED
         coupled = "" if isinstance(self.coupling, SharedDofs) else f", {self.coupling.name} coupling"
         return f"Shell({self.node_count} nodes, {len(self.stretch.blocks)} edges, {ends}{coupled})"
 
@@ -105,37 +106,38 @@ class Shell:
         joint: Joint | Sequence[Joint] | None = None,
         coupling: Coupling | None = None,
         twist: bool | None = None,
+        isotropic: bool | None = None,
     ) -> "Shell":
         """Assemble a mesh.
 
-        Parameters
-        ----------
-        mesh : if joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
-        rod : the same for all, or one for each rod of the grid; where a rod of the grid has a profile, its section
-            changes along it. Linkers without a rod of their own have the unchanged section.
-        clamped : each rod continues to a ghost node past its end that holds its direction there. The end's Voronoi
-            length is half its last edge, so that the clamp acts exactly at the end (second order). A rod may spin in
-            its clamp.
-        joint : the same for all, or one for each crossing of the grid; None: ball joints.
-        coupling : None: shared DOFs. Eccentric joints are tied by springs with any coupling.
-        twist : give the rods twist angles; None: if any energy depends on them.
+        Args:
+            mesh: if joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
+            rod: the same for all, or one for each rod of the grid; where a rod of the grid has a profile, its section
+                changes along it. Linkers without a rod of their own have the unchanged section.
+            clamped: each rod continues to a ghost node past its end that holds its direction there. The end's Voronoi
+                length is half its last edge, so that the clamp acts exactly at the end (second order). A rod may spin
+                in its clamp.
+            joint: the same for all, or one for each crossing of the grid; None: ball joints.
+            coupling: None: shared DOFs. Eccentric joints are tied by springs with any coupling.
+            twist: give the rods twist angles; None: if any energy depends on them.
+            isotropic: False: give all rods frames, as one of them needs in a larger shell; None: if these rods need
+                them.
 
-        Raises
-        ------
-        InputError : an argument is of the wrong kind; rods or joints are not as many as those of the grid; joints
-            exclude each other; `twist` is False although an energy depends on twist angles.
+        Raises:
+            InputError: an argument is of the wrong kind; rods or joints are not as many as those of the grid; joints
+                exclude each other; `twist` is False although an energy depends on twist angles.
         """
         instance("mesh", mesh, GridMesh)
         require_joint(joint)
         if coupling is not None:
             instance("coupling", coupling, Coupling, COUPLING)
         clamped, twist = flag("clamped", clamped), None if twist is None else flag("twist", twist)
-        return _Builder(mesh, rod, joint, coupling or SharedDofs(), clamped, twist).shell()
+        return _Builder(mesh, rod, joint, coupling or SharedDofs(), clamped, twist, isotropic).shell()
 
     @property
     def elements(self) -> tuple[Elements, ...]:
         """All energies but the stretch, those of explicit ties included: an equilibrium is the same."""
-        return (*self.within, *self.between)
+        return (*self.within, *self.between, *self.springs)
 
     @property
     def energies(self) -> Potential:
@@ -146,6 +148,16 @@ class Shell:
     def explicit(self) -> tuple[Elements, ...]:
         """The elements whose forces a motion freezes at the start of each step."""
         return self.between if isinstance(self.coupling, ExplicitPenalty) else ()
+
+    @cached_property
+    def frames(self) -> BendTwist | None:
+        """The elements that carry the rods' material frames; None where rods have none."""
+        return frames_among(self.within)
+
+    @property
+    def yields(self) -> bool:
+        """Whether its supports let the rods' ends move."""
+        return bool(self.slides or self.springs)
 
     @property
     def first_angle(self) -> int:
@@ -187,12 +199,11 @@ class Shell:
     def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
         """(N, 3) state of the shell.
 
-        Parameters
-        ----------
-        positions : (n, 3) of the mesh's nodes [m].
-        tangents : (2m, 3) outward unit tangents at the rod ends, which clamped ends need.
-        normals : (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
-            None: the directors are those of the flat grid, moved by the smallest rotation.
+        Args:
+            positions: (n, 3) of the mesh's nodes [m].
+            tangents: (2m, 3) outward unit tangents at the rod ends, which clamped ends need.
+            normals: (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
+                None: the directors are those of the flat grid, moved by the smallest rotation.
         """
         shared = np.zeros((int(self.like.max()) + 1, 3))
         shared[: len(positions)] = positions
@@ -204,13 +215,8 @@ class Shell:
             self._turn_directors(state, normals)
         return state
 
-    def positions(self, state: Floats) -> Floats:
-        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def positions(self, state: State) -> Floats:
+        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean."""
         if self.node_count == self.mesh.node_count:  # nodes that rods share
             return state[: self.node_count].copy()
         result, visits = np.zeros((self.mesh.node_count, 3)), np.zeros(self.mesh.node_count)
@@ -227,56 +233,48 @@ class Shell:
         return free.with_directions(turning, ANGLE).with_directions(self.spinning)
 
     def with_elements(self, elements: tuple[Elements, ...]) -> "Shell":
-        """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere.
+        """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere."""
+        first, last = len(self.within), len(self.within) + len(self.between)
+        return replace(self, within=elements[:first], between=elements[first:last], springs=elements[last:])
 
-        Parameters
-        ----------
-        elements : those within rods and linkers, then those between them.
-        """
-        count = len(self.within)
-        return replace(self, within=elements[:count], between=elements[count:])
+    @cached_property
+    def grid_of(self) -> Ints:
+        """(N,) which of the grids that lie side by side each block belongs to."""
+        of_rods = self.mesh.grid_of_rods
+        of_ends, of_edges = np.repeat(of_rods, 2), of_rods[self.mesh.edge_rods]
+        of_angles = np.append(of_edges, of_ends)[: self.angles]
+        return np.concatenate([self.mesh.grid_of_nodes, of_ends[: len(self.ghosts)], of_angles])[self.like]
 
-    def turned(self, turn: Floats) -> "Shell":
-        """The same shell of a flat grid that is turned in its plane, so that no edge of a shell that lies the other way
-        round has to be turned right round from there.
-
-        Parameters
-        ----------
-        turn : (2, 2), of rows x, y.
-        """
-        frames = self.with_elements(tuple(turned(element, turn) for element in self.elements))
-        return replace(frames, turn=self.turn @ turn)
+    def turned(self, turns: Floats) -> "Shell":
+        """The same shell of flat grids that are turned in their plane (g, 2, 2), of rows x, y, so that no edge of a
+        shell that lies the other way round has to be turned right round from there."""
+        of_grids = [turns[self.grid_of[element.blocks[:, 0]]] for element in self.elements]
+        frames = self.with_elements(tuple(map(turned, self.elements, of_grids)))
+        return replace(frames, turns=self.turns @ turns)
 
     def with_frames_of(self, elements: tuple[Elements, ...]) -> "Shell":
-        """The same shell with the source frames of another one, so that twist angles mean the same in both.
-
-        Parameters
-        ----------
-        elements : of a shell on the same mesh with other stiffnesses, in the same order.
-        """
+        """The same shell with the source frames of the elements of another one on the same mesh, with other
+        stiffnesses, so that twist angles mean the same in both."""
         return self.with_elements(tuple(map(with_frames, self.elements, elements)))
 
     def held_ends(self) -> Freedom:
-        """As `freedom`, with every rod end held in place."""
-        return self.freedom().with_directions(self.ends)
+        """As `freedom`, with every rod end held in place, or along all but its directions."""
+        held = self.freedom().with_directions(self.ends)
+        for end, directions in self.slides.items():
+            held = held.with_directions(self.ends[[end]], *directions)
+        return held
 
     def _turn_directors(self, state: Floats, normals: Floats) -> None:
         """Set the twist angles so that the first directors are as near to the normals as they can be."""
         flat = self.mesh.flat[self.mesh.edges]
         before, now = (unit(np.diff(ends, axis=1)[:, 0]) for ends in (flat, state[self.stretch.blocks]))
-        before[:, :2] @= self.turn
+        before[:, :2] = (before[:, None, :2] @ self.turns[self.grid_of[self.stretch.blocks[:, 0]]])[:, 0]
         moved = parallel_transport(adapted(np.broadcast_to(UP, before.shape), before), before, now)
         wanted = adapted(unit(normals[self.mesh.edges].sum(axis=1)), now)
         self.turn_edges(state, signed_angle(moved, wanted, now))
 
     def turn_edges(self, state: Floats, turns: Floats) -> None:
-        """Add `turns` (e,) [rad] to the twist angles in `state` of the rods' edges and their copies.
-
-        Parameters
-        ----------
-        state : (N, 3), which is changed.
-        turns : (e,) of the mesh's edges [rad].
-        """
+        """Add `turns` (e,) [rad] to the twist angles in `state` of the mesh's edges and their copies."""
         first = self.mesh.node_count + len(self.ghosts)
         turning = np.flatnonzero((self.like >= first) & (self.like < first + len(turns)))
         state[turning, 0] += turns[self.like[turning] - first]
@@ -293,6 +291,7 @@ class _Builder:
         coupling: Coupling,
         clamped: bool,
         twist: bool | None,
+        isotropic: bool | None = None,
     ) -> None:
         for item in rod if isinstance(rod, Sequence) else (rod,):
             instance("rod", item, Rod)
@@ -308,7 +307,9 @@ class _Builder:
         self.mesh, self.coupling = mesh, coupling
         self.sections = RodSections.of(mesh, self.rods)
         self.stiffness = self.sections.nodes
-        self.isotropic = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
+        self.curved = any(line.curve is not None for line in mesh.grid.rods)
+        alike = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
+        self.isotropic = isotropic is not False and alike and not self.curved
         needed = not self.isotropic or any(item.turns_frames for item in self.joints)
         self.twist = needed if twist is None else twist
         if needed and not self.twist:
@@ -345,11 +346,13 @@ class _Builder:
 
     def _spinning(self) -> Ints:
         """Block of the first twist angle of each rod that could spin about itself."""
-        if not (self.isotropic and self.twist):
+        if not self.twist:
             return np.empty(0, dtype=np.intp)
+        round_rods = np.logical_and.reduceat(self.stiffness[:, 0] == self.stiffness[:, 1], self.mesh.rod_start)
         holding = self._of_joints(lambda joint: joint.holds_normals, bool)
         held = np.unique(self.mesh.grid.crossings.rods[holding])
-        loose = np.setdiff1d(np.arange(len(self.rods)), held)
+        bent = [k for k, line in enumerate(self.mesh.grid.rods) if line.curve is not None]
+        loose = np.setdiff1d(np.flatnonzero(round_rods), [*held, *bent])
         return self.first_angle + np.searchsorted(self.mesh.edge_rods, loose)
 
     def _bends(self) -> tuple[Elements, ...]:
@@ -384,7 +387,14 @@ class _Builder:
             rows[::2], pairs[::2] = rows[::2, ::-1], pairs[::2, ::-1]
             nodes, angles = np.vstack([nodes, rows]), np.vstack([angles, pairs])
             per_length = np.vstack([per_length, at_clamps])
-        return (self._bend_twist(nodes, angles, per_length[:, :2], per_length[:, 2]),)
+        bend_twist = self._bend_twist(nodes, angles, per_length[:, :2], per_length[:, 2])
+        if not self.curved:
+            return (bend_twist,)
+        at_rest = mesh.rest_curvatures.compress(inner) * mesh.voronoi_lengths
+        if len(self.ghosts):
+            at_rest = np.append(at_rest, mesh.rest_curvatures[ends] * 0.5 * last_edges(mesh))
+        turned = -2.0 * np.tan(0.5 * at_rest)  # m2 = t x z is on the right
+        return (replace(bend_twist, natural_curvature=np.column_stack([0.0 * turned, turned])),)
 
     def _bend_twist(self, nodes: Ints, angles: Ints, bend: Floats, twist: Floats) -> BendTwist:
         blocks = np.column_stack([nodes[:, 0], angles[:, 0], nodes[:, 1], angles[:, 1], nodes[:, 2]])
@@ -401,18 +411,14 @@ class _Builder:
 
     def _elastic(self) -> tuple[Elements, ...]:
         """Joints other than linkers."""
-        elastic = [isinstance(joint, Elastic) and joint.turns_frames for joint in self.joints]
-        if not any(elastic):
-            return ()
-        crossings = np.flatnonzero(np.array(elastic)[self.joint_of])
-        joints = [self.joints[kind] for kind in self.joint_of[crossings].tolist()]
-        return elastic_joints(self.rod_nodes, crossings, joints, self.stiffness, self.size)
+        joints = [self.joints[kind] for kind in self.joint_of.tolist()]
+        return elastic_joints(self.rod_nodes, np.arange(len(joints)), joints, self.stiffness, self.size)
 
     def _linkers(self) -> tuple[list[Elements], list[Elements]]:
         """Linkers, and the ties of those with their own unknowns, whose blocks are added here."""
         linkers, ties = list[Elements](), list[Elements]()
         for kind, joint in enumerate(self.joints):
-            if not isinstance(joint, Linker):
+            if not joint.corners:
                 continue
             crossings = np.flatnonzero(self.joint_of == kind)
             corners = Corners.of(self.rod_nodes, crossings, joint.corners)
@@ -445,21 +451,23 @@ class _Builder:
         if not self.apart:
             return []
         eccentricity = self._of_joints(lambda joint: joint.eccentricity)
-        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not isinstance(joint, Linker), bool)
+        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not joint.corners, bool)
         pairs = self.rod_nodes.blocks[self.rod_nodes.at_crossings[centric]]
         ties = [_ties(pairs, self._penalties()[0])] if centric.any() else []
         return [*ties, *offset_ties(self.rod_nodes, eccentricity, self._offset_stiffness(), self.size)]
 
-    def _offset_stiffness(self) -> float:
-        """Stiffness of eccentric ties [N/m].
+    def _offset_stiffness(self) -> Floats:
+        """(c,) stiffness of eccentric ties [N/m].
 
         Ties a hundred thousand times stiffer, as of a penalty, would have a geometric stiffness that outweighs bending
         already at the micrometres by which rods miss their distance in an initial guess.
         """
+        mesh, rods = self.mesh, self.mesh.grid.crossings.rods
         if not isinstance(self.coupling, SharedDofs):
-            return self._penalties()[0]
-        edge = np.median(self.mesh.edge_lengths)
-        return OFFSET_STIFFNESS * min(rod.stretch_stiffness for rod in self.rods) / edge
+            return np.full(len(rods), self._penalties()[0])
+        edges = np.array([np.median(grid.edge_lengths) for grid in mesh.grids])
+        least = min(rod.stretch_stiffness for rod in self.rods)
+        return OFFSET_STIFFNESS * least / edges[mesh.grid_of_rods[rods[:, 0]]]
 
     def _penalties(self) -> tuple[float, float]:
         """C1 [N/m] and C2 [N m/rad]; by default those of the softest rod."""

@@ -26,11 +26,10 @@ def with_apron(
     Pieces of a line become one rod where the net continues between them. Lines that are crossed only there become
     virtual rods. A rod keeps its end where the net ends.
 
-    Parameters
-    ----------
-    rods : each from end to end of the target.
-    lines : offsets of the lines of the lattice, see `ChebyshevNet` [m].
-    clearance : distance of the first joint past an end from that end, at least [m].
+    Args:
+        rods: each from end to end of the target.
+        lines: offsets of the lines of the lattice, see `ChebyshevNet` [m].
+        clearance: distance of the first joint past an end from that end, at least [m].
     """
     u, v = lines
     rows, columns = np.searchsorted(net.u, u - 1e-12), np.searchsorted(net.v, v - 1e-12)
@@ -53,17 +52,13 @@ def with_apron(
 class _Family:
     """The lines of one family, and its rods on them. A stretch of a line ends where the net has no node.
 
-    Parameters
-    ----------
-    name : "u" or "v".
-    stations : (n,) where the lines are crossed [m].
-    offsets : (m,) of the lines [m].
-    live : (m, n) where the net has nodes.
-    clearance : see `with_apron` [m].
+    Args:
+        stations: (n,) where the lines are crossed [m].
+        offsets: (m,) of the lines [m].
+        live: (m, n) where the net has nodes.
 
-    Attributes
-    ----------
-    joints : (m, n) the nodes of all rods, and of `RINGS` more past their ends.
+    Attributes:
+        joints: (m, n) the nodes of all rods, and of `RINGS` more past their ends.
     """
 
     def __init__(
@@ -88,7 +83,7 @@ class _Family:
         return rods, np.searchsorted(kept, self.stretch_of)
 
 
-@njit()
+@njit("f1 f1 b2 f2 f")
 def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-untyped-def]
     """Of each node (m, n) its stretch; of each stretch (k,) its line; of each rod (r,) its stretch; of each stretch its
     first rod, or -1, and where its rods start and end (k, 2); and the joints (m, n), see `_Family`. Each of `rods`
@@ -130,7 +125,7 @@ def _stretches(stations, offsets, live, rods, clearance):  # type: ignore[no-unt
     return stretches, line_of, stretch_of, first_rod, ends, joints
 
 
-@njit()
+@njit("f1 i2 b2 i1 f2")
 def _prolong(stations, stretches, joints, first_rod, ends):  # type: ignore[no-untyped-def]
     """The stretches (k,) with rods, or with at least two `joints` (m, n), and their ends (k, 2), moved to these."""
     count, kept, used = np.zeros(len(ends), dtype=np.int64), np.empty(len(ends), dtype=np.int64), 0

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import cos, degrees, pi, sin
-from string import ascii_lowercase
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from rodshell.geometry.curves import nearest_four
 from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.flatgrid import Family
-from rodshell.layout.gridlayout import rod_names
+from rodshell.layout.gridlayout import piece_names, rod_names
 from rodshell.nets.compass import ON_SURFACE, Axes, axes
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
@@ -29,30 +28,29 @@ from rodshell.targets import Target
 from rodshell.units import length_text, shown
 from rodshell.validation import instance, number, point
 
-SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
+_SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
 SEARCHES = (2, 4, 8)  # steps per spacing of the march that finds the lines; more where the net extends further
 LOOSE = 0.05  # spacings: a larger error of a rod end gives a warning
-GRAZING = 0.01  # spacings: a line that is nowhere further inside than this runs along the end, and is ignored
+_GRAZING = 0.01  # spacings: a line that is nowhere further inside than this runs along the end, and is ignored
 SHORTEST = 2.0  # spacings: a rod that is no longer has fewer than three joints, and is not built
-AT_JOINT = 1e-5  # edges: a rod that ends this near a joint ends at it, since round-off bends the edge between them
+_AT_JOINT = 1e-5  # edges: a rod that ends this near a joint ends at it, since round-off bends the edge between them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ChebyshevNet:
     """The net of a layout on a target.
 
-    Parameters
-    ----------
-    rods : rods and virtual rods, each from end to end of the target: the footprint G0.
-    lines : offsets of all lines of the lattice near the target [m]: `lines[0]` (nu,) are the u of the lines of family
-        v, `lines[1]` (nv,) the v of those of family u.
-    net : the finer march, from which positions are taken.
-    error_estimate : largest |G0(fine) - G0(coarse)| / 3 over all ends of rods that are longer than two spacings: the
-        error before extrapolation [m].
-    min_angle : smallest angle between the families on the target [rad].
-    min_angle_at : x, y, z of the point where it is [m].
-    dropped : rods of the layout that are not in `rods`, with the reason.
-    pieces : of each rod of the layout that is on the target in several pieces, the names of those in `rods`.
+    Args:
+        rods: rods and virtual rods, each from end to end of the target: the footprint G0.
+        lines: offsets of all lines of the lattice near the target [m]: `lines[0]` (nu,) are the u of the lines of
+            family v, `lines[1]` (nv,) the v of those of family u.
+        net: the finer march, from which positions are taken.
+        error_estimate: largest |G0(fine) - G0(coarse)| / 3 over all ends of rods that are longer than two spacings: the
+            error before extrapolation [m].
+        min_angle: smallest angle between the families on the target [rad].
+        min_angle_at: x, y, z of the point where it is [m].
+        dropped: rods of the layout that are not in `rods`, with the reason.
+        pieces: of each rod of the layout that is on the target in several pieces, the names of those in `rods`.
     """
 
     target: Target
@@ -68,17 +66,8 @@ class ChebyshevNet:
     warnings: tuple[str, ...]
 
     def positions(self, rod: FlatRod, s: Floats) -> Floats:
-        """Interpolate the net along a rod, by local cubics.
-
-        Parameters
-        ----------
-        rod : one of `rods`, or a piece of one.
-        s : (n,) material coordinates [m].
-
-        Returns
-        -------
-        (n, 3) points [m].
-        """
+        """Points (n, 3) [m] at the material coordinates `s` (n,) [m] of one of `rods`, or of a piece of one, by local
+        cubics."""
         return self._along((rod,), np.zeros(1, dtype=np.intp), s, np.arange(len(s)), len(s))
 
     def node_positions(self, mesh: GridMesh) -> Floats:
@@ -110,19 +99,17 @@ def chebyshev_net(
 ) -> ChebyshevNet:
     """March the net of `layout` over `target` and cut it at the target's end.
 
-    Parameters
-    ----------
-    anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
-    warm_start : a similar net, from which this one is computed faster; the result is the same to round-off.
-    eccentricity : distance of the rods' centre lines at their joints [m]. Rods of family u are half of it below the
-        target and those of family v half of it above, each on the parallel surface there: a rod's material length is
-        that of its own line, so that the flat grid is the layout's straight lattice, and its ends are over the
-        target's end, along the normal.
+    Args:
+        anchor: x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+        warm_start: a similar net, from which this one is computed faster; the result is the same to round-off.
+        eccentricity: distance of the rods' centre lines at their joints [m]. Rods of family u are half of it below the
+            target and those of family v half of it above, each on the parallel surface there: a rod's material length
+            is that of its own line, so that the flat grid is the layout's straight lattice, and its ends are over the
+            target's end, along the normal.
 
-    Raises
-    ------
-    NetLimitError : the crossing angle falls below 10 degrees or the march fails inside the target; names the place.
-    InputError : the anchor is outside the target, the spacing is too large, or a rod is too short to reach the end.
+    Raises:
+        NetLimitError: the crossing angle falls below 10 degrees or the march fails inside the target; names the place.
+        InputError: the anchor is outside the target, the spacing is too large, or a rod is too short to reach the end.
     """
     instance("target", target, Target)
     instance("layout", layout, GridLayout)
@@ -161,7 +148,7 @@ def chebyshev_net(
     if eccentricity:
         _require_room(target, fine, 0.5 * eccentricity)
     angle, where = _smallest_angle(fine)
-    if degrees(angle) < SMALLEST_ANGLE:
+    if degrees(angle) < _SMALLEST_ANGLE:
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
     cuts, error, loosest = _extrapolate(target, lines, (coarse, fine), min(layout.spacing))
     ends = _at_joints(cuts[0], lines.u, layout), _at_joints(cuts[1], lines.v, layout)
@@ -236,9 +223,8 @@ def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
 def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
     """Smallest angle between the families over the inside nodes [rad], from central differences, and its place.
 
-    Raises
-    ------
-    NetLimitError : a node next to an inside one is missing.
+    Raises:
+        NetLimitError: a node next to an inside one is missing.
     """
     i, j, angle, whole = _sharpest(net.points, net.inside)
     if not whole:
@@ -247,7 +233,7 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
     return angle, (x, y, z)
 
 
-@njit(error_model="numpy")
+@njit("f3 b2")
 def _sharpest(points, inside):  # type: ignore[no-untyped-def]
     """Indices of the inside node with the smallest angle, which has the largest cosine; that angle [rad]; and whether
     the net has all nodes next to the inside ones."""
@@ -278,7 +264,7 @@ def _nearest(ascending: Floats, values: Floats) -> Ints:
     return np.asarray(np.searchsorted(0.5 * (ascending[1:] + ascending[:-1]), values))
 
 
-@njit(error_model="numpy")
+@njit("f1 f1 f3 i1 b1 i1 f1 i1 f2")
 def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: ignore[no-untyped-def]
     """Points of the `nodes` (k,), put into `result`, at the places `s` (k,) of lines of a net, by cubics through the
     four nearest known nodes.
@@ -323,9 +309,10 @@ def _extrapolate(
     sets = list[Lines]()
     for net in nets:
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
-        sets.append(Lines(net.u, *_columns(net.points, net.inside, column)))
+        points, inside = net.points[:, column].swapaxes(0, 1), net.inside[:, column].T
+        sets.append(Lines(net.u, np.ascontiguousarray(points), np.ascontiguousarray(inside)))
         sets.append(Lines(net.v, net.points.take(row, axis=0), net.inside.take(row, axis=0)))
-    cuts = cut_lines(target, sets, depth=GRAZING * spacing)
+    cuts = cut_lines(target, sets, depth=_GRAZING * spacing)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
     in_u, errors_u = extrapolated(cuts[0], cuts[2], len(lines.v), step)
     in_v, errors_v = extrapolated(cuts[1], cuts[3], len(lines.u), step)
@@ -344,19 +331,7 @@ def _extrapolate(
 def _at_joints(cuts: Cuts, stations: Floats, layout: GridLayout) -> Cuts:
     """The cuts of one family's lines, those next to one of the `stations` (n,) where they are crossed moved to it."""
     joints = stations[_nearest(stations, cuts.ends)]
-    return Cuts(cuts.line, np.where(np.abs(cuts.ends - joints) < AT_JOINT * layout.edge, joints, cuts.ends))
-
-
-@njit()
-def _columns(points, inside, columns):  # type: ignore[no-untyped-def]
-    """The nodes (m, n, 3) in some columns of a net (n, k, 3), and which of them are inside (m, n)."""
-    nodes, within = np.empty((len(columns), len(points), 3)), np.empty((len(columns), len(points)), dtype=np.bool_)
-    for m in range(len(columns)):
-        for n in range(len(points)):
-            within[m, n] = inside[n, columns[m]]
-            for k in range(3):
-                nodes[m, n, k] = points[n, columns[m], k]
-    return nodes, within
+    return Cuts(cuts.line, np.where(np.abs(cuts.ends - joints) < _AT_JOINT * layout.edge, joints, cuts.ends))
 
 
 def _name_rods(
@@ -392,16 +367,6 @@ def _name_rods(
             labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
             rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
     return tuple(rods), dropped, broken
-
-
-def piece_names(rod: str, count: int) -> list[str]:
-    """Names of the pieces of a rod: U07, or U07a, U07b, ... if there are several.
-
-    Parameters
-    ----------
-    rod : name of the whole rod.
-    """
-    return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
 
 
 def _require_names(layout: GridLayout, names: list[str]) -> None:

@@ -32,11 +32,10 @@ TOLERANCE = 1e-7  # of the step: Newton doubles the digits, so that a change bel
 class Net:
     """Nodes of a net on a surface.
 
-    Parameters
-    ----------
-    u, v : (nu,), (nv,) ascending material coordinates of the net's lines, both containing 0 [m].
-    points : (nu, nv, 3) positions [m]; NaN where the march found none.
-    heights : of the rods of families u and v above the surface, along its normal [m].
+    Args:
+        u, v: (nu,), (nv,) ascending material coordinates of the net's lines, both containing 0 [m].
+        points: (nu, nv, 3) positions [m]; NaN where the march found none.
+        heights: of the rods of families u and v above the surface, along its normal [m].
     """
 
     u: Floats
@@ -57,42 +56,17 @@ class Net:
 class Axes(NamedTuple):
     """Where the axes of a net cross.
 
-    Parameters
-    ----------
-    anchor : (3,) point of the surface [m].
-    tangents : (4, 3) unit tangents there, towards +u, -u, +v and -v.
+    Args:
+        anchor: (3,) point of the surface [m].
+        tangents: (4, 3) unit tangents there, towards +u, -u, +v and -v.
     """
 
     anchor: Floats
     tangents: Floats
 
 
-def march(
-    target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats, *, heights: Heights = ON_SURFACE
-) -> Net:
-    """March the net from its two axes.
-
-    Parameters
-    ----------
-    u, v : ascending material coordinates of the lines, both containing 0 [m].
-    anchor, heading : see `axes`.
-    heights : see `Net`.
-    """
-    points = np.full((len(u), len(v), 3), np.nan)
-    net = Net(u, v, points, heights=heights)
-    lay_axes(target, net, axes(target, anchor, heading))
-    fill_quadrants(target, net)
-    return net
-
-
 def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERANCE) -> None:
-    """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
-
-    Parameters
-    ----------
-    net : whose points on the axes are set.
-    tolerance : see `geodesics`.
-    """
+    """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer; see `geodesics`."""
     i0, j0 = net.origin
     anchor, tangents = start
     net.points[i0, j0] = anchor
@@ -113,11 +87,10 @@ def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERA
 def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
     """The axes through a point of a surface.
 
-    Parameters
-    ----------
-    anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
-        parts in the tangent plane are used.
+    Args:
+        anchor: (3,) point of the surface where the axes cross [m].
+        heading: (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
+            parts in the tangent plane are used.
     """
     normal = target.level(anchor[None])[1][0]
     along = heading - (heading @ normal / (normal @ normal))[..., None] * normal
@@ -129,9 +102,8 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
 class Layer:
     """The surface parallel to a target, with what a march needs of it.
 
-    Parameters
-    ----------
-    height : of the layer above it, along its normals [m].
+    Args:
+        height: of the layer above it, along its normals [m].
     """
 
     target: Target
@@ -166,16 +138,15 @@ def geodesics(
     The next chord lies in the plane of the last chord's direction and the surface normal at the node, so that
     the curve has no geodesic curvature.
 
-    Parameters
-    ----------
-    start : (k, 3) points of the surface [m].
-    direction : (k, 3) unit tangents there.
-    steps : k arrays of chord lengths [m].
-    tolerance : of Newton's last change of a chord, relative to its length; the error that is left is about its square.
+    Args:
+        start: (k, 3) points of the surface [m].
+        direction: (k, 3) unit tangents there.
+        steps: k arrays of chord lengths [m].
+        tolerance: of Newton's last change of a chord, relative to its length; the error that is left is about its
+            square.
 
-    Returns
-    -------
-    k arrays (len(steps), 3) of points; NaN from where a chord finds no surface.
+    Returns:
+        k arrays (len(steps), 3) of points; NaN from where a chord finds no surface.
     """
     count = len(steps)
     chords = np.zeros((max((len(s) for s in steps), default=0), count))
@@ -198,7 +169,7 @@ def geodesics(
     return [path[: len(s), k] for k, s in enumerate(steps)]
 
 
-@njit()
+@njit("f2 i i1 i f2 f2 f1")
 def _still_going(chords, n, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
     """Of the first `count` geodesics those that have a chord n and were not lost, moved to the front."""
     left = 0
@@ -211,7 +182,7 @@ def _still_going(chords, n, row, count, here, tangent, turn):  # type: ignore[no
     return left
 
 
-@njit(error_model="numpy")
+@njit("f1 i1 f2 f2 f2 f2 f2 f1")
 def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # type: ignore[no-untyped-def]
     """Unit normals at the points `here`, unit tangents `flat` across them, and a first guess (n, 3) of the next points:
     chords that `turn` out of the tangent plane as the last ones did."""
@@ -231,7 +202,7 @@ def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # t
     return ahead
 
 
-@njit(error_model="numpy")
+@njit("f1 i1 f2 f2 f2 f1 f2 f f1 f1 f2")
 def _turn_chords(  # type: ignore[no-untyped-def]
     chord, row, here, flat, normal, value, gradient, tolerance, turn, change, ahead
 ):
@@ -252,7 +223,7 @@ def _turn_chords(  # type: ignore[no-untyped-def]
     return going
 
 
-@njit()
+@njit("f2 i i1 f2 f2 f f1 f1 f2 f3")
 def _end_chords(chords, n, row, here, ahead, tolerance, turn, change, tangent, path):  # type: ignore[no-untyped-def]
     """Continue from the points `ahead` (m, 3), at which the chords n of the first m geodesics of `row` end; NaN in
     `path` (len(chords), k, 3) for those that found none. Returns how many have a next chord, see `_still_going`."""
@@ -269,10 +240,9 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
 
     If only the axes are known, these are on one anti-diagonal after the other.
 
-    Parameters
-    ----------
-    wanted : (nu, nv) nodes to find; default all.
-    tolerance : of Newton's last change of a node, relative to the step; the error that is left is about its square.
+    Args:
+        wanted: (nu, nv) nodes to find; default all.
+        tolerance: of Newton's last change of a node, relative to the step; the error that is left is about its square.
     """
     tried = np.zeros(net.points.shape[:2], dtype=bool) if wanted is None else ~wanted
     diagonal = 2
@@ -284,7 +254,7 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
         _keep(nodes, found, chords, change, sine, tolerance, net.points, tried)
 
 
-@njit()
+@njit("f3 b2 f1 f1 i i i")
 def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
     """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
 
@@ -333,7 +303,7 @@ def _compass(
     return p, change, sine
 
 
-@njit()
+@njit("i2 f2 f2 f1 f1 f f3 b2")
 def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type: ignore[no-untyped-def]
     """Put the points that were `found` (n, 3) in their places; not those that did not converge, nor where the net
     folds: (P - B) x (P - A) no longer points along the normal."""
@@ -345,7 +315,7 @@ def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type
             points[i, j, k] = found[n, k] if good else np.nan
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 f2 f2 ff f1 f2 f3 f f1 f1")
 def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, change, sine):  # type: ignore[no-untyped-def]
     """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
     of the crossing angle before it. Returns whether another step is needed.
@@ -378,13 +348,6 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
     gradient g, to be subtracted from P; and the volume of the three gradients, see `sine_of`.
 
     `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers.
-
-    Parameters
-    ----------
-    x, y : vectors from A and from B to P [m].
-    by_x, by_y : gradients of x^2/2 and y^2/2 by P [m].
-    g : gradient of f at P.
-    from_a, from_b : wanted lengths of x and y [m].
     """
     inverse = inverse_of(by_x, by_y, g)
     return solution(inverse, past(x, from_a), past(y, from_b), level), inverse[3]
@@ -426,14 +389,9 @@ def sine_of(volume, g, from_a, from_b):  # type: ignore[no-untyped-def]
 def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers.
 
-    Parameters
-    ----------
-    p : the point P of the surface [m].
-    a, b : points A and B of their layers [m].
-    g : gradient of f at P.
-    hessian : (3, 3) second derivatives of f at P.
-    heights : (2,) h_u and h_v, of the layers above the surface [m].
-    from_a, from_b : wanted lengths of x and y [m].
+    Args:
+        hessian: (3, 3) second derivatives of f at P.
+        heights: (2,) h_u and h_v, of the layers above the surface [m].
     """
     steep = np.sqrt(dot(g, g))
     n = (g[0] / steep, g[1] / steep, g[2] / steep)

@@ -19,29 +19,19 @@ MOST_STEPS = 100  # of false position; 10 are usual
 class Cuts(NamedTuple):
     """The parts of lines that are on the target, line by line and along each.
 
-    Parameters
-    ----------
-    line : (k,) index of the line of each part, ascending.
-    ends : (k, 2) material coordinates of its ends [m].
+    Args:
+        line: (k,) index of the line of each part, ascending.
+        ends: (k, 2) material coordinates of its ends [m].
     """
 
     line: Ints
     ends: Floats
 
-    def of_line(self, line: int) -> list[list[float]]:
-        """Start and end of each part of one line."""
-        parts: list[list[float]] = self.ends[self.line == line].tolist()
-        return parts
-
 
 def inside_nodes(target: Target, net: Net) -> Bools:
-    """Nodes inside the target's end that are connected with the anchor through inside nodes.
+    """Nodes (nu, nv) inside the target's end that are connected with the anchor through inside nodes.
 
     If the anchor is in an opening, they are connected with the first inside nodes along the axes.
-
-    Returns
-    -------
-    (nu, nv) booleans.
     """
     region = _region(target, net)
     runs, reached = _runs(region), np.zeros_like(region)
@@ -49,7 +39,7 @@ def inside_nodes(target: Target, net: Net) -> Bools:
     return reached
 
 
-@njit()
+@njit("b2 i2 i i b1 b2")
 def _connect(region, runs, i0, j0, found, reached):  # type: ignore[no-untyped-def]
     """The nodes `reached` (nu, nv) of the `region` (nu, nv) that are connected with node (i0, j0), or with the first
     along the axes. A run of nodes, see `_runs`, is found from any of them, or from a run next to it."""
@@ -88,7 +78,7 @@ def _region(target: Target, net: Net) -> Bools:
     return np.asarray(inside)
 
 
-@njit()
+@njit("f3 f1 f1")
 def _squares(points, u, v):  # type: ignore[no-untyped-def]
     """The middle of each square of nodes that are all known: its indices (n, 2) and point (n, 3); and path lengths (n,)
     to the square's corners."""
@@ -110,7 +100,7 @@ def _squares(points, u, v):  # type: ignore[no-untyped-def]
     return middles[:count], at[:count], way[:count]
 
 
-@njit()
+@njit("f3 i2 f1 f1")
 def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
     """Indices (m, 2) and points (m, 3) of the known nodes that are in no square whose end is further than its corners;
     and which of the other nodes (nu, nv) are inside."""
@@ -133,7 +123,7 @@ def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
     return asked[:count], at[:count], inside
 
 
-@njit()
+@njit("i2 f1 b2")
 def _set_inside(asked, margin, inside):  # type: ignore[no-untyped-def]
     for n in range(len(asked)):
         inside[asked[n, 0], asked[n, 1]] = margin[n] > 0.0
@@ -142,11 +132,10 @@ def _set_inside(asked, margin, inside):  # type: ignore[no-untyped-def]
 class Lines(NamedTuple):
     """Lines of one family of a net.
 
-    Parameters
-    ----------
-    s : (n,) material coordinates of the nodes along them [m].
-    points : (m, n, 3) nodes of each line [m]; NaN where there is none.
-    inside : (m, n) which nodes are inside the target's end.
+    Args:
+        s: (n,) material coordinates of the nodes along them [m].
+        points: (m, n, 3) nodes of each line [m]; NaN where there is none.
+        inside: (m, n) which nodes are inside the target's end.
     """
 
     s: Floats
@@ -155,16 +144,12 @@ class Lines(NamedTuple):
 
 
 def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> list[Cuts]:
-    """Cut lines of nets at the target's end, to fourth order between nodes.
+    """For each set the pieces of its lines inside the target's end, which cuts them to fourth order between nodes; none
+    of a line without inside nodes.
 
-    Parameters
-    ----------
-    sets : lines of one family of one net each.
-    depth : pieces that are nowhere further inside than this only graze the end and are ignored [m].
-
-    Returns
-    -------
-    For each set the pieces of its lines; none of a line without inside nodes.
+    Args:
+        sets: lines of one family of one net each.
+        depth: pieces that are nowhere further inside than this only graze the end and are ignored [m].
     """
     runs = _deep(target, sets, [_runs(lines.inside) for lines in sets], depth)
     count = 2 * sum(len(run) for run in runs)
@@ -181,7 +166,7 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
     ]
 
 
-@njit()
+@njit("b2")
 def _runs(inside):  # type: ignore[no-untyped-def]
     """(k, 3) the line, the first and the last node of each run of nodes of `inside` (m, n)."""
     lines, nodes = inside.shape
@@ -213,7 +198,7 @@ def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float)
     return kept
 
 
-@njit()
+@njit("f1 f3 i2 f2 f3 f1 f1")
 def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[no-untyped-def]
     """Four nodes around both ends of each of the `runs` (k, 3): their places `knots` (2k, 4) and points `around`
     (2k, 4, 3); and the places of the nodes between which the end is, `outer` and `inner` (2k,)."""
@@ -234,15 +219,11 @@ def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[
 
 
 def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: Floats) -> Floats:
-    """Where cubics through four nodes each cross the target's end, to round-off.
+    """Where cubics through four nodes each (n, 4, 3) at `knots` (n, 4) [m] cross the target's end, to round-off,
+    between the places `outer` and `inner` (n,) outside and inside of it.
 
-    By false position (Illinois): an end of the bracket that does not move twice is weighted by half in the next step.
-    A root that was found is not evaluated again.
-
-    Parameters
-    ----------
-    knots, points : (n, 4), (n, 4, 3) places of the nodes on their line [m], and the nodes [m].
-    outer, inner : (n,) places outside and inside the end [m].
+    By false position (Illinois): an end of the bracket that does not move twice is weighted by half in the next step. A
+    root that was found is not evaluated again.
     """
     below = np.minimum(target.margin(lagrange(knots, points, outer)), 0.0)
     above = target.margin(lagrange(knots, points, inner))
@@ -256,7 +237,7 @@ def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: 
     return found
 
 
-@njit(error_model="numpy")
+@njit("f1 f2 f3 f1 i1 f2 f2 b")
 def _narrow(value, knots, points, found, index, bracket, there, first):  # type: ignore[no-untyped-def]
     """One step of `_roots`: the brackets of the roots that are left are narrowed by the `value` (n,) at their last
     guess, except the `first` time. Returns how many roots are left: these are moved to the front.
@@ -293,27 +274,22 @@ def _narrow(value, knots, points, found, index, bracket, there, first):  # type:
 
 
 def extrapolated(coarse: Cuts, fine: Cuts, lines: int, step: float) -> tuple[Cuts, Floats]:
-    """Extrapolate the cuts of lines from two marches (Richardson).
+    """The cuts of lines, extrapolated from two marches (Richardson); and for each line a bound (lines,) of the finer
+    march's error [m].
 
     Each end is matched with the nearest of its kind in the coarse march: where a line grazes the end of the target, the
     marches may find different pieces. An end that only the finer march finds is kept; its error is at most about half
     the gap or piece that the other march does not find, or the distance to its nearest end.
 
-    Parameters
-    ----------
-    coarse, fine : cuts of the lines from the two marches.
-    step : distance within which ends are matched [m].
-
-    Returns
-    -------
-    The cuts, and for each line a bound (lines,) of the finer march's error [m].
+    Args:
+        step: distance within which ends are matched [m].
     """
     ends, errors = fine.ends.copy(), np.zeros(lines)
     _extrapolate(coarse.line, coarse.ends, fine.line, fine.ends, step, ends, errors)
     return Cuts(fine.line, ends), errors
 
 
-@njit()
+@njit("i1 f2 i1 f2 f f2 f1")
 def _extrapolate(coarse_line, coarse, line, fine, step, ends, errors):  # type: ignore[no-untyped-def]
     begin, matching = 0, 0
     while begin < len(line):

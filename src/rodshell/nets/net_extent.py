@@ -23,36 +23,27 @@ from rodshell.targets import Target
 from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 
+SURELY = 0.96  # of the margin: the ends of two nets in different steps differ slightly
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
-STRIDE = 0.2  # of the target's size: steps of the first march
+_STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # steps of the first march, from the anchor each way
 ROUGH = 5e-2  # of a step: tolerance of the first march, which leaves its square
-FAIR = 1e-2  # of the size: last motion of the march that finds the lines, see `march_near`
-FEWEST_STEPS = 6  # from each line to the next
+_FAIR = 1e-2  # of the size: last motion of the march that finds the lines, see `march_near`
+_FEWEST_STEPS = 6  # from each line to the next
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Covering(Net):
     """A net that covers a target: its points are known inside the target's end, and some way past it.
 
-    Parameters
-    ----------
-    inside : (nu, nv) nodes inside the target's end, see `inside_nodes`.
+    Args:
+        inside: (nu, nv) nodes inside the target's end, see `inside_nodes`.
     """
 
     inside: Bools
 
     def reach(self, past: int) -> Floats:
-        """How far the inside nodes reach towards -u, +u, -v and +v.
-
-        Parameters
-        ----------
-        past : number of nodes that are added each way.
-
-        Returns
-        -------
-        (4,) [m].
-        """
+        """How far (4,) [m] the inside nodes, and `past` nodes more, reach towards -u, +u, -v and +v."""
         result = list[float]()
         for s, touched in ((self.u, self.inside.any(axis=1)), (self.v, self.inside.any(axis=0))):
             on = np.flatnonzero(touched)
@@ -77,44 +68,36 @@ def march_covering(
 
     Where the target ends is taken from a net in longer steps; where that was wrong, the march is continued.
 
-    Parameters
-    ----------
-    u, v : (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
-    margin : (2,) along u and v [m].
-    near : the net in longer steps.
-    coarser : the same net in yet longer steps, see `march_near`.
-    heights : see `Net`.
-    converged : see `march_near`.
+    Args:
+        u, v: (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
+        margin: (2,) along u and v [m].
+        near, coarser: the net in longer steps, and in yet longer ones, see `march_near`.
+        converged: see `march_near`.
     """
     wanted = wanted_nodes(near, 1, u, v, margin)
     net = march_near(target, u, v, start, near, coarser=coarser, wanted=wanted, heights=heights, converged=converged)
     while True:
         found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
-        if not want_nodes(found, 0, u, v, SURELY * margin, wanted):
+        if not _want_nodes(found, 0, u, v, SURELY * margin, wanted):
             return found
         fill_quadrants(target, net, wanted, tolerance=converged**1.5)
 
 
 def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
-    """Nodes inside the target's end or within a margin of it, and all between these and the axes.
+    """Nodes (nu, nv) inside the target's end or within a margin of it, and all between these and the axes.
 
-    Parameters
-    ----------
-    near : a net in longer steps; if it has no inside nodes, all nodes are wanted.
-    past : the end may be so many of its nodes past the inside ones.
-    u, v : (nu,), (nv,) material coordinates of the lines [m].
-    margin : (2,) along u and v [m].
-
-    Returns
-    -------
-    (nu, nv) booleans.
+    Args:
+        near: a net in longer steps; if it has no inside nodes, all nodes are wanted.
+        past: the end may be so many of its nodes past the inside ones.
+        u, v: (nu,), (nv,) material coordinates of the lines [m].
+        margin: (2,) along u and v [m].
     """
     wanted = np.zeros((len(u), len(v)), dtype=bool)
-    want_nodes(near, past, u, v, margin, wanted)
+    _want_nodes(near, past, u, v, margin, wanted)
     return wanted
 
 
-def want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats, wanted: Bools) -> bool:
+def _want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats, wanted: Bools) -> bool:
     """Add to the nodes `wanted` (nu, nv) those of `wanted_nodes`; return whether any was not wanted before."""
     if near.inside.any():
         return bool(_want(near.inside, near.u, near.v, past, u, v, *margin, wanted))
@@ -123,7 +106,7 @@ def want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats, 
     return added
 
 
-@njit()
+@njit("b2 f1 f1 i f1 f1 f f b2")
 def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # type: ignore[no-untyped-def]
     """Add to the `wanted` nodes, see `wanted_nodes`; return whether any was not wanted before. In each quadrant they
     are below a staircase that only descends, away from the axis."""
@@ -160,11 +143,10 @@ def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # 
 class LatticeLines:
     """The lines of the lattice that can touch a target.
 
-    Parameters
-    ----------
-    u : offsets of the lines of family v, which cross the u axis [m].
-    v : offsets of the lines of family u [m].
-    nodes : the u and the v of all nodes of the finer march [m].
+    Args:
+        u: offsets of the lines of family v, which cross the u axis [m].
+        v: offsets of the lines of family u [m].
+        nodes: the u and the v of all nodes of the finer march [m].
     """
 
     u: Floats
@@ -180,21 +162,14 @@ def find_lines(
     parts: int,
     heights: Heights = ON_SURFACE,
 ) -> tuple[LatticeLines, Covering]:
-    """Find the lattice lines that can touch the target, and `MARGIN` spacings more.
+    """The lattice lines that can touch the target, and `MARGIN` spacings more; and the march that found them.
 
-    Parameters
-    ----------
-    near : a net that may be similar, or None.
-    parts : steps of the march per spacing.
-    heights : see `Net`.
+    Args:
+        near: a net that may be similar, or None.
+        parts: steps of the march per spacing.
 
-    Returns
-    -------
-    The lines, and the march that found them.
-
-    Raises
-    ------
-    InputError : there would be too many lines or nodes, or none inside the target.
+    Raises:
+        InputError: there would be too many lines or nodes, or none inside the target.
     """
     step, margin = _across(layout) / parts, MARGIN * _across(layout)
     spare = np.repeat(margin, 2)
@@ -211,7 +186,7 @@ def find_lines(
                 f"{raised(MOST_NODES, 10 * counts.prod())}"
             )
         u, v = (np.arange(-steps[k, 0], steps[k, 1] + 1) * step[k] for k in (0, 1))
-        near = march_covering(target, u, v, start, margin, near, heights=heights, converged=FAIR)
+        near = march_covering(target, u, v, start, margin, near, heights=heights, converged=_FAIR)
         if not near.inside.any():
             raise InputError("no node of the net is inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare
@@ -231,7 +206,7 @@ def _across(layout: GridLayout) -> Floats:
 
 def _stride(target: Target, start: Axes, heights: Heights) -> Covering:
     """The first net, in long steps: its axes, and the nodes between the parts of them that are inside."""
-    s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(STRIDE * target.size)
+    s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(_STRIDE * target.size)
     net = Net(s, s, np.full((len(s), len(s), 3), np.nan), heights=heights)
     lay_axes(target, net, start, tolerance=ROUGH)
     inside = target.margin(np.concatenate([net.points[:, STRIDES], net.points[STRIDES]])).reshape(2, -1) > 0
@@ -265,14 +240,10 @@ def march_lines(
     *near: Covering,
     heights: Heights = ON_SURFACE,
 ) -> Covering:
-    """March the net of lines at some of its nodes.
+    """March the net of lines at every node, or at every second.
 
-    Parameters
-    ----------
-    lines : see `find_lines`.
-    every : 1 for all nodes, 2 for every second node.
-    near : one or two nets in longer steps, the finer first.
-    heights : see `Net`.
+    Args:
+        near: one or two nets in longer steps, the finer first.
     """
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
     return march_covering(target, u, v, start, MARGIN * _across(layout), *near, heights=heights)
@@ -297,19 +268,11 @@ def _coarser(target: Target) -> str:
 def _steps(offsets: Floats, edge: float) -> Ints:
     """Steps from line to line: an even number of at least six, as many as edges if these are enough."""
     edges = edge_counts(np.diff(offsets), edge)
-    return np.where(edges < FEWEST_STEPS, 2 * np.maximum(FEWEST_STEPS // 2, edges), edges + edges % 2)
+    return np.where(edges < _FEWEST_STEPS, 2 * np.maximum(_FEWEST_STEPS // 2, edges), edges + edges % 2)
 
 
-@njit()
-def _divided(offsets, steps):  # type: ignore[no-untyped-def]
+def _divided(offsets: Floats, steps: Ints) -> Floats:
     """Material coordinates of nodes, in `steps` (n - 1,) from each of the `offsets` (n,) to the next."""
-    result, filled = np.empty(steps.sum() + 1), 0
-    for k in range(len(steps)):
-        for n in range(steps[k]):
-            result[filled] = offsets[k] + (offsets[k + 1] - offsets[k]) * n / steps[k]
-            filled += 1
-    result[filled] = offsets[len(steps)]
-    return result
-
-
-SURELY = 0.96  # of the margin: the ends of two nets in different steps differ slightly
+    part, count = np.repeat(np.arange(len(steps)), steps), int(steps.sum())
+    step = np.arange(count) - (np.cumsum(steps) - steps)[part]
+    return np.append(offsets[part] + np.diff(offsets)[part] * step / steps[part], offsets[-1])

@@ -35,7 +35,7 @@ from rodshell.targets import Implicit, Target
 ROUNDS = 6
 CONVERGED = 2e-5  # of the size, and of a step on local models: the last motion, of which the third power is left
 EXACT = 1e-13  # of the step, on a local model
-CLEARLY = 1.5  # ratio of the squares of the steps of two nets, above which their difference can be extrapolated
+_CLEARLY = 1.5  # ratio of the squares of the steps of two nets, above which their difference can be extrapolated
 BEYOND = 2.5  # steps of the known net by which a guess may be outside it
 
 
@@ -51,14 +51,13 @@ def march_near(
     heights: Heights = ON_SURFACE,
     converged: float = CONVERGED,
 ) -> Net:
-    """March a net as `march` does, starting from a similar net; a bad guess costs time, not accuracy.
+    """March a net from its two axes, starting from a similar net; a bad guess costs time, not accuracy.
 
-    Parameters
-    ----------
-    target, u, v, heights : see `march`.
-    coarser : the same net as `near` in longer steps, from which the start is extrapolated.
-    wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
-    converged : the last motion of nodes, relative to the target's size; the error that is left is its third power.
+    Args:
+        u, v, heights: see `Net`.
+        coarser: the same net as `near` in longer steps, from which the start is extrapolated.
+        wanted: (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
+        converged: the last motion of nodes, relative to the target's size; the error that is left is its third power.
     """
     guess = near if coarser is None else _extrapolated(near, coarser, u, v)
     net = Net(u, v, interpolated(guess, u, v), heights=heights)
@@ -76,14 +75,14 @@ def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
         (along[-1] - along[0]) * (across[-1] - across[0]) / ((len(along) - 1) * (len(across) - 1))
         for along, across in ((u, v), (near.u, near.v), (coarser.u, coarser.v))
     )
-    if coarse <= CLEARLY * fine:
+    if coarse <= _CLEARLY * fine:
         return near
     points = interpolated(coarser, near.u, near.v)
     _add_change(near.points, points, (fine - requested) / (coarse - fine))
     return Net(near.u, near.v, points)
 
 
-@njit()
+@njit("f3 f3 f")
 def _add_change(near, coarser, share):  # type: ignore[no-untyped-def]
     """Put into `coarser` (nu, nv, 3) the points `near` (nu, nv, 3) with a share of their change from there, if both are
     known."""
@@ -95,16 +94,8 @@ def _add_change(near, coarser, share):  # type: ignore[no-untyped-def]
 
 
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
-    """Interpolate a net by local cubics both ways, which also extrapolate a little past its last nodes.
-
-    Parameters
-    ----------
-    u, v : (nu,), (nv,) material coordinates wanted [m].
-
-    Returns
-    -------
-    (nu, nv, 3) points [m]; NaN further away.
-    """
+    """Points (nu, nv, 3) [m] of a net at the material coordinates `u` (nu,), `v` (nv,) [m], by local cubics both ways,
+    which also extrapolate a little past its last nodes; NaN further away."""
     i0, j0 = net.origin
     return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
 
@@ -141,7 +132,7 @@ def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> boo
     return True
 
 
-@njit()
+@njit("f3 f1 f1 i i")
 def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
     """The nodes (n, 3) of the axes but the anchor, one arm after the other, outwards as `Axes.tangents`; the
     steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
@@ -161,7 +152,7 @@ def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
     return x, steps, stops
 
 
-@njit()
+@njit("f2 i1 i i f3")
 def _put_arms(x, stops, i0, j0, points):  # type: ignore[no-untyped-def]
     for arm in range(4):
         for n in range(stops[arm], stops[arm + 1]):
@@ -173,7 +164,7 @@ def _put_arms(x, stops, i0, j0, points):  # type: ignore[no-untyped-def]
                     points[i0, j0 + k, d] = x[n, d]
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 f1 i1 f2 f1 f2 f3")
 def _straighten(starts, directions, steps, stops, points, value, gradient, hessian):  # type: ignore[no-untyped-def]
     """Move the `points` (n, 3) of the arms to the geodesics that begin at `starts` (4, 3) in `directions` (4, 3), see
     `compass.geodesics`, on second order models at the points; return by how much, or NaN."""
@@ -253,7 +244,7 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
     return False
 
 
-@njit()
+@njit("f3 b2 i i i2")
 def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
     """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes, the others become NaN;
     and whether there is one of each. `row` (nu, nv) is the index of each in the result, -1 for the others."""
@@ -273,7 +264,7 @@ def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
     return chosen[:count], whole
 
 
-@njit()
+@njit("f3 i2 f2 f b2 f2")
 def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-untyped-def]
     """The rows (n,) of nodes that have `moved` by more than the `limit`, whose `models` are put where they are now and
     which alone are `new`."""
@@ -293,7 +284,7 @@ def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-u
     return rows
 
 
-@njit(error_model="numpy")
+@njit("f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2 f")
 def _sweep(  # type: ignore[no-untyped-def]
     points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved, tolerance
 ):

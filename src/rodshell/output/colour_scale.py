@@ -1,21 +1,24 @@
 """Colours that stand for numbers: of rods in a picture (gap, stress, height), and of the trials of a search."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from html import escape
 from math import degrees
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.grid import Shape, shape_of
-from rodshell.output.svg import number
+from rodshell.output.svg import document, label, number, tag
 from rodshell.results.archive import Archive, made_once
-from rodshell.results.states import SHELLS
+from rodshell.results.states import is_shell, shells_among
 from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
+
+if TYPE_CHECKING:
+    from rodshell.formfinding.search import Trial
 
 Colour = Literal["gap", "stress", "curvature", "force"]
 
@@ -26,9 +29,6 @@ STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
 HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
 STAGES = "history_stress"
-STRESSES = ("stress_pinned", "stress_clamped", STAGES)
-CURVATURES = ("curvature_pinned", "curvature_clamped", "history_curvature")
-FORCES = ("force_pinned", "force_clamped")
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
 
 
@@ -36,12 +36,11 @@ FINEST = 1e-3  # mm; smaller gaps are drawn like none
 class Scale:
     """What colours a shell's rods.
 
-    Parameters
-    ----------
-    values : (k,) at each entry of `rod_nodes`, in the unit that the caption names.
-    low, high : values at both ends of the map.
-    colours : control points of the map, evenly spaced, "#rrggbb".
-    caption : what the values are, with their unit.
+    Args:
+        values: (k,) at each entry of `rod_nodes`, in the unit that the caption names.
+        low, high: values at both ends of the map.
+        colours: control points of the map, evenly spaced, "#rrggbb".
+        caption: what the values are, with their unit.
     """
 
     values: Floats
@@ -58,18 +57,16 @@ class Scale:
 
     @property
     def palette(self) -> list[str]:
-        return list(_palette(self.colours))
+        """Colours "#rrggbb" of all bins."""
+        return hex_colours(self.colours, np.linspace(0, 1, BINS))
 
 
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
     """The scale of a shape, the same for all shapes of an archive; None where its rods have the colours of families.
 
-    Parameters
-    ----------
-    archive : the result that the shape belongs to.
-    shape : the one whose rods are coloured.
-    colour : "stress"; "curvature"; "force", along the rods; or "gap": signed distance to the target, or height where
-        there is no target.
+    Args:
+        colour: "stress"; "curvature"; "force", along the rods; or "gap": signed distance to the target, or height where
+            there is no target.
     """
     nodes = archive.states["rod_nodes"]
     if colour == "stress":
@@ -88,26 +85,13 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
 
 
 def gap_scale(gaps: Floats, largest: float) -> Scale:
-    """The scale of signed distances to the target.
-
-    Parameters
-    ----------
-    gaps : (k,) at each entry of `rod_nodes` [m].
-    largest : of all shapes that have the scale [mm].
-    """
-    factor, unit = length_unit(largest)
-    limit = _rounded_up(max(largest, FINEST) / factor)
-    return Scale(1e3 / factor * gaps, -limit, limit, SIGNED, f"gap to target in {unit}, + outside")
+    """The scale of signed distances to the target (k,) [m], `largest` [mm] of all shapes that have the scale."""
+    factor, unit = (1e3, "m") if largest >= 1e3 else (1.0, "mm")
+    return _scale(1e3 / factor * gaps, max(largest, FINEST) / factor, SIGNED, f"gap to target in {unit}, + outside")
 
 
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
-    """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too.
-
-    Parameters
-    ----------
-    archive : the result that the shape belongs to.
-    shape : one whose gaps are known.
-    """
+    """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too."""
     assert shape.gap is not None
     points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
     worst = int(np.argmax(np.abs(gaps)))
@@ -122,27 +106,24 @@ def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
 @made_once
 def _largest_of_all_gaps(archive: Archive) -> float:
     """The largest gap [mm], without its sign, of all shapes that have one."""
-    shapes = [shape_of(archive, name) for name in SHELLS if name in archive.states]
+    shapes = [shape_of(archive, name) for name in shells_among(archive.states)]
     return max((abs(largest_gap(archive, shape)[0]) for shape in shapes if shape.gap is not None), default=0.0)
 
 
-@lru_cache(maxsize=8)
-def _palette(colours: tuple[str, ...]) -> list[str]:
-    return hex_colours(colours, np.linspace(0, 1, BINS))
-
-
-def length_unit(largest: float) -> tuple[float, str]:
-    """The unit that fits a length [mm]: how many mm it is, and its name."""
-    return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
+def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, Floats]]:
+    """The arrays of stress, curvature or force in the shapes on all supports, and in the stages of the deployment."""
+    for name, values in archive.states.items():
+        if name.startswith(f"{what}_") or name == f"history_{what}":
+            yield name, values
 
 
 def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     """Utilisation where the strength is known, else the stress in a unit of its size."""
     assert shape.stress is not None
-    bending, final = archive.results.bending, shape.name in SHELLS
+    bending, final = archive.results.bending, is_shell(shape.name)
     strength = bending.strength if bending else None
     erection = (bending.erection_strength if bending else None) or strength
-    known = [(name, float(np.max(values))) for name, values in archive.states.items() if name in STRESSES]
+    known = [(name, float(np.max(values))) for name, values in _of_all_shapes(archive, "stress")]
     if strength and erection:
         unit, caption = (strength if final else erection) / 100, "utilisation in %"
         if strength != erection:
@@ -152,43 +133,38 @@ def _stress_scale(archive: Archive, shape: Shape) -> Scale:
         top = max(largest for _, largest in known)
         unit, name = next((entry for entry in PRESSURES if top >= entry[0]), PRESSURES[-1])
         caption, top = f"stress in {name}", top / unit
-    largest = float(np.max(shape.stress)) / unit
-    limit = _rounded_up(max(top, FINEST))
-    return Scale(shape.stress / unit, 0.0, limit, STRESS, f"{caption}, here up to {largest:.3g}")
+    values = shape.stress / unit
+    return _scale(values, max(top, FINEST), STRESS, f"{caption}, here up to {float(np.max(values)):.3g}")
 
 
 def _curvature_scale(archive: Archive, shape: Shape) -> Scale:
     assert shape.curvature is not None
-    top = max(float(np.max(values)) for name, values in archive.states.items() if name in CURVATURES)
-    limit = _rounded_up(max(top, FINEST))
+    top = max(float(np.max(values)) for _, values in _of_all_shapes(archive, "curvature"))
     caption = f"curvature in 1/m, here up to {float(np.max(shape.curvature)):.3g}"
-    return Scale(np.asarray(shape.curvature, dtype=float), 0.0, limit, STRESS, caption)
+    return _scale(np.asarray(shape.curvature, dtype=float), max(top, FINEST), STRESS, caption)
 
 
 def _force_scale(archive: Archive, shape: Shape) -> Scale:
     """Normal forces; signed as gaps are, so that rods without a force are drawn in ink."""
     assert shape.force is not None
-    known = [values for name, values in archive.states.items() if name in FORCES]
-    top = max(float(np.abs(values).max()) for values in known)
+    top = max(float(np.abs(values).max()) for _, values in _of_all_shapes(archive, "force"))
     unit, name = (1e3, "kN") if top >= 1e3 else (1.0, "N") if top >= 1.0 else (1e-3, "mN")
-    limit = _rounded_up(max(top / unit, FINEST))
-    return Scale(shape.force / unit, -limit, limit, SIGNED, f"normal force in {name}, + tension")
+    return _scale(shape.force / unit, max(top / unit, FINEST), SIGNED, f"normal force in {name}, + tension")
 
 
-def _rounded_up(largest: float) -> float:
-    """To a whole number of ticks."""
+def _scale(values: Floats, largest: float, colours: tuple[str, ...], caption: str) -> Scale:
+    """From 0 to the largest value, rounded up to a whole number of ticks; of a signed map from its opposite."""
     step = nice_step(largest, 4)
-    return float(step * np.ceil(largest / step - 1e-9))
+    limit = float(step * np.ceil(largest / step - 1e-9))
+    return Scale(values, -limit if colours is SIGNED else 0.0, limit, colours, caption)
 
 
 def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
     """Draw the map with ticks and caption.
 
-    Parameters
-    ----------
-    scale : the map, its range and its caption.
-    right : x at which the bar ends [drawing units].
-    y : baseline of the numbers [drawing units].
+    Args:
+        right: x at which the bar ends [drawing units].
+        y: baseline of the numbers [drawing units].
     """
     length = 200.0
     left, step = right - length, length / BINS
@@ -206,10 +182,8 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
 def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
     """Colours "#rrggbb" in a map of evenly spaced control points.
 
-    Parameters
-    ----------
-    points : colours "#rrggbb" of the control points.
-    shares : (k,) places in the map, from 0 (its first point) to 1 (its last).
+    Args:
+        shares: (k,) places in the map, from 0 (its first point) to 1 (its last).
     """
     table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
     at = np.linspace(0.0, 1.0, len(points))
@@ -219,38 +193,16 @@ def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def mixed(colour: str, other: str, share: float) -> str:
-    """A mixture of two colours, as "#rrggbb".
-
-    Parameters
-    ----------
-    colour, other : the two colours, "#rrggbb".
-    share : of the other colour, 0 to 1.
-    """
-    pairs = ((int(colour[k : k + 2], 16), int(other[k : k + 2], 16)) for k in (1, 3, 5))
-    return "#" + "".join(f"{round(a + share * (b - a)):02x}" for a, b in pairs)
+    """A mixture of two colours "#rrggbb" with a share of the other, 0 to 1."""
+    return hex_colours((colour, other), np.array([share]))[0]
 
 
 CELL, ROW, LEFT, TOP = 84, 30, 190, 64
+NONE = "#f4f4f4"  # of a cell whose trial failed
 
 
-class TrialLike(Protocol):
-    """What a picture needs of a trial: anchor [m], heading [rad], value."""
-
-    @property
-    def anchor(self) -> tuple[float, float]: ...
-    @property
-    def heading(self) -> float: ...
-    @property
-    def value(self) -> float: ...
-
-
-def search_svg(title: str, trials: tuple[TrialLike, ...], best: TrialLike) -> str:
-    """Values in cells, dark the smallest; what failed stays empty.
-
-    Parameters
-    ----------
-    best : the one to be framed.
-    """
+def search_svg(title: str, trials: "Sequence[Trial]", best: "Trial") -> str:
+    """Values in cells, dark the smallest; what failed stays empty; the best has a frame."""
     anchors = list(dict.fromkeys(trial.anchor for trial in trials))
     headings = list(dict.fromkeys(trial.heading for trial in trials))
     values = np.array([trial.value for trial in trials])
@@ -258,25 +210,18 @@ def search_svg(title: str, trials: tuple[TrialLike, ...], best: TrialLike) -> st
     shares = np.clip((values - low) / (high - low if high > low else 1.0), 0.0, 1.0)
     colours = hex_colours(HEIGHT, np.where(np.isfinite(values), shares, 1.0))
     width, height = LEFT + CELL * len(headings) + 20, TOP + ROW * len(anchors) + 20
-    parts = [f'<text x="20" y="24" font-weight="bold">{escape(title)}</text>']
+    parts = [tag("rect", width=width, height=height, fill="white"), label(title, 20, 24, 13, font_weight="bold")]
     for k, heading in enumerate(headings):
-        parts.append(
-            f'<text x="{LEFT + CELL * (k + 0.5):g}" y="{TOP - 10}" text-anchor="middle">{degrees(heading):.0f}°</text>'
-        )
+        words = f"{degrees(heading):.0f}°"
+        parts.append(label(words, LEFT + CELL * (k + 0.5), TOP - 10, 13, text_anchor="middle"))
     for k, (x, y) in enumerate(anchors):
-        parts.append(f'<text x="20" y="{TOP + ROW * (k + 0.65):g}">({x:.4g}, {y:.4g}) m</text>')
+        parts.append(label(f"({x:.4g}, {y:.4g}) m", 20, TOP + ROW * (k + 0.65), 13))
     for trial, colour in zip(trials, colours, strict=True):
         x, y = LEFT + CELL * headings.index(trial.heading), TOP + ROW * anchors.index(trial.anchor)
-        found = np.isfinite(trial.value)
-        frame = ' stroke="#d33" stroke-width="3"' if trial is best else ""
-        fill = colour if found else "#f4f4f4"
-        parts.append(f'<rect x="{x + 2}" y="{y + 2}" width="{CELL - 4}" height="{ROW - 4}" fill="{fill}"{frame}/>')
-        text, ink = (f"{trial.value:.3g}", "white") if found else ("none", "#888")
-        parts.append(
-            f'<text x="{x + CELL / 2:g}" y="{y + ROW * 0.65:g}" text-anchor="middle" fill="{ink}">{text}</text>'
+        text, ink, fill = (
+            (f"{trial.value:.3g}", "white", colour) if np.isfinite(trial.value) else ("none", "#888", NONE)
         )
-    body = "\n".join(parts)
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
-        f'font-family="sans-serif" font-size="13">\n<rect width="100%" height="100%" fill="white"/>\n{body}\n</svg>\n'
-    )
+        frame = {"stroke": "#d33", "stroke_width": 3} if trial is best else {}
+        parts.append(tag("rect", x=x + 2, y=y + 2, width=CELL - 4, height=ROW - 4, fill=fill, **frame))
+        parts.append(label(text, x + CELL / 2, y + ROW * 0.65, 13, text_anchor="middle", fill=ink))
+    return document((0, 0, width, height), *parts)

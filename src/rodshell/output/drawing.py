@@ -1,7 +1,7 @@
 """A drawing: paths, marks and texts on named layers, y up [mm]. DXF, SVG, PDF and PNG are written from it."""
 
 import pathlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress, pairwise
@@ -13,10 +13,11 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.geometry.bounds import bounds
 
-Anchor = Literal["start", "middle", "end"]
+_Anchor = Literal["start", "middle", "end"]
 T = TypeVar("T", float, Floats)
 
 INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"
+FAMILIES = ("#1f5f8b", "#a8552a", "#2b7a4b")  # of the rods of a grid's first, second and third family
 LETTER = 0.62  # width of a capital or digit over the text size
 TEXT = 3.43  # mm: size of usual texts on paper, whose capitals are 2.5 mm high, the usual nominal size of ISO 3098
 SMALL = 0.75  # size of the smallest texts over the usual one: where capitals are 2.5 mm high, these have 1.9 mm
@@ -26,8 +27,8 @@ BELOW = 0.2  # of which this much is below its baseline
 # The typeface of PDF and PNG: DejaVu Sans Condensed 2.37, unchanged, under the licence in fonts/LICENSE.txt. It covers
 # Latin, Greek and Cyrillic, and is about as wide as Helvetica, in which browsers and CAD programs show the same
 # drawings. System fonts are never used, so that files are the same on every computer.
-FONTS = pathlib.Path(__file__).with_name("fonts")
-REGULAR, BOLD = (FONTS / f"DejaVuSansCondensed{weight}.ttf" for weight in ("", "-Bold"))
+_FONTS = pathlib.Path(__file__).with_name("fonts")
+REGULAR, BOLD = (_FONTS / f"DejaVuSansCondensed{weight}.ttf" for weight in ("", "-Bold"))
 CAPITAL = 0.729  # height of a capital over the text size
 
 
@@ -35,12 +36,11 @@ CAPITAL = 0.729  # height of a capital over the text size
 class Layer:
     """How a layer looks.
 
-    Parameters
-    ----------
-    colour : "#rrggbb".
-    pen : width of its lines [mm of paper].
-    number : of the colour in AutoCAD's table.
-    dash : lengths of a dash and of the gap after it [mm of paper]; empty: lines are solid.
+    Args:
+        colour: "#rrggbb".
+        pen: width of its lines [mm of paper].
+        number: of the colour in AutoCAD's table.
+        dash: lengths of a dash and of the gap after it [mm of paper]; empty: lines are solid.
     """
 
     colour: str
@@ -64,12 +64,11 @@ FORBIDDEN = '<>/\\":;?*|=`,'  # in a layer's name [DXF reference]
 class Pen(NamedTuple):
     """How a path or mark looks that does not look like its layer.
 
-    Parameters
-    ----------
-    colour : of the line, "#rrggbb".
-    width : of the line [mm]; 0: there is none.
-    dash : lengths of dashes and gaps in turn [mm].
-    fill : colour of the inside; "": it is not filled.
+    Args:
+        colour: of the line, "#rrggbb".
+        width: of the line [mm]; 0: there is none.
+        dash: lengths of dashes and gaps in turn [mm].
+        fill: colour of the inside; "": it is not filled.
     """
 
     colour: str
@@ -81,12 +80,11 @@ class Pen(NamedTuple):
 class Path(NamedTuple):
     """A polyline.
 
-    Parameters
-    ----------
-    points : (k, 2) [mm], or (k, 3) in space, which only DXF shows.
-    layer : a key of `LAYERS`.
-    pen : None: that of the layer.
-    name : the rod that it stands for; note : shown where the pointer is, in SVG.
+    Args:
+        points: (k, 2) [mm], or (k, 3) in space, which only DXF shows.
+        layer: a key of `LAYERS`.
+        pen: None: that of the layer.
+        name: the rod that it stands for; note : shown where the pointer is, in SVG.
     """
 
     points: Floats
@@ -104,11 +102,10 @@ class Path(NamedTuple):
 class Mark(NamedTuple):
     """A circle.
 
-    Parameters
-    ----------
-    at : (2,) its middle [mm].
-    radius : [mm].
-    layer, pen, note : as of `Path`.
+    Args:
+        at: (2,) its middle [mm].
+        radius: [mm].
+        layer, pen, note: as of `Path`.
     """
 
     at: Floats
@@ -121,20 +118,19 @@ class Mark(NamedTuple):
 class Text(NamedTuple):
     """One line of text.
 
-    Parameters
-    ----------
-    at : (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
-    size : of the font [mm].
-    angle : of the baseline against x [rad].
-    colour : "": that of the layer.
-    halo : colour of a rim that sets it off against lines behind it; "": none. PDF and DXF have none.
+    Args:
+        at: (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
+        size: of the font [mm].
+        angle: of the baseline against x [rad].
+        colour: "": that of the layer.
+        halo: colour of a rim that sets it off against lines behind it; "": none. PDF and DXF have none.
     """
 
     text: str
     at: Floats
     size: float
     layer: str
-    anchor: Anchor = "start"
+    anchor: _Anchor = "start"
     angle: float = 0.0
     bold: bool = False
     colour: str = ""
@@ -146,17 +142,15 @@ class Text(NamedTuple):
         return np.array(corners(x, y, cos(self.angle), sin(self.angle), self.size, len(self.text), BACK[self.anchor]))
 
 
-BACK: dict[Anchor, float] = {"start": 0.0, "middle": -0.5, "end": -1.0}  # where a text begins, in its widths
+BACK: dict[_Anchor, float] = {"start": 0.0, "middle": -0.5, "end": -1.0}  # where a text begins, in its widths
 
 
 def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[T, T]]:
     """x and y of the four corners of a text's room, or of many: of numbers, or of arrays (t,).
 
-    Parameters
-    ----------
-    x, y : where its baseline starts, is centred or ends.
-    c, s : cosine and sine of the angle of its baseline.
-    back : where it begins, see `BACK`.
+    Args:
+        c, s: cosine and sine of the angle of its baseline.
+        back: where it begins, see `BACK`.
     """
     width = LETTER * size * letters
     left = back * width
@@ -168,10 +162,9 @@ def corners(x: T, y: T, c: T, s: T, size: T, letters: T, back: T) -> list[tuple[
 class Drawing:
     """A drawing.
 
-    Parameters
-    ----------
-    text : usual size of its texts [mm]; pens are as wide as on paper with texts of the size TEXT.
-    left_out : what found no room, in words.
+    Args:
+        text: usual size of its texts [mm]; pens are as wide as on paper with texts of the size TEXT.
+        left_out: what found no room, in words.
     """
 
     name: str
@@ -226,44 +219,28 @@ class Drawing:
         )
 
     def placed(self, scale: float, shift: Floats) -> "Drawing":
-        """The drawing scaled about the origin, with its pens and texts, then shifted. Paths in space are left out.
+        """The drawing scaled about the origin, with pens and texts, then shifted (2,) [mm]; without paths in space."""
 
-        Parameters
-        ----------
-        scale : new lengths over old ones.
-        shift : (2,) [mm].
-        """
-        paths = [path for path in self.paths if path.flat]
-        used = {id(pen): pen for pen in (*(path.pen for path in paths), *(mark.pen for mark in self.marks))}
-        pens = {key: _scaled(pen, scale) for key, pen in used.items()}
-        at = _moved([*(mark.at for mark in self.marks), *(text.at for text in self.texts)], scale, shift)
-        marks, texts = at[: len(self.marks)], at[len(self.marks) :]
-        return Drawing(
-            self.name,
-            self.title,
-            scale * self.text,
-            tuple(
-                Path(points, path.layer, path.closed, pens[id(path.pen)], path.name, path.note)
-                for path, points in zip(paths, _moved([path.points for path in paths], scale, shift), strict=True)
+        def moved(points: Floats) -> Floats:
+            return np.asarray(scale * points + shift)
+
+        def pen(item: Path | Mark) -> Pen | None:
+            look = item.pen
+            return look and look._replace(width=scale * look.width, dash=tuple(scale * dash for dash in look.dash))
+
+        return replace(
+            self,
+            text=scale * self.text,
+            paths=tuple(path._replace(points=moved(path.points), pen=pen(path)) for path in self.paths if path.flat),
+            marks=tuple(
+                mark._replace(at=moved(mark.at), radius=scale * mark.radius, pen=pen(mark)) for mark in self.marks
             ),
-            tuple(
-                Mark(place, scale * mark.radius, mark.layer, pens[id(mark.pen)], mark.note)
-                for mark, place in zip(self.marks, marks, strict=True)
-            ),
-            tuple(
-                Text(t.text, place, scale * t.size, t.layer, t.anchor, t.angle, t.bold, t.colour, t.halo)
-                for t, place in zip(self.texts, texts, strict=True)
-            ),
-            self.left_out,
+            texts=tuple(text._replace(at=moved(text.at), size=scale * text.size) for text in self.texts),
         )
 
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
-        """The part within a rectangle; marks and texts that cross its border, and paths in space, are left out.
-
-        Parameters
-        ----------
-        low, high : (2,) lower left and upper right corner of the rectangle [mm].
-        """
+        """The part within the rectangle from `low` to `high` (2,) [mm]; paths in space are left out, and marks and
+        texts that cross its border."""
         flat = [path for path in self.paths if path.flat]
         extents = self._extents
         inside, marks, texts = (np.all((lowest >= low) & (highest <= high), axis=1) for lowest, highest in extents)
@@ -297,83 +274,29 @@ class Pencil:
     left_out: list[str] = field(default_factory=list)
 
     def line(self, points: Iterable[Iterable[float]], layer: str, **look: object) -> None:
-        """Add a polyline.
-
-        Parameters
-        ----------
-        points : (k, 2), or (k, 3) in space [mm].
-        layer : a key of `LAYERS`.
-        look : further fields of `Path`, such as its pen.
-        """
+        """Add a polyline of points (k, 2), or (k, 3) in space [mm]."""
         self.paths.append(Path(np.array(points, dtype=float), layer, **look))  # type: ignore[arg-type]
 
     def mark(self, at: Iterable[float], radius: float, layer: str, **look: object) -> None:
-        """Add a circle.
-
-        Parameters
-        ----------
-        at : (2,) its middle [mm].
-        radius : [mm].
-        layer : a key of `LAYERS`.
-        look : further fields of `Mark`, such as its pen.
-        """
+        """Add a circle about `at` (2,) [mm]."""
         self.marks.append(Mark(np.array(at, dtype=float), radius, layer, **look))  # type: ignore[arg-type]
 
     def write(self, text: str, at: Iterable[float], size: float, layer: str, **look: object) -> None:
-        """Add a line of text.
-
-        Parameters
-        ----------
-        at : (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
-        size : of the font [mm].
-        layer : a key of `LAYERS`.
-        look : further fields of `Text`, such as its anchor.
-        """
+        """Add a line of text; `at` (2,) [mm] as of `Text`."""
         self.texts.append(Text(text, np.array(at, dtype=float), size, layer, **look))  # type: ignore[arg-type]
 
     def leave_out(self, count: int, of: int, what: str) -> None:
-        """Record that texts found no room.
-
-        Parameters
-        ----------
-        count : number of texts that were left out; nothing is recorded for 0.
-        of : number of all such texts.
-        what : what the texts are, in words.
-        """
+        """Record that `count` of such texts found no room, in words; nothing for 0."""
         if count:
             self.left_out.append(f"{'all' if count == of > 1 else count} of {of} {what}")
 
     def done(self, name: str, title: str, text: float) -> Drawing:
-        """The drawing of all that was added.
-
-        Parameters
-        ----------
-        title : of the drawing, in words.
-        text : usual size of its texts [mm].
-        """
+        """The drawing of all that was added, `text` being the usual size of its texts [mm]."""
         return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts), tuple(self.left_out))
 
 
-def _scaled(pen: Pen | None, scale: float) -> Pen | None:
-    return pen and Pen(pen.colour, scale * pen.width, tuple(scale * dash for dash in pen.dash), pen.fill)
-
-
-def _moved(groups: Sequence[Floats], scale: float, shift: Floats) -> list[Floats]:
-    """Points (..., 2) in groups, scaled about the origin and then shifted: all at once, since groups are many."""
-    if not groups:
-        return []
-    stops = np.cumsum([points.size // 2 for points in groups]).tolist()
-    moved = scale * np.concatenate([points.reshape(-1, 2) for points in groups]) + shift
-    return [moved[a:b].reshape(points.shape) for a, b, points in zip([0, *stops], stops, groups, strict=False)]
-
-
 def within(box: Floats, low: Floats, high: Floats) -> bool:
-    """Whether all points (k, 2) lie in a rectangle.
-
-    Parameters
-    ----------
-    box : (k, 2) points; low, high : (2,) lower left and upper right corner of the rectangle.
-    """
+    """Whether all points (k, 2) lie in the rectangle from `low` to `high` (2,)."""
     (left, bottom), (right, top) = low.tolist(), high.tolist()
     return all(left <= x <= right and bottom <= y <= top for x, y in box.tolist())
 

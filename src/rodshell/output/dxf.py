@@ -18,19 +18,17 @@ from rodshell.output.drawing import FORBIDDEN, LAYERS, Drawing, Path, Text
 
 LONGEST = 200  # letters of a layer's name
 CAPITAL = 0.716  # height of Arial's capitals over the text size; a DXF text is as high as its capitals
-DATE = 2451544.5  # 2000-01-01, a Julian date
-IDENTIFIER = "{00000000-0000-0000-0000-000000000000}"
+_DATE = 2451544.5  # 2000-01-01, a Julian date
+_IDENTIFIER = "{00000000-0000-0000-0000-000000000000}"
 ALIGNMENTS = {"start": TextEntityAlignment.LEFT, "middle": TextEntityAlignment.CENTER, "end": TextEntityAlignment.RIGHT}
-STYLES = {False: ("SANS", "arial.ttf"), True: ("SANS-BOLD", "arialbd.ttf")}  # which every CAD program has or replaces
+_STYLES = {False: ("SANS", "arial.ttf"), True: ("SANS-BOLD", "arialbd.ttf")}  # which every CAD program has or replaces
 
 
 def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str:
     """The text of a DXF file: a LINE, LWPOLYLINE or 3D POLYLINE for each path, a CIRCLE a mark, a TEXT a text.
 
-    Parameters
-    ----------
-    drawing : at 1:1 [mm].
-    names : for some layers the name that they take in the file (see `layer_names`).
+    Args:
+        names: for some layers the name that they take in the file (see `layer_names`).
     """
     document = ezdxf.new("R2010", units=ezdxf.units.MM)
     layers = layer_names(names or {})
@@ -46,12 +44,8 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
 
 
 def layer_names(names: Mapping[str, str]) -> dict[str, str]:
-    """The name of each layer in a file: without characters that DXF forbids, and unique in upper and lower case.
-
-    Parameters
-    ----------
-    names : the wished names of some layers, by those of `LAYERS`.
-    """
+    """The name of each layer in a file, by a wish or its own: without characters that DXF forbids, and unique in upper
+    and lower case."""
     shown, taken = dict[str, str](), {"0", "DEFPOINTS"}  # which every file has
     for layer in LAYERS:
         asked = "".join("_" if letter in FORBIDDEN else letter for letter in printable(str(names.get(layer, layer))))
@@ -72,9 +66,9 @@ def _written(document: Document) -> str:
     document.commit_pending_changes()
     document.update_all()
     for date in ("$TDCREATE", "$TDUCREATE", "$TDUPDATE", "$TDUUPDATE"):
-        document.header[date] = DATE
+        document.header[date] = _DATE
     for identifier in ("$VERSIONGUID", "$FINGERPRINTGUID"):
-        document.header[identifier] = IDENTIFIER
+        document.header[identifier] = _IDENTIFIER
     about = document.ezdxf_metadata()
     about[CREATED_BY_EZDXF] = about[WRITTEN_BY_EZDXF] = "rodshell"
     stream = StringIO()
@@ -93,7 +87,7 @@ def _set_up(document: Document, layers: Mapping[str, str], drawing: Drawing) -> 
             document.linetypes.add("DASHED", [dash + gap, dash, -gap], description="Dashed")
         document.layers.add(layers[name], **look)
     document.header["$LTSCALE"] = scale
-    for style, font in STYLES.values():
+    for style, font in _STYLES.values():
         document.styles.add(style, font=font)
     low, high = drawing.box()
     width, height = (1.05 * (high - low)).tolist()
@@ -117,7 +111,7 @@ def _add_text(space: Modelspace, text: Text, layer: str) -> None:
         _plain(text.text),
         height=CAPITAL * text.size,
         rotation=degrees(text.angle) or None,
-        dxfattribs={"layer": layer, "style": STYLES[text.bold][0]},
+        dxfattribs={"layer": layer, "style": _STYLES[text.bold][0]},
     )
     entity.set_placement(text.at.tolist(), align=ALIGNMENTS[text.anchor])
 

@@ -1,4 +1,7 @@
-"""Every file that is made from an archive, by kind: what `rodshell export --only` may ask for."""
+"""Every file that is made from an archive, by kind: what `rodshell export --only` may ask for.
+
+Modules that need a library of one kind of file alone are imported when such a file is written.
+"""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -7,19 +10,22 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
 from warnings import warn
 
 from rodshell.errors import InputError, OutOfTimeError, OutputWarning
+from rodshell.output.drawing import Drawing
+from rodshell.output.drawings import drawing_set, sheet_set
+from rodshell.output.drawings.flat import FlatPlan, flat_plan
+from rodshell.output.grid import shape_names, shape_of
+from rodshell.output.models import compas_json, glb_bytes, obj_text, rhino_bytes, time_series, vtp_text
+from rodshell.output.pictures import deployment_picture, picture
+from rodshell.output.schedules import SCHEDULES, table_csv
+from rodshell.output.svg import drawing_svg
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results.archive import Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
-from rodshell.results.states import SHELLS
+from rodshell.results.states import DRAPED, POPPED, shells_among
 from rodshell.validation import described, flag, instance, mapping
-
-if TYPE_CHECKING:
-    from rodshell.output.drawing import Drawing
-    from rodshell.output.drawings.flat import FlatPlan
 
 Files = Iterator[tuple[str, str | bytes]]
 
@@ -35,17 +41,15 @@ def save(
 ) -> Path:
     """Write the whole result folder, replacing an older result's files and no others; returns its absolute path.
 
-    Parameters
-    ----------
-    kinds : of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: all but 3dm.
-    force : also replace files that rodshell did not write, or that were changed since, where it has to write.
-    progress : called for each kind of files; where it raises OutOfTimeError the archive is written and the kinds that
-        are left are not, with a warning that names them.
+    Args:
+        kinds: of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: all but 3dm.
+        force: also replace files that rodshell did not write, or that were changed since, where it has to write.
+        progress: called for each kind of files; where it raises OutOfTimeError the archive is written and the kinds
+            that are left are not, with a warning that names them.
 
-    Raises
-    ------
-    InputError : an unknown kind, or a form in place of its archive. ForeignFileError : such files are there, and
-        `force` is False. OutputError : the folder cannot be written.
+    Raises:
+        InputError: an unknown kind, or a form in place of its archive. ForeignFileError : such files are there, and
+            `force` is False. OutputError : the folder cannot be written.
     """
     _require_archive(archive)
     flag("force", force)
@@ -60,7 +64,7 @@ def save(
         put_archive(archive, place)
         for name, text in more.items():
             place.put(name, text)
-        content, left = Content(archive), list(DEFAULT if wanted is None else wanted)
+        content, left = Content(archive), list(wanted)
         with suppress(OutOfTimeError):
             while left:
                 progress("files", left[0], 0.0)
@@ -84,14 +88,12 @@ def export(
 ) -> list[str]:
     """Write files of some kinds into `folder`, all of them or none; returns their names.
 
-    Parameters
-    ----------
-    kinds : as of `save`, without the archive.
-    force, progress : as of `save`.
+    Args:
+        kinds: as of `save`, without the archive.
+        force, progress: as of `save`.
 
-    Raises
-    ------
-    InputError : as of `save`, or a kind needs a package that is not installed. OutputError : as of `save`.
+    Raises:
+        InputError: as of `save`, or a kind needs a package that is not installed. OutputError : as of `save`.
     """
     _require_archive(archive)
     flag("force", force)
@@ -114,76 +116,58 @@ class Content:
     archive: Archive
 
     @cached_property
-    def plan(self) -> "FlatPlan":
-        from rodshell.output.drawings.flat import flat_plan
-
+    def plan(self) -> FlatPlan:
         return flat_plan(self.archive)
 
     @cached_property
-    def drawings(self) -> "dict[str, Drawing]":
-        from rodshell.output.drawings import drawing_set
-
+    def drawings(self) -> dict[str, Drawing]:
         return drawing_set(self.archive)
 
     @cached_property
     def svgs(self) -> dict[str, str]:
-        from rodshell.output.svg import drawing_svg
-
         return {name: drawing_svg(drawing) for name, drawing in self.drawings.items()}
 
+    @property
+    def meshed(self) -> bool:
+        """Whether the nodes of each rod are known."""
+        return "rod_nodes" in self.archive.states
 
-def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
-    """Names in the result's folder and contents of the files of some kinds; default: all but 3dm.
+    def models(self, suffix: str, make: Callable[[Archive, str], str | bytes], states: Iterable[str | None]) -> Files:
+        """A file for each of some states that are known."""
+        for state in filter(None, states):
+            yield f"model/{state}.{suffix}", make(self.archive, state)
 
-    Parameters
-    ----------
-    kinds : of files, keys of `KINDS`; default: all but 3dm.
 
-    Raises
-    ------
-    InputError : an unknown kind, or one that needs a package that is not installed.
+def files_of(archive: Archive, kinds: str | Iterable[str] | None = None) -> Files:
+    """Names in the result's folder and contents of the files of some kinds, as of `save`.
+
+    Raises:
+        InputError: an unknown kind, or one that needs a package that is not installed.
     """
     content = Content(archive)
-    for kind in DEFAULT if kinds is None else kinds:
+    for kind in wanted_kinds(kinds):
         yield from KINDS[kind](content)
 
 
-def reserved(kinds: Iterable[str] | None = None) -> list[str]:
-    """Patterns (of `Path.glob`) of every name that `files_of` may give for some kinds, whatever the archive.
-
-    Parameters
-    ----------
-    kinds : see `KINDS`; default: all but 3dm.
-    """
-    return [name for kind in (DEFAULT if kinds is None else kinds) for name in NAMES[kind]]
+def reserved(kinds: str | Iterable[str] | None = None) -> list[str]:
+    """Patterns (of `Path.glob`) of every name that `files_of` may give for some kinds, whatever the archive."""
+    return [name for kind in wanted_kinds(kinds) for name in NAMES[kind]]
 
 
-def read_kinds(words: str) -> list[str]:
-    """The kinds named in "dxf, csv".
+def wanted_kinds(kinds: object) -> list[str]:
+    """The kinds of files that are wanted.
 
-    Parameters
-    ----------
-    words : in any case, with commas.
-    """
-    kinds = [word.strip().lower() for word in words.split(",") if word.strip()]
-    return [_known(word) for word in kinds or [words]]
+    Args:
+        kinds: one text such as "dxf, csv", in any case, or several kinds, maybe none; None: the default ones.
 
-
-def wanted_kinds(kinds: object) -> list[str] | None:
-    """The kinds of files that are wanted, None for the default ones.
-
-    Parameters
-    ----------
-    kinds : one text, as of `read_kinds`, or several kinds, maybe none.
-
-    Raises
-    ------
-    InputError : an unknown kind.
+    Raises:
+        InputError: an unknown kind.
     """
     if kinds is None:
-        return None
+        return list(DEFAULT)
     if isinstance(kinds, str):
-        return read_kinds(kinds)
+        words = [word.strip().lower() for word in kinds.split(",") if word.strip()]
+        return [_known(word) for word in words or [kinds]]
     if not isinstance(kinds, Iterable) or getattr(kinds, "ndim", 1) == 0:
         raise InputError(f"kinds must be kinds of files, such as {', '.join(KINDS)}, not {described(kinds)}")
     return [_known(kind) for kind in kinds]
@@ -218,7 +202,6 @@ def _svg(content: Content) -> Files:
 
 
 def _pdf(content: Content) -> Files:
-    from rodshell.output.drawings import sheet_set
     from rodshell.output.pdf import drawings_pdf
 
     sheets, paper = sheet_set(content.archive)
@@ -226,79 +209,45 @@ def _pdf(content: Content) -> Files:
 
 
 def _csv(content: Content) -> Files:
-    from rodshell.output import schedules
-
-    archive, results = content.archive, content.archive.results
-    fabrication = results.fabrication
-    tables: dict[str, Callable[[Archive], schedules.Table]] = {
-        "rods": schedules.rods_table,
-        "joints": schedules.joints_table,
-        "supports": schedules.supports_table,
-    }
-    tables |= {"bracing": schedules.bracing_table} if fabrication and fabrication.bracing else {}
-    tables |= {"foundations": schedules.foundations_table} if results.loads else {}
-    tables |= {"stock": schedules.stock_table} if fabrication and fabrication.stock else {}
-    tables |= {"sections": schedules.sections_table} if any(rod.stiffness for rod in results.rods) else {}
-    tables |= {"seams": schedules.seams_table} if results.seams else {}
-    tables |= {"end_paths": schedules.end_paths_table} if "history" in archive.states else {}
-    for name, table in tables.items():
-        columns, rows = table(archive)
-        yield f"schedule/{name}.csv", schedules.csv_text([columns, *rows])
+    for name, schedule in SCHEDULES.items():
+        if schedule.known(content.archive):
+            yield f"schedule/{name}.csv", table_csv(schedule.table(content.archive))
 
 
 def _obj(content: Content) -> Files:
-    from rodshell.output.models import obj_text
-
-    archive = content.archive
-    for state in _shells(archive):
-        yield f"model/{state}.obj", obj_text(archive, state)
+    return content.models("obj", obj_text, shells_among(content.archive.states))
 
 
 def _gltf(content: Content) -> Files:
-    from rodshell.output.models import glb_bytes
-
-    archive = content.archive
-    if archive.final and _meshed(archive):
-        yield f"model/{archive.final}.glb", glb_bytes(archive, archive.final)
+    return content.models("glb", glb_bytes, [content.archive.final] if content.meshed else [])
 
 
 def _vtp(content: Content) -> Files:
-    from rodshell.output.models import time_series, vtp_text
-
-    archive = content.archive
-    for state in _shells(archive) if _meshed(archive) else []:
-        yield f"model/{state}.vtp", vtp_text(archive, state)
-    for name, text in time_series(archive):
+    yield from content.models("vtp", vtp_text, shells_among(content.archive.states) if content.meshed else [])
+    for name, text in time_series(content.archive):
         yield f"model/{name}", text
 
 
 def _compas(content: Content) -> Files:
-    from rodshell.output.models import compas_json
-
-    archive = content.archive
-    if archive.final and _meshed(archive):
-        yield f"model/{archive.final}.json", compas_json(archive, archive.final)
+    return content.models("json", compas_json, [content.archive.final] if content.meshed else [])
 
 
 def _rhino(content: Content) -> Files:
-    from rodshell.output.models import rhino_bytes
-
     yield "model/rodshell.3dm", rhino_bytes(content.archive, content.plan)
 
 
 def _png(content: Content) -> Files:
-    from rodshell.output.grid import shape_of
-    from rodshell.output.pictures import deployment_picture, picture
     from rodshell.output.png import drawing_png
 
     archive = content.archive
-    for name in ("flat", *((archive.final,) if archive.final else ())) if _meshed(archive) else []:
+    shown = [name for name in shape_names(archive) if name in ("flat", archive.final)]
+    for name in shown if content.meshed else []:
         shape = shape_of(archive, name)
         if shape.gap is not None or shape.stress is None:
             yield f"pictures/{name}.png", drawing_png(picture(archive, name))
         if shape.stress is not None:
             yield f"pictures/{name}-stress.png", drawing_png(picture(archive, name, "stress"))
-    if "history" in archive.states and _meshed(archive):
+    if "history" in archive.states and content.meshed:
         yield "pictures/pop_up.png", drawing_png(deployment_picture(archive))
 
 
@@ -308,15 +257,6 @@ def _report(content: Content) -> Files:
     yield "report.html", report_html(content.archive, content.plan, content.drawings, content.svgs)
 
 
-def _shells(archive: Archive) -> list[str]:
-    return [state for state in SHELLS if state in archive.states]
-
-
-def _meshed(archive: Archive) -> bool:
-    """Whether the archive knows the nodes of each rod."""
-    return "rod_nodes" in archive.states
-
-
 KINDS: dict[str, Callable[[Content], Files]] = {
     "dxf": _dxf, "svg": _svg, "pdf": _pdf, "csv": _csv, "obj": _obj, "gltf": _gltf, "vtp": _vtp, "compas": _compas,
     "3dm": _rhino, "png": _png, "report": _report,
@@ -324,24 +264,25 @@ KINDS: dict[str, Callable[[Content], Files]] = {
 DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another package
 
 _DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
-_SCHEDULES = ("rods", "joints", "supports", "foundations", "bracing", "stock", "sections", "seams", "end_paths")
-_STAGES = ("flat", "stage_[0-9]*", "popped_pinned")
+_STAGES = ("flat", "stage_[0-9]*", f"{POPPED}*")
+
+_SHELLS = (DRAPED, f"{POPPED}*")
 
 NAMES: dict[str, list[str]] = {
     "dxf": [f"drawings/{name}.dxf" for name in _DRAWINGS],
     "svg": [f"drawings/{name}.svg" for name in _DRAWINGS],
     "pdf": ["drawings/drawings.pdf"],
-    "csv": [f"schedule/{name}.csv" for name in _SCHEDULES],
-    "obj": [f"model/{state}.obj" for state in SHELLS],
-    "gltf": [f"model/{state}.glb" for state in SHELLS],
+    "csv": [f"schedule/{name}.csv" for name in SCHEDULES],
+    "obj": [f"model/{state}.obj" for state in _SHELLS],
+    "gltf": [f"model/{state}.glb" for state in _SHELLS],
     "vtp": [
-        *(f"model/{state}.vtp" for state in SHELLS), "model/pop_up.pvd",
+        *(f"model/{state}.vtp" for state in _SHELLS), "model/pop_up.pvd",
         *(f"model/pop_up/{state}.vtp" for state in _STAGES),
     ],
-    "compas": [f"model/{state}.json" for state in SHELLS],
+    "compas": [f"model/{state}.json" for state in _SHELLS],
     "3dm": ["model/rodshell.3dm"],
     "png": [
-        *(f"pictures/{state}{what}.png" for state in ("flat", *SHELLS) for what in ("", "-stress")),
+        *(f"pictures/{state}{what}.png" for state in ("flat", *_SHELLS) for what in ("", "-stress")),
         "pictures/pop_up.png",
     ],
     "report": ["report.html"],

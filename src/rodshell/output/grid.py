@@ -1,7 +1,8 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -12,32 +13,28 @@ from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
 from rodshell.results.archive import Archive, made_once
-from rodshell.results.laths import laths_on
-from rodshell.results.states import BENT, GAPS, SHELLS
+from rodshell.results.states import BENT, DRAPED, GAP, POPPED, shells_among
+from rodshell.rods.supports import SUPPORTS
 
-CAPTIONS = {
-    "flat": "Flat, as cut and laid out",
-    "draped": "Draped on the target",
-    "popped_pinned": "Popped up, pinned ends (free to turn)",
-    "popped_clamped": "Popped up, clamped ends (directions held)",
-}
+CAPTIONS = {"flat": "Flat, as cut and laid out", DRAPED: "Draped on the target"}
 STAGE = "stage_"
 FEWEST = 3  # ends of an outline
+AXES = {"u": 0, "v": 1}  # that rods of a family run along, by the format of result.json
+STRAIGHT = 1e-6  # of a rod's length, which it leaves its chord by: it is straight
 
 
 @dataclass(frozen=True, eq=False)
 class GridRod:
     """One rod of a result, with its geometry.
 
-    Parameters
-    ----------
-    record : what the result knows of it.
-    flat : (2, 2) x, y of its two ends in the flat state [m].
-    nodes : (k,) its nodes in the states, from start to end; empty if the states do not hold them.
+    Args:
+        record: what the result knows of it.
+        course: (k, 2) x, y of points along it in the flat state [m]: its two ends, or more where it bends there.
+        nodes: (k,) its nodes in the states, from start to end; empty if the states do not hold them.
     """
 
     record: Rod
-    flat: Floats
+    course: Floats
     nodes: Ints
 
     @property
@@ -47,6 +44,11 @@ class GridRod:
     @property
     def family(self) -> str:
         return self.record.family
+
+    @property
+    def axis(self) -> int | None:
+        """The axis of the flat plan that it runs along at its offset, x or y; None: it has both its own ends."""
+        return None if self.record.offset is None else AXES.get(self.record.family)
 
     @property
     def length(self) -> float:
@@ -64,11 +66,6 @@ class GridRod:
         return self.length if self.record.cut_length is None else self.record.cut_length
 
     @property
-    def laths(self) -> tuple[tuple[float, float], ...]:
-        """The cut ends of each lath that lies on it, from its start [m]."""
-        return laths_on(self.record)
-
-    @property
     def allowance(self) -> float:
         """Length that is added at each end [m]."""
         return 0.5 * (self.cut_length - self.length)
@@ -77,10 +74,46 @@ class GridRod:
         """Distance from the cut end of the start [m] of what lies at the distance `at` from the start."""
         return at + self.allowance
 
+    @property
+    def flat(self) -> Floats:
+        """(2, 2) x, y of its two ends in the flat state [m]."""
+        return self.course[[0, -1]]
+
+    @cached_property
+    def stations(self) -> Floats:
+        """(k,) distances of the points of its course from the start [m]."""
+        return along(self.course)
+
     def point(self, at: float) -> Floats:
-        """(2,) x, y [m] of the flat point at the distance `at` from the start."""
-        along = self.flat[1] - self.flat[0]
-        return np.asarray(self.flat[0] + at / np.linalg.norm(along) * along)
+        """(2,) x, y [m] of the flat point at the distance `at` from the start, which may lie beyond its ends."""
+        k = int(np.clip(np.searchsorted(self.stations, at) - 1, 0, len(self.stations) - 2))
+        (first, second), start = self.course[k : k + 2], self.stations[k]
+        return np.asarray(first + (at - start) / (self.stations[k + 1] - start) * (second - first))
+
+    def heading(self, at: float) -> Floats:
+        """(2,) direction of the flat rod at the distance `at` from the start, half an edge to either side."""
+        step = 0.5 * float(np.diff(self.stations).min())
+        return self.point(at + step) - self.point(at - step)
+
+    @property
+    def as_cut(self) -> Floats:
+        """(k, 2) its course with its allowances at both ends [m]."""
+        ends = self.point(-self.allowance), self.point(self.length + self.allowance)
+        return np.vstack([ends[0], self.course[1:-1], ends[1]])
+
+
+def along(points: Floats) -> Floats:
+    """(k,) distances of points (k, d) of a polyline from its first, along it [m]."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+
+
+def node_stations(archive: Archive, rod: GridRod) -> Floats:
+    """(k,) distances of a rod's nodes from its start [m]; its flat state may not keep them if it is assembled in place,
+    so that rods along curves of the target are measured there."""
+    if archive.results.flat_state is None:
+        return along(archive.states["flat"][rod.nodes])
+    found = along(archive.states[DRAPED][rod.nodes])
+    return np.asarray(found * (rod.length / found[-1]))
 
 
 @dataclass(frozen=True)
@@ -102,12 +135,28 @@ class GridJoint:
 @made_once
 def rods_of(archive: Archive) -> list[GridRod]:
     """All rods, in the order of the result."""
-    nodes = _nodes(archive)
-    flat = archive.states.get("flat")
-    return [
-        _grid_rod(rod, nodes[k] if k < len(nodes) else np.empty(0, dtype=np.intp), flat)
-        for k, rod in enumerate(archive.results.rods)
-    ]
+    states, rods, nodes = archive.states, archive.results.rods, list[Ints]()
+    if "rod_nodes" in states and "rod_start" in states:
+        nodes = np.split(states["rod_nodes"].astype(np.intp), states["rod_start"][1:])
+    nodes += [np.empty(0, dtype=np.intp)] * len(rods)
+    return [_grid_rod(rod, along, states.get("flat")) for rod, along in zip(rods, nodes, strict=False)]
+
+
+def meshed_rods(archive: Archive) -> list[GridRod]:
+    """The rods whose nodes the states hold: all, or none."""
+    return [rod for rod in rods_of(archive) if len(rod.nodes)]
+
+
+def end_nodes(rods: Iterable[GridRod]) -> Ints:
+    """(2 m,) the nodes of start and end of each rod in turn."""
+    return np.array([rod.nodes[[0, -1]] for rod in rods], dtype=np.intp).ravel()
+
+
+def family_numbers(families: Iterable[str]) -> list[int]:
+    """For the family of each rod, which one of the grid it is, from 0, in the order in which they come."""
+    names = list(families)
+    numbers = {family: k for k, family in enumerate(dict.fromkeys(names))}
+    return [numbers[family] for family in names]
 
 
 def joints_of(rods: list[GridRod]) -> list[GridJoint]:
@@ -123,38 +172,30 @@ def joints_of(rods: list[GridRod]) -> list[GridJoint]:
 
 
 def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
-    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods.
-
-    Parameters
-    ----------
-    positions : (n, 3) nodes of a shape [m].
-    """
-    return {name: positions[nodes].mean(axis=0) for name, nodes in _joint_nodes(archive).items()}
+    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods."""
+    nodes = archive.states.get("rod_nodes", np.empty(0))
+    return {joint.id: positions[nodes[entries]].mean(axis=0) for joint, entries in joint_entries(archive)}
 
 
 def outlines_of(rods: list[GridRod]) -> list[Ints]:
-    """Rod ends along each outline of the flat grid, see `outlines`.
-
-    Parameters
-    ----------
-    rods : those that are drawn; the ends of rod k are 2 k and 2 k + 1.
-    """
+    """Rod ends along each outline of the flat grid, those of rod k being 2 k and 2 k + 1, see `outlines`."""
     return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
 
 
 @made_once
-def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
-    """The nodes of each joint that has some, on both of its rods, by its id: one node twice, or one in either layer."""
-    rods, flat = rods_of(archive), archive.states.get("flat")
-    nodes = dict[str, list[int]]()
-    if flat is None:
-        return nodes
-    stations = [np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[:1]], axis=1) for rod in rods]
-    for joint in joints_of(rods):
-        if all(len(rods[k].nodes) for k in joint.rods):
-            pairs = zip(joint.rods, joint.at, strict=True)
-            nodes[joint.id] = [int(rods[k].nodes[np.abs(stations[k] - at).argmin()]) for k, at in pairs]
-    return nodes
+def joint_entries(archive: Archive) -> list[tuple[GridJoint, list[int]]]:
+    """Every joint of rods that have nodes, and the entry of `rod_nodes` on either rod that lies nearest to it: one node
+    twice, or one in either layer."""
+    if "flat" not in archive.states:
+        return []
+    rods = meshed_rods(archive)
+    starts: list[int] = np.cumsum([0, *(len(rod.nodes) for rod in rods)]).tolist()
+    stations = [node_stations(archive, rod) for rod in rods]
+
+    def entry(rod: int, at: float) -> int:
+        return starts[rod] + int(np.abs(stations[rod] - at).argmin())
+
+    return [(joint, [*map(entry, joint.rods, joint.at)]) for joint in joints_of(rods)]
 
 
 @lru_cache(maxsize=4)
@@ -163,35 +204,29 @@ def _outlines(flat: bytes) -> list[Ints]:
     return outlines(np.frombuffer(flat).reshape(-1, 2, 2))
 
 
-def _nodes(archive: Archive) -> list[Ints]:
-    if "rod_nodes" not in archive.states or "rod_start" not in archive.states:
-        return []
-    return np.split(archive.states["rod_nodes"].astype(np.intp), archive.states["rod_start"][1:])
-
-
 def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
-    if rod.family == "u" and rod.offset is not None:
-        ends = np.array([[rod.start, rod.offset], [rod.end, rod.offset]])
-    elif rod.family == "v" and rod.offset is not None:
-        ends = np.array([[rod.offset, rod.start], [rod.offset, rod.end]])
+    course = np.array([[rod.start, 0.0], [rod.end, 0.0]])
+    if rod.offset is not None and rod.family in AXES:
+        course = np.full((2, 2), rod.offset)
+        course[:, AXES[rod.family]] = rod.start, rod.end
     elif flat is not None and len(nodes):
-        ends = np.asarray(flat[nodes[[0, -1]], :2], dtype=np.float64)
-    else:
-        ends = np.array([[rod.start, 0.0], [rod.end, 0.0]])
-    return GridRod(rod, ends, nodes)
+        course = np.asarray(flat[nodes, :2], dtype=np.float64)
+        chord, off = course[-1] - course[0], course - course[0]
+        if np.abs(off[:, 0] * chord[1] - off[:, 1] * chord[0]).max() < STRAIGHT * float(chord @ chord):
+            course = course[[0, -1]]
+    return GridRod(rod, course, nodes)
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
     """One shape of the grid.
 
-    Parameters
-    ----------
-    name : "flat", "draped", "popped_pinned", "popped_clamped", or "stage_1", ... of the deployment.
-    positions : (n, 3) [m].
-    gap : (n,) signed distances to the target [m], where known.
-    stress : (k,) [Pa], curvature : (k,) [1/m] and force : (k,) normal forces [N], tension positive, at each entry of
-        `rod_nodes`, where known.
+    Args:
+        name: "flat", "draped", "popped_pinned", "popped_clamped", or "stage_1", ... of the deployment.
+        positions: (n, 3) [m].
+        gap: (n,) signed distances to the target [m], where known.
+        stress: (k,) [Pa], curvature : (k,) [1/m] and force : (k,) normal forces [N], tension positive, at each entry of
+            `rod_nodes`, where known.
     """
 
     name: str
@@ -210,32 +245,35 @@ class Shape:
 def shape_names(archive: Archive) -> list[str]:
     """All shapes, in the order of the deployment."""
     stages = [f"{STAGE}{k}" for k in range(1, len(archive.states.get("history_share", ())) - 1)]
-    states = archive.states
-    return [name for name in ("flat", *stages, *SHELLS) if name.startswith(STAGE) or name in states]
+    states, flat = archive.states, ("flat",) if lies_flat(archive) else ()
+    return [name for name in (*flat, *stages, *shells_among(states)) if name.startswith(STAGE) or name in states]
+
+
+def lies_flat(archive: Archive) -> bool:
+    """Whether there is a flat grid to be drawn; else the shell is assembled in place."""
+    flat = archive.results.flat_state
+    return flat is None or flat.lies_flat is not False
 
 
 def caption_of(archive: Archive, state: str) -> str:
-    """What a state shows, in words.
-
-    Parameters
-    ----------
-    state : a key of `CAPTIONS`.
-    """
+    """What a state shows, in words."""
     if archive.is_lost(state):
-        return f"Not popped up, {state.removeprefix('popped_')} ends: where the computation stopped"
-    return CAPTIONS[state]
+        return f"Not popped up, {state.removeprefix(POPPED)} ends: where the computation stopped"
+    return CAPTIONS.get(state) or f"Popped up, {supported(state)}"
+
+
+def supported(state: str, *more: str) -> str:
+    """With which ends a popped-up state is, with notes on them."""
+    name = state.removeprefix(POPPED)
+    notes = "; ".join([*([SUPPORTS[name].note] if name in SUPPORTS else []), *more])
+    return f"{name} ends{f' ({notes})' if notes else ''}"
 
 
 def shape_of(archive: Archive, name: str) -> Shape:
-    """A shape by its name.
+    """A shape by its name, one of `shape_names`.
 
-    Parameters
-    ----------
-    name : one of `shape_names`.
-
-    Raises
-    ------
-    OutputError : the archive has no such shape.
+    Raises:
+        OutputError: the archive has no such shape.
     """
     known, states = shape_names(archive), archive.states
     if name not in known:
@@ -245,9 +283,9 @@ def shape_of(archive: Archive, name: str) -> Shape:
         caption = f"Deployment at {100 * states['history_share'][k]:.0f} %"
         curvature, stress = (states[f"history_{what}"][k] if f"history_{what}" in states else None for what in BENT)
         return Shape(name, caption, np.asarray(states["history"][k], dtype=float), None, stress, curvature)
-    ends = name.removeprefix("popped_")
+    ends = name.removeprefix(POPPED)
     curvature, stress = (states.get(f"{what}_{ends}") for what in BENT)
-    gap = states.get(GAPS.get(name, ""))
+    gap = states.get(GAP + ends)
     force = states.get(f"force_{ends}")
     return Shape(name, caption_of(archive, name), np.asarray(states[name], dtype=float), gap, stress, curvature, force)
 
@@ -255,24 +293,19 @@ def shape_of(archive: Archive, name: str) -> Shape:
 def deployed_shape(archive: Archive, name: str) -> Shape:
     """A shape as the deployment passes it: the flat grid not in the axes of its drawings, but where it is laid out on
     site before its ends move.
-
-    Parameters
-    ----------
-    name : one of `shape_names`.
     """
     shape, final = shape_of(archive, name), archive.final
     if not shape.flat or final is None:
         return shape
-    ends = np.array([rod.nodes[[0, -1]] for rod in rods_of(archive) if len(rod.nodes) > 1], dtype=np.intp).ravel()
+    ends = end_nodes(meshed_rods(archive))
     return replace(shape, positions=laid_out(shape.positions, archive.states[final], ends))
 
 
 def laid_out(flat: Floats, final: Floats, ends: Ints) -> Floats:
     """The flat grid (n, 3), moved in its plane to below a shape (n, 3): where its deployment begins.
 
-    Parameters
-    ----------
-    ends : (e,) nodes of the rod ends, which come as near as they can to where they end.
+    Args:
+        ends: (e,) nodes of the rod ends, which come as near as they can to where they end.
     """
     goals = final[ends]
     return PlanarMotion.onto(flat[ends], goals).moved(flat, float(goals[:, 2].min()))
@@ -286,14 +319,12 @@ def outlines(rods: Floats) -> list[Ints]:
 
     Grids that do not touch each other have one outline each. No end is in two outlines, and none has fewer than three.
 
-    Parameters
-    ----------
-    rods : (m, 2, 2) the two ends of each straight rod [m].
+    Args:
+        rods: (m, 2, 2) the two ends of each straight rod [m].
 
-    Returns
-    -------
-    For each outline the ends (k,) along it, 2 r for the start of rod r and 2 r + 1 for its end: counterclockwise around
-    a grid, clockwise around an opening. Outlines with most ends come first.
+    Returns:
+        For each outline the ends (k,) along it, 2 r for the start of rod r and 2 r + 1 for its end: counterclockwise
+        around a grid, clockwise around an opening. Outlines with most ends come first.
     """
     if not len(rods):
         return []

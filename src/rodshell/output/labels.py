@@ -7,28 +7,28 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import isotonic_regression
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.boxes import boxes_meet, lines_meet, lines_near
 from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
 
-Extent = tuple[float, float, float, float]
+_Extent = tuple[float, float, float, float]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
 CLOSE = 5  # positions that are tried on a label's line
-STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # and next to it
+STEPS, _TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # and next to it
 THIN = 0.1  # what a line takes, over the size of its text
 
 
 class Label(NamedTuple):
     """A rod's label at one of its ends.
 
-    Parameters
-    ----------
-    centre : (2,) middle of the text.
-    angle : of the text against x [rad].
-    end : (2,) the rod's end that it belongs to.
-    moved : whether it stands so far off that it needs a line to its rod.
+    Args:
+        centre: (2,) middle of the text.
+        angle: of the text against x [rad].
+        end: (2,) the rod's end that it belongs to.
+        moved: whether it stands so far off that it needs a line to its rod.
     """
 
     text: str
@@ -56,19 +56,17 @@ class Label(NamedTuple):
         return np.array([(x, y), (a + c * u - s * v, b + s * u + c * v)])
 
 
-MOST_SQUARES = 10_000  # that a box is found by; one that lies in more is compared with all
+_MOST_SQUARES = 10_000  # that a box is found by; one that lies in more is compared with all
 WIDE = ()
 
 
 class Room:
-    """The boxes (4, 2) that are taken, found by the square of the plane that they lie in.
-
-    within : an outer room; what is taken there is taken here too.
-    """
+    """The boxes (4, 2) that are taken, also those `within` an outer room, found by the square of the plane that they
+    lie in."""
 
     def __init__(self, square: float, within: "Room | None" = None) -> None:
         self._square = square
-        self._taken: dict[tuple[int, ...], list[tuple[Extent, Floats]]] = {}
+        self._taken: dict[tuple[int, ...], list[tuple[_Extent, Floats]]] = {}
         self._boxes = list[Floats]()
         self._within = within
 
@@ -105,15 +103,15 @@ class Room:
         for box in other._boxes:
             self.take(box)
 
-    def _squares(self, extent: Extent) -> list[tuple[int, ...]]:
+    def _squares(self, extent: _Extent) -> list[tuple[int, ...]]:
         (left, low, right, high), square = extent, self._square
-        if (right - left + square) * (high - low + square) > MOST_SQUARES * square**2:
+        if (right - left + square) * (high - low + square) > _MOST_SQUARES * square**2:
             return [WIDE]
         rows = range(int(low // square), int(high // square) + 1)
         return [(x, y) for x in range(int(left // square), int(right // square) + 1) for y in rows]
 
 
-def _extent(box: Floats) -> Extent:
+def _extent(box: Floats) -> _Extent:
     """Lowest x and y, highest x and y."""
     (a, b, c, d), (e, f, g, h) = box.T.tolist()
     return min(a, b, c, d), min(e, f, g, h), max(a, b, c, d), max(e, f, g, h)
@@ -124,12 +122,9 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
 
     A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
 
-    Parameters
-    ----------
-    texts : the label of each rod.
-    rods : (m, 2, 2) both ends of each rod.
-    size : of the text, in the unit of `rods`.
-    at : (m, 2) whether an end is to have one; default: all.
+    Args:
+        size: of the text, in the unit of `rods`.
+        at: (m, 2) whether an end is to have one; default: all.
     """
     placed: list[Label] = []
     room, labelled = Room(4 * size), np.zeros(len(rods), dtype=bool)
@@ -137,7 +132,7 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
     for end in (0, 1):
         for k in np.flatnonzero(wanted[:, end]).tolist():
             choices = _on_own_line(texts[k], rods[k, end], rods[k, 1 - end], size)
-            label = next((label for label in choices if fits(label, size, room, rods)), None)
+            label = next((label for label in choices if _fits(label, size, room, rods)), None)
             if label is not None:
                 placed.append(label)
                 take(label, size, room)
@@ -156,75 +151,49 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
 
     The text covers none of the lines (m, 2, 2) either, the line to it may cross them.
 
-    Parameters
-    ----------
-    end : (2,) the rod's end that it belongs to.
-    way : (2,) to the side that is tried first.
-    size : of the text, in the unit of `end`.
-    lines : (m, 2, 2) lines that the text must not cover.
+    Args:
+        way: (2,) to the side that is tried first.
+        size: of the text, in the unit of `end`.
     """
     first = float(np.arctan2(way[1], way[0]))
     half = 0.5 * size * np.array([LETTER * len(text), LINE])
     reach = 0.5 * (STEPS + 2) * size + 2 * float(half.max())
     lines = lines_near(lines, end - reach, end + reach)
-    for step, turn in ((step, turn) for step in range(STEPS) for turn in TURNS):
+    for step, turn in ((step, turn) for step in range(STEPS) for turn in _TURNS):
         ray = np.array([np.cos(first + turn), np.sin(first + turn)])
         to_side = float(np.min(half / np.maximum(np.abs(ray), 1e-12)))  # from the box's middle to its rim
         label = Label(text, end + ((0.8 + 0.5 * step) * size + to_side) * ray, 0.0, end, moved=True)
-        if fits(label, size, room, lines):
+        if _fits(label, size, room, lines):
             return label
     return None
 
 
 def take(label: Label, size: float, room: Room) -> None:
-    """Take the label's room, and that of the line to it.
-
-    Parameters
-    ----------
-    size : of its text, in the unit of its coordinates.
-    room : in which its box is taken.
-    """
+    """Take the room of a label, its text of a size, and that of the line to it."""
     room.take(label.box(size))
     if label.moved:
         room.take(thin(label.leader(size), THIN * size))
 
 
-def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
-    """Whether a label and the line to it find room; the label must cover none of the lines.
-
-    Parameters
-    ----------
-    size : of the text; room : what is taken; lines : (m, 2, 2), all in the unit of the label.
-    """
+def _fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
+    """Whether a label and the line to it find room; the label must cover none of the lines."""
     box = label.box(size)
     return (
         room.free(box)
         and not lines_meet(box, lines)
-        and (not label.moved or room.free(off_its_mark(label.leader(size), size)))
+        and (not label.moved or room.free(_off_its_mark(label.leader(size), size)))
     )
 
 
-def off_its_mark(line: Floats, size: float) -> Floats:
-    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is.
-
-    Parameters
-    ----------
-    line : (2, 2) from the mark to the label.
-    size : of the text, in the unit of the line; half of it is left out at the mark.
-    """
+def _off_its_mark(line: Floats, size: float) -> Floats:
+    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is."""
     (ax, ay), (bx, by) = line.tolist()
     share = min(0.5 * size / max(hypot(bx - ax, by - ay), 1e-12), 0.9)
     return thin(np.array([(ax + share * (bx - ax), ay + share * (by - ay)), (bx, by)]), THIN * size)
 
 
 def thin(line: Floats, width: float) -> Floats:
-    """(4, 2) corners of the room of a line (2, 2).
-
-    Parameters
-    ----------
-    line : (2, 2) its two ends.
-    width : of the room, in the unit of the line.
-    """
+    """(4, 2) corners of the room of a line (2, 2) of some width."""
     (ax, ay), (bx, by) = line.tolist()
     half = 0.5 * width / max(hypot(bx - ax, by - ay), 1e-12)
     x, y = half * (ay - by), half * (bx - ax)  # to the left
@@ -232,28 +201,11 @@ def thin(line: Floats, width: float) -> Floats:
 
 
 def spread(positions: ArrayLike, gap: float) -> Floats:
-    """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares.
-
-    Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
-
-    Parameters
-    ----------
-    positions : (k,) positions on a line; gap : least distance of neighbours.
-    """
+    """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares."""
     asked = np.asarray(positions, dtype=float)
-    order = np.argsort(asked, kind="stable")
-    wanted = asked[order] - gap * np.arange(len(asked))  # now they need only be ascending
-    groups: list[tuple[float, int]] = []
-    for value in wanted.tolist():
-        group = (value, 1)
-        while groups and groups[-1][0] > group[0]:
-            mean, count = groups.pop()
-            group = ((mean * count + group[0] * group[1]) / (count + group[1]), count + group[1])
-        groups.append(group)
+    order, apart = np.argsort(asked, kind="stable"), gap * np.arange(len(asked))
     result = np.empty_like(asked)
-    result[order] = np.concatenate([np.full(n, mean) for mean, n in groups] or [np.empty(0)]) + gap * np.arange(
-        len(asked)
-    )
+    result[order] = isotonic_regression(asked[order] - apart).x + apart
     return result
 
 
@@ -264,6 +216,11 @@ def _on_own_line(text: str, end: Floats, other: Floats, size: float) -> Iterable
     first = (0.55 + 0.5 * LETTER * len(text)) * size
     for step in range(CLOSE):
         yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2)
+
+
+def segments(courses: Iterable[Floats]) -> Floats:
+    """(m, 2, 2) the lines of polylines (k, 2)."""
+    return np.concatenate([np.empty((0, 2, 2)), *(np.stack([line[:-1], line[1:]], axis=1) for line in courses)])
 
 
 def closed_segments(outline: Floats) -> Floats:
@@ -280,10 +237,10 @@ def upright(angle: float) -> float:
 
 # Callouts
 
-CALLOUT_SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names: the largest at which all of an outline find room
+_CALLOUT_SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names: the largest at which all of an outline find room
 OFF = 1.3  # from a place to where its name may begin
 GAPS = (1.1, 1.7, np.inf)  # from name to name, or what there is all around; at the wider ones their ways turn evenly
-EVENED = 6  # times
+_EVENED = 6  # times
 MANY = 24  # names: where more find no room, the drawing needs a larger scale, not other places for them
 FARTHEST = 8.0  # from a place to the start of its name's line
 
@@ -300,10 +257,6 @@ def outward(points: Floats) -> Floats:
     """(k, 2) unit normals, to the right of an outline that is walked through the points (k, 2); 0 for a single one.
 
     At each place across the chord of its neighbours, so that points that nearly coincide do not turn it.
-
-    Parameters
-    ----------
-    points : (k, 2) along an outline, in their order.
     """
     along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     return _unit(np.column_stack([along[:, 1], -along[:, 0]]))
@@ -319,19 +272,20 @@ def callouts(
     still finds no room on its line is put anywhere near its place; it is left out if there is no room, or if there are
     more than MANY such names.
 
-    Parameters
-    ----------
-    away : (k, 2) unit vectors from each place to the side where its name is to stand.
+    Args:
+        away: (k, 2) unit vectors from each place to the side where its name is to stand.
     """
     best: _Tried | None = None
-    for size, gap in ((text * share, gap) for gap in GAPS for share in CALLOUT_SIZES):
-        tried = _tried(names, points, away, size, gap, room, lines)
+    for size, gap in ((text * share, gap) for gap in GAPS for share in _CALLOUT_SIZES):
+        taken, (starts, ways) = Room(4 * size, room), _slots(points, away, size, gap)
+        labels = [_free(*slot, size, taken, lines) for slot in zip(names, points, starts, ways, strict=True)]
+        tried = _Tried(labels, size, taken)
         best = tried if best is None or tried.missing < best.missing else best
         if not best.missing or (size <= text * SMALL and best.missing > MANY):
             break
     assert best is not None
     room.join(best.room)
-    sizes = [text * share for share in CALLOUT_SIZES if text * share <= best.size]
+    sizes = [text * share for share in _CALLOUT_SIZES if text * share <= best.size]
     found = list[Callout]()
     for label, name, place, way in zip(best.labels, names, points, away, strict=True):
         if label is not None:
@@ -354,15 +308,6 @@ class _Tried:
         return sum(label is None for label in self.labels)
 
 
-def _tried(
-    names: Sequence[str], points: Floats, away: Floats, size: float, gap: float, room: Room, lines: Floats
-) -> _Tried:
-    taken = Room(4 * size, room)
-    starts, ways = _slots(points, away, size, gap)
-    labels = [_free(*slot, size, taken, lines) for slot in zip(names, points, starts, ways, strict=True)]
-    return _Tried(labels, size, taken)
-
-
 def _elsewhere(
     name: str, place: Floats, way: Floats, sizes: Sequence[float], room: Room, lines: Floats
 ) -> list[Callout]:
@@ -380,7 +325,7 @@ def _slots(points: Floats, away: Floats, size: float, gap: float) -> tuple[Float
 
     gap : from a name to the next, in text sizes; less if the outline is too short.
     """
-    for _ in range(EVENED if gap > GAPS[0] else 0):
+    for _ in range(_EVENED if gap > GAPS[0] else 0):
         away = _unit(np.roll(away, 1, axis=0) + 2 * away + np.roll(away, -1, axis=0))
     aside = points + OFF * size * away
     steps = np.linalg.norm(np.roll(aside, -1, axis=0) - aside, axis=1)  # to the next place, all around
@@ -403,13 +348,13 @@ def _free(name: str, place: Floats, start: Floats, way: Floats, size: float, roo
     """The first free place of a name along its line, taken with the line to it."""
     angle = upright(float(np.arctan2(way[1], way[0])))
     half = (0.3 + 0.5 * LETTER * len(name)) * size
-    foot = off_its_mark(np.array([place, start]), size)
+    foot = _off_its_mark(np.array([place, start]), size)
     near = float(np.linalg.norm(start - place)) < FARTHEST * size
     reach = 2 * half + CLOSE * size
     lines = lines_near(lines, start - reach, start + reach)
     for step in range(CLOSE if near and room.free(foot) else 0):
         label = Label(name, start + (half + 0.5 * step * size) * way, angle, start, moved=True)
-        if fits(label, size, room, lines) and room.free(thin(label.leader(size), THIN * size)):
+        if _fits(label, size, room, lines) and room.free(thin(label.leader(size), THIN * size)):
             room.take(foot)
             take(label, size, room)
             return label

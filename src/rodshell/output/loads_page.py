@@ -1,14 +1,15 @@
 """The report's part on a shell under loads, which an engineer can check by hand: assumptions, utilisation, deflections,
 stability, modes, foundations and bracing."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from math import isnan
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
-from rodshell.figures.loads import LoadedShell
+from rodshell.figures.loads import LoadedShell, Utilisations
 from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
 from rodshell.output.schedules import loaded_shells
@@ -17,10 +18,13 @@ from rodshell.results import Archive, Results
 from rodshell.results.wording import millimetres, percent, rounded, rounded_down, rounding_of, shown_factor, stress
 from rodshell.units import percent_text
 
+Row = dict[str, str]
+Shells = Sequence[tuple[str, Ends, LoadedShell]]
+
 CLOSE = 1.005  # both factors are found within 0.2 %: a larger ratio of theirs says something
-MOST_NAMES = 4  # of joints that slip
-MOST_MODES = 3  # pictures, of the combination that falls first
-BY = {
+_MOST_NAMES = 4  # of joints that slip
+_MOST_MODES = 3  # pictures, of the combination that falls first
+_BY = {
     "bending": "bending and axial force",
     "shear": "torsion and shear force",
     "slip": "slip of a joint",
@@ -54,15 +58,20 @@ def loads_page(archive: Archive) -> dict[str, Any] | None:
     ]
     return {
         "assumptions": [*_strengths(results), *STATED, *([SEAMS] if results.patches else [])],
-        "strength": [_strength(results, *each) for each in shells],
-        "deflection": [_deflection(results, *each) for each in shells],
-        "stability": [_stability(*each) for each in shells],
+        "strength": _rows(shells, partial(_strength, results)),
+        "deflection": _rows(shells, partial(_deflection, results)),
+        "stability": _rows(shells, _stability),
         "frequencies": list(_frequencies(shells)),
         "modes": pictures,
-        "foundations": [_foundation(results, *each) for each in shells],
-        "joints": [_joints(*each) for each in shells if len(each[2].joint_moments)],
-        "bracing": [_bracing(results, *each) for each in shells if each[2].bracing],
-    }  # fmt: skip
+        "foundations": _rows(shells, partial(_foundation, results)),
+        "joints": _rows([each for each in shells if len(each[2].joint_moments)], _joints),
+        "bracing": _rows([each for each in shells if each[2].bracing], partial(_bracing, results)),
+    }
+
+
+def _rows(shells: Shells, figures: Callable[[LoadedShell], Row]) -> list[Row]:
+    """A row for each shell under loads: cells by their heads."""
+    return [{"Combination": name, "Ends": ends, **figures(shell)} for name, ends, shell in shells]
 
 
 def _strengths(results: Results) -> Iterator[str]:
@@ -90,34 +99,36 @@ def _strengths(results: Results) -> Iterator[str]:
         yield "Creep is not in the figures; how large it is, is not known of this material."
 
 
-def _strength(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
-    place, parts = shell.governs, shell.utilisations
-    each = [None] * 4 if parts is None else [parts.bending, parts.shear, parts.slip, parts.permanent]
+def _strength(results: Results, shell: LoadedShell) -> Row:
+    place, parts = shell.governs, shell.utilisations or Utilisations()
     where = ""
     if place is not None:
         at = millimetres(place.at, rounding=rounding_of(results))
-        where = f"{BY.get(place.by or '', place.by or '')}: {place.rod}, {at} from its start"
-    return [
-        name,
-        ends,
-        shell.duration or "",
-        *("not known" if value is None else percent(value) for value in each),
-        where,
-    ]
+        where = f"{_BY.get(place.by or '', place.by or '')}: {place.rod}, {at} from its start"
+    return {
+        "Lasts": shell.duration or "",
+        "Bending": _known(parts.bending, percent),
+        "Shear": _known(parts.shear, percent),
+        "Slip": _known(parts.slip, percent),
+        "Permanent": _known(parts.permanent, percent),
+        "Governs": where,
+    }
 
 
-def _deflection(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+def _known(value: float | None, show: Callable[[float], str]) -> str:
+    return "not known" if value is None else show(value)
+
+
+def _deflection(results: Results, shell: LoadedShell) -> Row:
     deflection, span = shell.max_deflection, _span(results)
-    return [
-        name,
-        ends,
-        rounded_down(shell.at_factor or 0.0),
-        millimetres(deflection, rounding=rounding_of(results)),
-        "" if not deflection or span is None else f"span/{span / deflection:.0f}",
-        "not known" if shell.max_stress is None else stress(shell.max_stress),
-        "" if shell.euler is None else percent(shell.euler),
-        "" if shell.euler_at is None else shell.euler_at.rod,
-    ]
+    return {
+        "At factor": rounded_down(shell.at_factor or 0.0),
+        "Deflection": millimetres(deflection, rounding=rounding_of(results)),
+        "Span over it": "" if not deflection or span is None else f"span/{span / deflection:.0f}",
+        "Largest stress": _known(shell.max_stress, stress),
+        "Compression over Euler load": "" if shell.euler is None else percent(shell.euler),
+        "in": "" if shell.euler_at is None else shell.euler_at.rod,
+    }
 
 
 def _span(results: Results) -> float | None:
@@ -126,7 +137,7 @@ def _span(results: Results) -> float | None:
     return float(np.ptp(points[:, :2], axis=0).min()) if len(points) else None
 
 
-def _stability(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+def _stability(shell: LoadedShell) -> Row:
     """Three figures side by side."""
     imperfect = shown_factor(shell.imperfect_factor)
     if shell.imperfect_kind is None:
@@ -136,16 +147,14 @@ def _stability(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     above = (shell.imperfect_factor or np.inf) > CLOSE * (shell.limit_factor or np.inf)
     if above and shell.limit_kind == "bifurcation" and shell.imperfect_kind not in (None, "not followed"):
         imperfect += " (the bifurcation is stable)"
-    return [
-        name,
-        ends,
-        shown_factor(shell.linear_factor),
-        f"{shown_factor(shell.limit_factor)} ({shell.limit_kind})",
-        imperfect,
-    ]
+    return {
+        "Linear buckling": shown_factor(shell.linear_factor),
+        "Path of the perfect shell": f"{shown_factor(shell.limit_factor)} ({shell.limit_kind})",
+        "With imperfections": imperfect,
+    }
 
 
-def _frequencies(shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[str]:
+def _frequencies(shells: Shells) -> Iterator[str]:
     """Natural frequencies with each kind of ends: they do not depend on the combination."""
     for ends, shell in {ends: shell for _, ends, shell in shells}.items():
         known = [rounded(value) for value in shell.frequencies.tolist() if not isnan(value)]
@@ -153,10 +162,10 @@ def _frequencies(shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[str]:
             yield f"{ends} ends: {', '.join(known)} Hz"
 
 
-def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[tuple[str, Ends, str]]:
+def _modes(archive: Archive, shells: Shells) -> Iterator[tuple[str, Ends, str]]:
     """Caption, ends and state of the pictures: of the combination that falls first."""
     name, ends, shell = min(shells, key=lambda each: np.inf if each[2].limit_factor is None else each[2].limit_factor)
-    for k, factor in enumerate(shell.mode_factors[:MOST_MODES].tolist(), start=1):
+    for k, factor in enumerate(shell.mode_factors[:_MOST_MODES].tolist(), start=1):
         state = f"loaded_buckling_{ends}_{name}_{k}"
         if state in archive.states and not isnan(factor):
             yield (
@@ -168,7 +177,7 @@ def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Ite
         yield f"How the shell gives way under {name}, {ends} ends: {shell.limit_kind}", ends, state
 
 
-def _foundation(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+def _foundation(results: Results, shell: LoadedShell) -> Row:
     """Load and reactions, and the largest forces that the foundations carry."""
     forces = shell.support_forces
     sums = (shell.load_sum, shell.reaction_sum)
@@ -176,49 +185,45 @@ def _foundation(results: Results, name: str, ends: Ends, shell: LoadedShell) -> 
     across = np.linalg.norm(forces[:, :2], axis=1)
     down = int(np.argmax(forces[:, 2]))
     names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
-    return [
-        name,
-        ends,
-        ", ".join(_kilo(value) for value in load),
-        ", ".join(_kilo(value) for value in held),
-        f"{_kilo(forces[down, 2])} at {names[down]}",
-        f"{_kilo(across.max())} at {names[int(np.argmax(across))]}",
-        "none" if not shell.uplift else f"{_kilo(shell.uplift)} at {names[int(np.argmin(forces[:, 2]))]}",
-    ]
+    lifted = f"{_kilo(shell.uplift)} at {names[int(np.argmin(forces[:, 2]))]}" if shell.uplift else "none"
+    return {
+        "Loads x, y, z": ", ".join(map(_kilo, load)),
+        "Reactions x, y, z": ", ".join(map(_kilo, held)),
+        "Largest vertical": f"{_kilo(forces[down, 2])} at {names[down]}",
+        "Largest horizontal": f"{_kilo(across.max())} at {names[int(np.argmax(across))]}",
+        "Largest uplift": lifted,
+    }
 
 
 def _kilo(newtons: float) -> str:
     return f"{round(1e-3 * newtons, 2) + 0.0:.2f}"
 
 
-def _joints(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+def _joints(shell: LoadedShell) -> Row:
     """Moments of locked joints, and which joints slip."""
     largest = float(np.abs(np.nan_to_num(shell.joint_moments)).max(initial=0.0))
     slip = None if shell.utilisations is None else shell.utilisations.slip
-    more = f" and {len(shell.slipping) - MOST_NAMES} more" if len(shell.slipping) > MOST_NAMES else ""
-    return [
-        name,
-        ends,
-        rounded(largest),
-        shell.joint_moment_at or "",
-        "not known" if slip is None else percent(slip),
-        "not known" if slip is None else ", ".join(shell.slipping[:MOST_NAMES]) + more or "none",
-    ]
+    more = f" and {len(shell.slipping) - _MOST_NAMES} more" if len(shell.slipping) > _MOST_NAMES else ""
+    slipping = ", ".join(shell.slipping[:_MOST_NAMES]) + more or "none"
+    return {
+        "Largest moment, N m": rounded(largest),
+        "at": shell.joint_moment_at or "",
+        "Of slip": _known(slip, percent),
+        "Slipping": "not known" if slip is None else slipping,
+    }
 
 
-def _bracing(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+def _bracing(results: Results, shell: LoadedShell) -> Row:
     forces = np.array([force for force in shell.bracing if force is not None])
     braces = results.fabrication.bracing if results.fabrication else ()
     pull, push = max(0.0, float(forces.max(initial=0.0))), max(0.0, -float(forces.min(initial=0.0)))
     where = int(np.argmax([abs(force or 0.0) for force in shell.bracing]))
     most = f"{braces[where].start} to {braces[where].end}" if where < len(braces) else ""
-    return [
-        name,
-        ends,
-        str(len(forces)),
-        _kilo(pull),
-        _kilo(push),
-        most,
-        percent_text(float(np.mean(forces == 0.0))),
-        "not known" if shell.bracing_utilisation is None else percent(shell.bracing_utilisation),
-    ]
+    return {
+        "Braces": str(len(forces)),
+        "Largest tension": _kilo(pull),
+        "Largest compression": _kilo(push),
+        "Largest in": most,
+        "Slack": percent_text(float(np.mean(forces == 0.0))),
+        "Utilisation": _known(shell.bracing_utilisation, percent),
+    }

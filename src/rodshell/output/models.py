@@ -25,7 +25,17 @@ from rodshell.figures.form import Section, Stiffness
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.drawings.flat import FlatPlan
-from rodshell.output.grid import STAGE, Shape, deployed_shape, joint_places, joints_of, rods_of, shape_names, shape_of
+from rodshell.output.grid import (
+    STAGE,
+    GridRod,
+    Shape,
+    deployed_shape,
+    joint_places,
+    joints_of,
+    meshed_rods,
+    shape_names,
+    shape_of,
+)
 from rodshell.output.svg import tag
 from rodshell.results import Archive
 
@@ -34,37 +44,25 @@ COLOURS = {"CUT": (34, 40, 47), "MARK": (179, 55, 44), "FINAL": (31, 95, 139), "
 
 
 def obj_text(archive: Archive, state: str) -> str:
-    """All nodes [m], then one object with one polyline for each rod.
-
-    Parameters
-    ----------
-    state : "draped", "popped_pinned" or "popped_clamped".
-    """
+    """All nodes [m], then one object with one polyline for each rod."""
     nodes = archive.states[state]
     text = f"# rodshell, {state}, metres\n"
     text += len(nodes) * "v %.9f %.9f %.9f\n" % tuple(nodes.ravel().tolist())
-    for rod in rods_of(archive):
-        if len(rod.nodes) > 1:
-            text += f"o {' '.join(rod.id.split()) or 'rod'}\nl {' '.join(map(str, (rod.nodes + 1).tolist()))}\n"
+    for rod in meshed_rods(archive):
+        text += f"o {' '.join(rod.id.split()) or 'rod'}\nl {' '.join(map(str, (rod.nodes + 1).tolist()))}\n"
     return text
 
 
 def vtp_text(archive: Archive, name: str) -> str:
-    """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`.
-
-    Parameters
-    ----------
-    name : of a shape, see `shape_names`.
-    """
-    shape = deployed_shape(archive, name)
-    rods = [(k, rod.nodes) for k, rod in enumerate(rods_of(archive)) if len(rod.nodes) > 1]
+    """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`."""
+    shape, rods = deployed_shape(archive, name), meshed_rods(archive)
     nodes = archive.states["rod_nodes"]
-    offsets = np.cumsum([len(nodes_of_rod) for _, nodes_of_rod in rods], dtype=np.int64)
+    offsets = np.cumsum([len(rod.nodes) for rod in rods], dtype=np.int64)
     counts = {"Points": len(nodes), "Lines": len(rods), "Verts": 0, "Strips": 0, "Polys": 0}
     piece = tag(
         "Piece",
         tag("PointData", *(_data_array(key, values) for key, values in _known(shape, nodes)), ""),
-        tag("CellData", _data_array("rod", np.array([k for k, _ in rods], dtype=np.int64))),
+        tag("CellData", _data_array("rod", np.arange(len(rods)))),
         tag("Points", _data_array("Points", shape.positions[nodes], NumberOfComponents="3")),
         tag("Lines", _data_array("connectivity", np.arange(len(nodes))), _data_array("offsets", offsets)),
         **{f"NumberOf{key}": str(count) for key, count in counts.items()},
@@ -78,7 +76,7 @@ def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
     if not stages:
         return
     shares = archive.states["history_share"]
-    last = "popped_pinned"
+    last = archive.deployed
     entries = []
     for share, name in zip(shares.tolist(), ["flat", *stages, last], strict=True):
         yield f"pop_up/{name}.vtp", vtp_text(archive, name)
@@ -110,13 +108,8 @@ def _vtk_file(kind: str, body: str) -> str:
 
 
 def compas_json(archive: Archive, state: str) -> str:
-    """A state of the shell; the graph's nodes are joints, its edges the rods between them.
-
-    Parameters
-    ----------
-    state : "draped", "popped_pinned" or "popped_clamped".
-    """
-    positions, rods = archive.states[state], rods_of(archive)
+    """A state of the shell; the graph's nodes are joints, its edges the rods between them."""
+    positions, rods = archive.states[state], meshed_rods(archive)
     joint_positions = joint_places(archive, positions)
     lines = [
         {
@@ -125,7 +118,6 @@ def compas_json(archive: Archive, state: str) -> str:
             "name": rod.id,
         }
         for rod in rods
-        if len(rod.nodes) > 1
     ]
     node = {repr(name): dict(zip("xyz", at.tolist(), strict=True)) for name, at in joint_positions.items()}
     edge: dict[str, dict[str, Any]] = {name: {} for name in node}
@@ -154,9 +146,8 @@ def compas_json(archive: Archive, state: str) -> str:
 def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
     """The whole model.
 
-    Raises
-    ------
-    InputError : rhino3dm is not installed.
+    Raises:
+        InputError: rhino3dm is not installed.
     """
     try:
         import rhino3dm as r
@@ -185,13 +176,13 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
         return result
 
     mm = plan.rounding.mm
-    for rod, cut in zip(plan.rods, plan.cuts, strict=True):
+    for rod, course in zip(plan.rods, plan.courses, strict=True):
         figures = {"length_mm": mm(rod.length), "cut_length_mm": mm(rod.cut_length)}
         joints = " ".join(f"{other}:{mm(rod.from_cut_end(at))}" for other, at in rod.joints)
         figures |= {"layer": str(rod.record.layer), "joints_from_cut_end_mm": joints}
-        (x0, y0), (x1, y1) = cut.tolist()
-        model.Objects.AddLine(r.Point3d(x0, y0, 0.0), r.Point3d(x1, y1, 0.0), about("CUT", rod.id, figures))
-        if archive.final and len(rod.nodes) > 1:
+        flat = polyline(np.column_stack([course, np.zeros(len(course))]))
+        model.Objects.AddPolyline(flat, about("CUT", rod.id, figures))
+        if archive.final and len(rod.nodes):
             curve = 1e3 * archive.states[archive.final][rod.nodes]
             model.Objects.AddPolyline(polyline(curve), about("FINAL", rod.id, figures))
     for joint, (x, y) in zip(plan.joints, plan.marks.tolist(), strict=True):
@@ -214,13 +205,8 @@ FLOAT, INDEX, VERTICES, ELEMENTS = 5126, 5125, 34962, 34963  # glTF's numbers fo
 
 
 def glb_bytes(archive: Archive, state: str) -> bytes:
-    """One node, mesh and name for each rod.
-
-    Parameters
-    ----------
-    state : "draped", "popped_pinned" or "popped_clamped".
-    """
-    shape, rods = shape_of(archive, state), [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
+    """One node, mesh and name for each rod."""
+    shape, rods = shape_of(archive, state), meshed_rods(archive)
     section = archive.results.rod.section if archive.results.rod else None
     outline = section_outline(section, float(np.ptp(shape.positions, axis=0).max()))
     scale = scale_of(archive, shape, "gap")
@@ -230,13 +216,7 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
         colours = np.split(palette[scale.bins], np.cumsum([len(rod.nodes) for rod in rods])[:-1])
     file = _Glb()
     for k, rod in enumerate(rods):
-        curve, along = shape.positions[rod.nodes], rod.record.stiffness
-        widths = (
-            None
-            if along is None or "flat" not in archive.states
-            else widths_along(along, archive.states["flat"][rod.nodes])
-        )
-        points, normals, faces = swept(curve, outline, widths)
+        points, normals, faces = swept(shape.positions[rod.nodes], outline, section_widths(archive, rod))
         shades = None if colours is None else np.repeat(colours[k], len(outline), axis=0)
         file.add(rod.id, points, normals, faces, shades)
     return file.content()
@@ -247,10 +227,8 @@ def section_outline(section: Section | None, size: float) -> Floats:
 
     Up is m1, the normal of the grid: a rectangle's width and an ellipse's a lie there.
 
-    Parameters
-    ----------
-    section : of the rods; None: not known.
-    size : of the shell [m], for the thickness of a section without a shape.
+    Args:
+        size: of the shell [m], for the thickness of a section without a shape.
     """
     section = section or Section()
     if section.kind == "rectangle" and section.height is not None and section.width is not None:
@@ -262,15 +240,16 @@ def section_outline(section: Section | None, size: float) -> Floats:
     return np.column_stack([b * np.cos(angle), a * np.sin(angle)])
 
 
-def widths_along(along: Stiffness, flat: Floats) -> Floats:
-    """(k, 2) widths across and up of a rod's section at its nodes, over those of the unchanged one.
+def section_widths(archive: Archive, rod: GridRod) -> Floats | None:
+    """(k, 2) widths across and up of a rod's section at its nodes, over those of the unchanged one; None: it does not
+    change, or the flat grid is not known."""
+    along, flat = rod.record.stiffness, archive.states.get("flat")
+    return None if along is None or flat is None else widths_along(along, flat[rod.nodes])
 
-    Parameters
-    ----------
-    flat : (k, 3) its nodes in the flat grid [m].
-    """
-    stations = np.linalg.norm(flat - flat[0], axis=1)
-    factors = np.interp(stations, along.at, along.factors)
+
+def widths_along(along: Stiffness, flat: Floats) -> Floats:
+    """The same of a rod whose nodes are `flat` (k, 3) in the flat grid [m]."""
+    factors = np.interp(np.linalg.norm(flat - flat[0], axis=1), along.at, along.factors)
     same = np.ones_like(factors)
     if along.varies in ("laths", "width", "a"):
         return np.column_stack([same, factors if along.varies == "laths" else np.cbrt(factors)])
@@ -282,10 +261,8 @@ def swept(curve: Floats, outline: Floats, widths: Floats | None = None) -> tuple
 
     The frame has no twist and begins as upright as possible. The ends are open.
 
-    Parameters
-    ----------
-    curve : (k, 3) nodes [m]; outline : (s, 2) corners across and up [m].
-    widths : (k, 2) by which these are multiplied at each node; None: by 1.
+    Args:
+        widths: (k, 2) by which these are multiplied at each node; None: by 1.
     """
     edges = unit(np.diff(curve, axis=0))
     up = np.array([0.0, 0.0, 1.0]) if abs(edges[0, 2]) < 0.9 else np.array([1.0, 0.0, 0.0])
@@ -311,9 +288,7 @@ class _Glb:
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
         self._meshes: list[dict[str, Any]] = []
-        self._nodes: list[dict[str, Any]] = []
-        self._parts: list[bytes] = []
-        self._length = 0
+        self._body = bytearray()
 
     def add(
         self, name: str, points: Floats, normals: Floats, faces: NDArray[np.uint32], colours: Floats | None
@@ -325,33 +300,32 @@ class _Glb:
             attributes["COLOR_0"] = self._array(colours.astype(np.float32), "VEC3", VERTICES)
         indices = self._array(faces.ravel(), "SCALAR", ELEMENTS)
         primitive = {"attributes": attributes, "indices": indices, "material": 0}
-        self._nodes.append({"name": name, "mesh": len(self._meshes)})
         self._meshes.append({"name": name, "primitives": [primitive]})
 
     def content(self) -> bytes:
         tree = {
             "asset": {"version": "2.0", "generator": "rodshell"},
             "scene": 0,
-            "scenes": [{"nodes": list(range(len(self._nodes)))}],
-            "nodes": self._nodes,
+            "scenes": [{"nodes": list(range(len(self._meshes)))}],
+            "nodes": [{"name": mesh["name"], "mesh": k} for k, mesh in enumerate(self._meshes)],
             "meshes": self._meshes,
             "materials": [
                 {"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.7}, "doubleSided": True}
             ],
             "accessors": self._accessors,
             "bufferViews": self._views,
-            "buffers": [{"byteLength": self._length}],
+            "buffers": [{"byteLength": len(self._body)}],
         }
         text = json.dumps(tree, separators=(",", ":"), ensure_ascii=False).encode()
         text += b" " * (-len(text) % 4)
-        body = b"".join(self._parts)
-        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(body), 0x004E4942) + body
+        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+        chunks += struct.pack("<II", len(self._body), 0x004E4942) + self._body
         return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
     def _array(self, values: NDArray[Any], kind: str, use: int, *, bounds: bool = False) -> int:
         """Index of a new accessor; every item is of four bytes, so that all are aligned."""
         data = np.ascontiguousarray(values).tobytes()
-        self._views.append({"buffer": 0, "byteOffset": self._length, "byteLength": len(data), "target": use})
+        self._views.append({"buffer": 0, "byteOffset": len(self._body), "byteLength": len(data), "target": use})
         accessor: dict[str, Any] = {
             "bufferView": len(self._views) - 1,
             "componentType": INDEX if values.dtype == np.uint32 else FLOAT,
@@ -361,6 +335,5 @@ class _Glb:
         if bounds:
             accessor |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         self._accessors.append(accessor)
-        self._parts.append(data)
-        self._length += len(data)
+        self._body += data
         return len(self._accessors) - 1

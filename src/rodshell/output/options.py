@@ -19,10 +19,9 @@ if TYPE_CHECKING:
 class OutputOptions(CheckOptions):
     """What is checked, made and drawn.
 
-    Parameters
-    ----------
-    rod_chosen : which of the rod's "material" and "section" the program chose to fit the target.
-    strength_of : the preset material that the strengths are of, where they were not given.
+    Args:
+        rod_chosen: which of the rod's "material" and "section" the program chose to fit the target.
+        strength_of: the preset material that the strengths are of, where they were not given.
     """
 
     fabrication: Fabrication = field(default_factory=Fabrication)
@@ -52,10 +51,6 @@ class OutputOptions(CheckOptions):
         """The same with the strengths of the rod's preset material, where none was given.
 
         A strength that is given alone, such as a reduced one, has a shear strength in the preset's proportion.
-
-        Parameters
-        ----------
-        rod : section and material of every rod.
         """
         material = rod.material
         if material is None or material.bending_strength is None:
@@ -74,28 +69,13 @@ class OutputOptions(CheckOptions):
     def limits(self, rod: Rod, asked: "Strength") -> "Limits":
         """What rods are judged by, with loads and without.
 
-        Parameters
-        ----------
-        rod : section and material of every rod.
-        asked : what was given for it.
-
-        Raises
-        ------
-        InputError : a service class is given, and nothing depends on it.
+        Raises:
+            InputError: a service class is given, and nothing depends on it.
         """
-        judged_by = self.judged_by(rod)
-        return Limits.of(
-            rod, asked,
-            characteristic=judged_by.strength, of_preset=self.strength is None, shear_weight=judged_by.shear_weight,
-        )  # fmt: skip
+        return Limits.of(rod, asked, given=self.strength, shear_weight=self.judged_by(rod).shear_weight)
 
     def require_known_stress(self, rod: Rod, joint: Joint) -> None:
-        """InputError where a strength is given and the stress that it stands against cannot be known.
-
-        Parameters
-        ----------
-        rod : section and material of every rod.
-        """
+        """InputError where a strength is given and the stress that it stands against cannot be known."""
         if self.strength is not None:
             require_known_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)
 

@@ -10,12 +10,11 @@ from contextlib import contextmanager
 from functools import cache
 from io import BytesIO
 from itertools import groupby
-from math import cos, sin, sqrt
+from math import cos, sin
 from threading import Lock
-from typing import TYPE_CHECKING
 
 from reportlab import rl_config
-from reportlab.lib.colors import HexColor
+from reportlab.lib.colors import Color, HexColor
 from reportlab.pdfbase.pdfmetrics import getFont, registerFont, stringWidth
 from reportlab.pdfbase.ttfonts import TTFont
 from reportlab.pdfgen.canvas import Canvas
@@ -24,30 +23,20 @@ from rodshell.errors import OutputWarning
 from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Mark, Path, Pen, Text
 from rodshell.output.drawings.sheets import source_date
 
-if TYPE_CHECKING:
-    from reportlab.lib.colors import Color
-    from reportlab.pdfgen.canvas import Canvas
-    from reportlab.pdfgen.pathobject import PDFPathObject
-
 POINTS = 72 / 25.4  # of a millimetre
-QUARTER = 4 / 3 * (sqrt(2) - 1)  # length of the handles of a quarter circle's Bezier curve over the radius
 SANS = {False: "rodshell-sans", True: "rodshell-sans-bold"}
-ONE_AT_A_TIME = Lock()
-MOST_NAMED = 10  # characters without a glyph that a warning shows
+_ONE_AT_A_TIME = Lock()
+_MOST_NAMED = 10  # characters without a glyph that a warning shows
 
 
 def drawings_pdf(sheets: Sequence[Drawing], paper: tuple[float, float], title: str) -> bytes:
     """A PDF file with each drawing on a page of its own, and a bookmark for each.
 
-    Parameters
-    ----------
-    sheets : in mm of paper, their origin at the lower left corner of the page.
-    paper : width and height of the pages [mm].
-    title : of the file, which readers show.
+    Args:
+        sheets: in mm of paper, their origin at the lower left corner of the page.
 
-    Warns
-    -----
-    OutputWarning : characters that the typeface has no glyph for; they are drawn as boxes.
+    Warns:
+        OutputWarning: characters that the typeface has no glyph for; they are drawn as boxes.
     """
     _register_fonts()
     _warn_of_missing_glyphs(text.text for sheet in sheets for text in sheet.texts)
@@ -81,7 +70,7 @@ def _settings() -> Iterator[None]:
 
     Both hold for the whole process, so that only one thread at a time writes a file.
     """
-    with ONE_AT_A_TIME:
+    with _ONE_AT_A_TIME:
         before, rl_config.useA85 = rl_config.useA85, 0
         no_date = os.environ.pop("SOURCE_DATE_EPOCH", None) if source_date() is None else None
         try:
@@ -99,13 +88,7 @@ def _register_fonts() -> None:
 
 
 def text_width(text: str, size: float, *, bold: bool = False) -> float:
-    """Width of a line of text, in the unit of its `size`.
-
-    Parameters
-    ----------
-    size : of the font; the width has the same unit.
-    bold : whether the font is bold.
-    """
+    """Width of a line of text, in the unit of its `size`."""
     _register_fonts()
     return float(stringWidth(text, SANS[bold], size))
 
@@ -114,15 +97,15 @@ def _warn_of_missing_glyphs(texts: Iterable[str]) -> None:
     glyphs = getFont(SANS[False]).face.charToGlyph
     missing = sorted(letter for letter in set().union(*texts) if ord(letter) not in glyphs)
     if missing:
-        more = f" and {len(missing) - MOST_NAMED} more" if len(missing) > MOST_NAMED else ""
+        more = f" and {len(missing) - _MOST_NAMED} more" if len(missing) > _MOST_NAMED else ""
         warnings.warn(
-            f"the PDF shows boxes for characters that its typeface lacks: {' '.join(missing[:MOST_NAMED])}{more}",
+            f"the PDF shows boxes for characters that its typeface lacks: {' '.join(missing[:_MOST_NAMED])}{more}",
             OutputWarning,
             stacklevel=3,
         )
 
 
-def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
+def _draw(canvas: Canvas, pen: Pen, items: Iterable[Path | Mark]) -> None:
     """Lines and circles of one pen; as one path where they are not filled, which would cut what overlaps."""
     canvas.setStrokeColor(_colour(pen.colour))
     canvas.setLineWidth(pen.width)
@@ -133,7 +116,7 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
         path = canvas.beginPath()
         for item in group:
             if isinstance(item, Mark):
-                _add_circle(path, item)
+                path.circle(*item.at.tolist(), item.radius)
                 continue
             first, *others = item.points.tolist()
             path.moveTo(*first)
@@ -144,18 +127,7 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
         canvas.drawPath(path, stroke=int(pen.width > 0), fill=int(bool(pen.fill)))
 
 
-def _add_circle(path: "PDFPathObject", mark: Mark) -> None:
-    """A circle of four curves; reportlab's own method looks up the sines of right angles again for each."""
-    (x, y), r = mark.at.tolist(), mark.radius
-    k = QUARTER * r
-    path.moveTo(x + r, y)
-    path.curveTo(x + r, y + k, x + k, y + r, x, y + r)
-    path.curveTo(x - k, y + r, x - r, y + k, x - r, y)
-    path.curveTo(x - r, y - k, x - k, y - r, x, y - r)
-    path.curveTo(x + k, y - r, x + r, y - k, x + r, y)
-
-
-def _write(canvas: "Canvas", texts: Iterable[Text]) -> None:
+def _write(canvas: Canvas, texts: Iterable[Text]) -> None:
     """Texts, with a new font and colour only where they change."""
     written = canvas.beginText()
     for (bold, size, colour), group in groupby(texts, key=_look):
@@ -180,6 +152,6 @@ def _look(text: Text) -> tuple[bool, float, str]:
 
 
 @cache
-def _colour(code: str) -> "Color":
+def _colour(code: str) -> Color:
     """ "#rrggbb" as reportlab has colours."""
     return HexColor(code)

@@ -10,22 +10,25 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
-from rodshell.output.drawing import Drawing, Path, Pen, Pencil
+from rodshell.output.drawing import FAMILIES, Drawing, Path, Pen, Pencil
 from rodshell.output.grid import (
     STAGE,
     GridRod,
     Shape,
     deployed_shape,
+    end_nodes,
+    family_numbers,
+    meshed_rods,
     opens,
     outlines_of,
-    rods_of,
     shape_names,
     shape_of,
 )
 from rodshell.output.svg import number, picture_document
 from rodshell.results.archive import Archive, made_once
-from rodshell.results.states import SHELLS
+from rodshell.results.states import DRAPED, POPPED, is_shell, shells_among
 from rodshell.results.wording import MINUS, UNDER, nice_ticks, shown_length
+from rodshell.rods.supports import clamped_among
 
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(27.0)  # of the eye
 _C, _S, _CE, _SE = np.cos(AZIMUTH), np.sin(AZIMUTH), np.cos(ELEVATION), np.sin(ELEVATION)
@@ -38,11 +41,10 @@ TOWARDS = np.array([_CE * _C, _CE * _S, _SE])
 class View:
     """A box in space [m] drawn `width` units wide.
 
-    Parameters
-    ----------
-    low, high : (3,) corners of the box [m].
-    shift : (2,) added to the projected coordinates, so that the box's upper left corner is (0, 0).
-    size : (2,) width and height of the drawn box.
+    Args:
+        low, high: (3,) corners of the box [m].
+        shift: (2,) added to the projected coordinates, so that the box's upper left corner is (0, 0).
+        size: (2,) width and height of the drawn box.
     """
 
     low: Floats
@@ -53,13 +55,7 @@ class View:
 
     @staticmethod
     def of(points: Floats, width: float) -> "View":
-        """The view of all points (n, 3) [m] and of the ground below them.
-
-        Parameters
-        ----------
-        points : (n, 3) all that is to be seen [m].
-        width : of the picture [drawing units].
-        """
+        """The view of all points (n, 3) [m] and of the ground below them."""
         low, high = bounds(points)
         corners = np.array([[x, y, low[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
         corners = np.concatenate([corners, points])
@@ -83,31 +79,26 @@ class View:
 
 
 def ground_axes(pencil: Pencil, view: View, colour: str, text: float) -> None:
-    """The box's ground with millimetre ticks on its front edges, and the height on the left.
-
-    Parameters
-    ----------
-    view : of the box; colour : of lines and numbers; text : size of the numbers [drawing units].
-    """
+    """The box's ground with millimetre ticks on its front edges, and the height on the left."""
     (x0, y0, z0), (x1, y1, z1) = view.low, view.high
     thin, pale = Pen(colour, 0.8), Pen(mixed(colour, "#ffffff", 0.55), 0.8)
     corners = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]])
     pencil.line(view.project(corners), "DIM", closed=True, pen=pale)
     span = 0.02 * max(x1 - x0, y1 - y0)
 
-    def tick(point: list[float], out: list[float], value: float) -> None:
-        """A short line outwards from `point`, and the value [m] in mm beyond it."""
-        at, off = np.array(point), np.array(out)
-        a, b, c = view.project(np.array([at, at + off, at + 2.6 * off]))
-        anchor = "end" if b[0] < a[0] - 1 else "start" if b[0] > a[0] + 1 else "middle"
-        pencil.line([a, b], "DIM", pen=thin)
-        shown = number(1e3 * value).replace("-", MINUS)
-        pencil.write(shown, c - (0, 0.35 * text), text, "DIM", anchor=anchor, colour=colour)
+    def ticks(axis: int, start: list[float], out: list[float], count: int, above: float = -np.inf) -> None:
+        """Short lines outwards from places along an axis through `start`, and these in mm beyond them."""
+        for value in nice_ticks(1e3 * view.low[axis], 1e3 * view.high[axis], count):
+            if value > above:
+                at, off = np.where(np.arange(3) == axis, 1e-3 * value, start), np.array(out)
+                a, b, c = view.project(np.array([at, at + off, at + 2.6 * off]))
+                anchor = "end" if b[0] < a[0] - 1 else "start" if b[0] > a[0] + 1 else "middle"
+                pencil.line([a, b], "DIM", pen=thin)
+                shown = number(value).replace("-", MINUS)
+                pencil.write(shown, c - (0, 0.35 * text), text, "DIM", anchor=anchor, colour=colour)
 
-    for value in nice_ticks(1e3 * x0, 1e3 * x1, 5):
-        tick([1e-3 * value, y0, z0], [0, -span, 0], 1e-3 * value)
-    for value in nice_ticks(1e3 * y0, 1e3 * y1, 5):
-        tick([x1, 1e-3 * value, z0], [span, 0, 0], 1e-3 * value)
+    ticks(0, [x0, y0, z0], [0, -span, 0], 5)
+    ticks(1, [x1, y0, z0], [span, 0, 0], 5)
     middle = np.array([[(x0 + x1) / 2, y0 - 8 * span, z0], [x1 + 8 * span, (y0 + y1) / 2, z0]])
     for name, at in zip("xy", view.project(middle), strict=True):
         pencil.write(f"{name}, mm", at - (0, 0.35 * text), text, "DIM", anchor="middle", colour=colour)
@@ -115,9 +106,7 @@ def ground_axes(pencil: Pencil, view: View, colour: str, text: float) -> None:
         foot, top = view.project(np.array([[x0, y0, z0], [x0, y0, z1]]))
         pencil.line([foot, top], "DIM", pen=thin)
         pencil.write("z, mm", top + (0, 0.8 * text), text, "DIM", anchor="middle", colour=colour)
-        for value in nice_ticks(1e3 * z0, 1e3 * z1, 3):
-            if value > 1e3 * (z0 + 0.05 * (z1 - z0)):
-                tick([x0, y0, 1e-3 * value], [-0.6 * span, -0.6 * span, 0], 1e-3 * value)
+        ticks(2, [x0, y0, z0], [-0.6 * span, -0.6 * span, 0], 3, above=1e3 * (z0 + 0.05 * (z1 - z0)))
 
 
 Polylines = list[list[tuple[int, slice]]]
@@ -126,7 +115,6 @@ WIDTH = 540.0  # drawing units of the shell itself
 SIDE, TOP, BELOW, BAR = 50.0, 22.0, 40.0, 28.0  # margins; the colour bar needs more below
 FRAMES, COLUMNS, GUTTER, CAPTION = 6, 3, 14.0, 34.0  # shapes of the deployment: all, a row; room at the sides, below
 PAPER, INK, SOFT, GROUND = "#fdfdfb", "#22282f", "#7b838a", "#f1efe8"
-FAMILIES = ("#1f5f8b", "#a8552a")
 DEPTHS = 20  # layers of depth: rods of a nearer layer pass over those of a farther one,
 LAG = 2  # and are set off against those so many layers farther: rods that meet at a joint do not cut each other
 PIECE = 5.0  # drawing units: about the length of a piece, or of an edge that is longer; finer ones make files large
@@ -134,45 +122,22 @@ LEVEL = 0.01  # of its width: an outline that rises more is not filled, which wo
 FADE = 0.42  # share of paper in the colour of the farthest rods
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
-    """Parts of rods between two drawn nodes, rod by rod.
-
-    Parameters
-    ----------
-    drawn : (d,) entries of `rod_nodes` that are drawn.
-    first : (s,) at which of them each piece begins; it ends at the next.
-    rod : (s,) index of its rod.
-    """
-
-    drawn: Ints
-    first: Ints
-    rod: Ints
-
-
 def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
     """A picture of "flat", "draped", "popped_pinned", "popped_clamped" or "stage_1", ... as a complete SVG.
 
     All final shapes share one view, as the stages of the deployment do, and all shapes one colour scale.
 
-    Parameters
-    ----------
-    colour : of the rods: "gap" to the target (without a target: height), or "stress".
+    Args:
+        colour: of the rods: "gap" to the target (without a target: height), or "stress".
 
-    Raises
-    ------
-    OutputError : the archive has no such state.
+    Raises:
+        OutputError: the archive has no such state.
     """
     return picture_document(picture(archive, state, colour))
 
 
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
-    """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format.
-
-    Parameters
-    ----------
-    state, colour : as of `picture_svg`.
-    """
+    """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format."""
     kept = _pictures(archive)
     if (state, colour) not in kept:
         kept[state, colour] = _laid_out(archive, state, colour)
@@ -187,14 +152,14 @@ def _pictures(archive: Archive) -> dict[tuple[str, Colour], Drawing]:
 
 def _laid_out(archive: Archive, state: str, colour: Colour) -> Drawing:
     """A picture, see `picture`."""
-    shape, rods = shape_of(archive, state), rods_of(archive)
+    shape = shape_of(archive, state)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)
     pencil = Pencil()
-    ends = np.array([rod.nodes[[0, -1]] for rod in rods if len(rod.nodes) > 1], dtype=np.intp).ravel()
+    ends = end_nodes(meshed_rods(archive))
     front = view.depth(points[ends]) > 0.5
     ground_axes(pencil, view, SOFT, 12.5)
-    _ground_curves(pencil, view, shape, rods)
+    _ground_curves(pencil, view, shape, meshed_rods(archive))
     drawn = _Rods.of(archive, view, shape, scale)
     drawn.draw(pencil, range(DEPTHS // 2))
     _supports(pencil, view, points[ends[~front]], state, len(ends))
@@ -212,14 +177,8 @@ MODE = 0.06  # of the shell's width: the largest displacement of a mode as it is
 
 
 def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
-    """A mode, drawn as displacements of the shell over the shell as it stands.
-
-    Parameters
-    ----------
-    ends : end condition of the shell.
-    state : name of the mode's array (n, 3).
-    """
-    shape, pencil = shape_of(archive, f"popped_{ends}"), Pencil()
+    """A mode, an array (n, 3) of the states, drawn as displacements of the shell over the shell as it stands."""
+    shape, pencil = shape_of(archive, POPPED + ends), Pencil()
     motion = archive.states[state]
     size = MODE * float(np.ptp(shape.positions[:, 0]))
     moved = replace(shape, positions=shape.positions + size * motion / max(float(np.abs(motion).max()), 1e-300))
@@ -231,16 +190,11 @@ def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
 
 
 def deployment_picture(archive: Archive) -> Drawing:
-    """The way from flat to popped up in FRAMES shapes side by side, coloured as of `picture`.
-
-    Parameters
-    ----------
-    archive : one that holds stages of a deployment.
-    """
+    """The way from flat to popped up in FRAMES shapes side by side, coloured as of `picture`."""
     known = shape_names(archive)
-    names = [name for name in known if name.startswith(STAGE) or name in ("flat", "popped_pinned")]
+    names = [name for name in known if name.startswith(STAGE) or name in ("flat", archive.deployed)]
     chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
-    view, rods, whole, last = _view_of_all(archive), rods_of(archive), Pencil(), None
+    view, whole, last = _view_of_all(archive), Pencil(), None
     width = WIDTH + 2 * SIDE
     share = (width - 2 * GUTTER) / COLUMNS / WIDTH
     cell = np.array([share * WIDTH, -share * float(view.size[1]) - CAPTION])
@@ -248,7 +202,7 @@ def deployment_picture(archive: Archive) -> Drawing:
         shape, ground = deployed_shape(archive, name), Pencil()
         scale = scale_of(archive, shape, "stress")
         last = scale or last
-        _ground_curves(ground, view, shape, rods)
+        _ground_curves(ground, view, shape, meshed_rods(archive))
         corner = cell * (k % COLUMNS, k // COLUMNS) + (GUTTER - SIDE, 0.0)
         whole.paths += ground.done("", "", 12.5).placed(share, corner).paths
         drawn = _Rods.of(archive, view, shape, scale, share)
@@ -276,44 +230,47 @@ def _view(archive: Archive, shape: Shape) -> View:
     """One view for all shapes in space, and one for the flat grid; stages spread further than the final shell."""
     if shape.flat:
         return View.of(shape.positions, WIDTH)
-    return _view_of_shells(archive) if shape.name in SHELLS else _view_of_all(archive)
+    return _view_of_shells(archive) if is_shell(shape.name) else _view_of_all(archive)
 
 
 @made_once
 def _view_of_shells(archive: Archive) -> View:
-    return View.of(np.concatenate([archive.states[name] for name in SHELLS if name in archive.states]), WIDTH)
+    return View.of(np.concatenate([archive.states[name] for name in shells_among(archive.states)]), WIDTH)
 
 
 @made_once
 def _view_of_all(archive: Archive) -> View:
-    shells = [archive.states[name] for name in SHELLS if name in archive.states]
+    shells = [archive.states[name] for name in shells_among(archive.states)]
     return View.of(np.concatenate([*shells, *archive.states["history"]]), WIDTH)
 
 
-def _pieces(archive: Archive, length: float) -> Pieces:
-    """Pieces of about a length [m]: of rods with shorter edges, nodes are left out evenly."""
-    lengths = [len(rod.nodes) for rod in rods_of(archive)]
-    whole = sum(rod.length for rod in rods_of(archive) if len(rod.nodes) > 1)
-    stride = max(1, round(length * sum(max(count - 1, 0) for count in lengths) / max(whole, 1e-12)))
-    drawn, first = [np.empty(0, dtype=np.intp)], 0
-    for count in lengths:
-        drawn.append(first + np.array([*range(0, count - 1, stride), count - 1][:count], dtype=np.intp))
-        first += count
-    owner = np.repeat(np.arange(len(lengths)), [len(entries) for entries in drawn[1:]])
-    begins = np.flatnonzero(owner[1:] == owner[:-1])
-    return Pieces(np.concatenate(drawn).astype(np.intp), begins, owner[begins])
+def _pieces(archive: Archive, length: float) -> tuple[Ints, Ints, Ints]:
+    """Entries (d,) of `rod_nodes` that are drawn, at which of them each piece (s,) of a rod to the next begins, and the
+    index (s,) of its rod. A piece has about a length [m]: of rods with shorter edges, nodes are left out evenly."""
+    rods = meshed_rods(archive)
+    whole, edges = sum(rod.length for rod in rods), sum(len(rod.nodes) - 1 for rod in rods)
+    stride = max(1, round(length * edges / max(whole, 1e-12)))
+    drawn, owner, first = list[int](), list[int](), 0
+    for k, rod in enumerate(rods):
+        last = first + len(rod.nodes) - 1
+        chosen = [*range(first, last, stride), last]
+        drawn += chosen
+        owner += [k] * len(chosen)
+        first = last + 1
+    of_rod = np.array(owner, dtype=np.intp)
+    begins = np.flatnonzero(of_rod[1:] == of_rod[:-1])
+    return np.array(drawn, dtype=np.intp), begins, of_rod[begins]
 
 
 @dataclass(frozen=True, eq=False)
 class _Rods:
     """The rods of a picture, layer by layer.
 
-    Parameters
-    ----------
-    plane : (d, 2) the drawn nodes.
-    halos, lines : by layer, the farthest first: indices in the palette, and drawn nodes of polylines.
-    fade : share of paper in the farthest colours.
-    pen : width of the rods in the middle [drawing units].
+    Args:
+        plane: (d, 2) the drawn nodes.
+        halos, lines: by layer, the farthest first: indices in the palette, and drawn nodes of polylines.
+        fade: share of paper in the farthest colours.
+        pen: width of the rods in the middle [drawing units].
     """
 
     plane: Floats
@@ -326,20 +283,21 @@ class _Rods:
     @staticmethod
     def of(archive: Archive, view: View, shape: Shape, scale: Scale | None, share: float = 1.0) -> "_Rods":
         """Of a shape, whose lengths are drawn at a share of the view's scale."""
-        rods, pieces = rods_of(archive), _pieces(archive, PIECE / (share * view.scale))
-        nodes = np.concatenate([np.empty(0, dtype=np.intp), *(rod.nodes for rod in rods)])[pieces.drawn]
+        rods, (drawn, first, of_rod) = meshed_rods(archive), _pieces(archive, PIECE / (share * view.scale))
+        nodes = archive.states["rod_nodes"][drawn]
         nearness = view.depth(shape.positions)[nodes]
-        near = 0.5 * (nearness[pieces.first] + nearness[pieces.first + 1])
+        near = 0.5 * (nearness[first] + nearness[first + 1])
         layer = np.minimum((near * DEPTHS).astype(np.intp), DEPTHS - 1)
         if scale is None:
-            shade = np.array([rod.family == "v" for rod in rods], dtype=np.intp)[pieces.rod]
+            families = family_numbers(rod.family for rod in rods)
+            shade = (np.array(families, dtype=np.intp) % len(FAMILIES))[of_rod]
             palette, fade = list(FAMILIES), 0.0 if shape.flat else FADE
         else:
-            bins = scale.bins[pieces.drawn]
-            shade = np.rint(0.5 * (bins[pieces.first] + bins[pieces.first + 1])).astype(np.intp)
+            bins = scale.bins[drawn]
+            shade = np.rint(0.5 * (bins[first] + bins[first + 1])).astype(np.intp)
             palette, fade = scale.palette, FADE
         pen = float(np.clip(0.12 * WIDTH / max(len(rods), 1), 0.45, 1.7))
-        halos, lines = (_polylines(pieces, layer, shades) for shades in (np.zeros_like(shade), shade))
+        halos, lines = (_polylines(first, layer, shades) for shades in (np.zeros_like(shade), shade))
         return _Rods(view.project(shape.positions)[nodes], halos, lines, palette, fade, pen)
 
     def draw(self, pencil: Pencil, layers: range, *, halos: bool = True) -> None:
@@ -364,10 +322,10 @@ def _nearness(depth: int) -> float:
     return (depth + 0.5) / DEPTHS
 
 
-def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
+def _polylines(first: Ints, layer: Ints, shade: Ints) -> Polylines:
     """Pieces that follow each other on a rod in one layer and shade as one; the shades of a layer ascend."""
     order = np.lexsort((shade, layer))
-    first, layer, shade = pieces.first[order], layer[order], shade[order]
+    first, layer, shade = first[order], layer[order], shade[order]
     ends = np.flatnonzero((np.diff(layer) != 0) | (np.diff(shade) != 0) | (np.diff(first) > 1))
     begin, end = (np.concatenate(parts)[: len(first)] for parts in (([0], ends + 1), (ends, [len(first) - 1])))
     columns = (layer[begin], shade[begin], first[begin], first[end] + 2)
@@ -379,22 +337,21 @@ def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
 
 def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[GridRod]) -> None:
     """The boundary: closed curves through the rods' ends, openings on top of what they open."""
-    drawn = [rod for rod in rods if len(rod.nodes) > 1]
-    ends = np.array([rod.nodes[[0, -1]] for rod in drawn], dtype=np.intp).ravel()
-    for loop in outlines_of(drawn):
+    ends = end_nodes(rods)
+    for loop in outlines_of(rods):
         outline = shape.positions[ends[loop]]
         fill = ""
         if np.ptp(outline[:, 2]) < LEVEL * np.ptp(outline[:, :2]):
-            fill = PAPER if opens(np.array([rod.flat for rod in drawn]).reshape(-1, 2)[loop]) else GROUND
+            fill = PAPER if opens(np.array([rod.flat for rod in rods]).reshape(-1, 2)[loop]) else GROUND
         pencil.line(view.project(outline), "BOUNDARY-FINAL", closed=True, pen=Pen(SOFT, 1.0, fill=fill))
 
 
 def _supports(pencil: Pencil, view: View, ends: Floats, state: str, count: int) -> None:
     """Some of a shell's `count` rod ends: rings where they turn freely, discs where they are clamped."""
-    if state in ("flat", "draped"):
+    if state in ("flat", DRAPED):
         return
     radius = float(np.clip(200 / count, 0.6, 2.6))
-    fill = INK if state == "popped_clamped" else PAPER
+    fill = INK if clamped_among([state.removeprefix(POPPED)]) else PAPER
     for at in view.project(ends):
         _dot(pencil, at, radius, Pen(INK, 0.4 * radius, fill=fill))
 

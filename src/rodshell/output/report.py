@@ -5,35 +5,34 @@ and draws nothing between them.
 """
 
 import base64
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from rodshell.figures.checks import Clearance, Reactions
+from rodshell.figures.checks import OTHER_SHAPES, Clearance, Reactions, SelfWeight
 from rodshell.figures.fabrication import Stock
 from rodshell.figures.form import Agreement, Drape, Gate, PopUp
 from rodshell.figures.records import Ends, Record
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
-from rodshell.output.grid import CAPTIONS, caption_of
+from rodshell.output.grid import caption_of, shape_names
 from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
-from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
-from rodshell.output.schedules import joints_table as joints
-from rodshell.output.schedules import supports_table as supports
+from rodshell.output.schedules import SCHEDULES, Table, heading
 from rodshell.output.section_profiles import profiles_svg
 from rodshell.output.svg import SCALE, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
 from rodshell.results.laths import laths_text
-from rodshell.results.states import SHELLS
-from rodshell.results.strength_used import ENDS, by_design_strength
+from rodshell.results.states import is_shell, shells_among
+from rodshell.results.strength_used import by_design_strength
 from rodshell.results.verdict import facts, unknown_below
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
+from rodshell.rods.supports import finals_first
 from rodshell.units import places_text
 
 IN_PAGE = ("supports", "elevations", "erection")
@@ -48,14 +47,7 @@ NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between
 
 
 def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing], files: Mapping[str, str]) -> str:
-    """The whole page; `plan`, `drawings` and `files` are the archive's.
-
-    Parameters
-    ----------
-    plan : the flat plan of the archive.
-    drawings : of the archive, by name, see `drawing_set`.
-    files : the same as SVG files.
-    """
+    """The whole page; `plan`, `drawings` and the same as SVG `files` are the archive's."""
     environment = Environment(
         loader=PackageLoader("rodshell.output", "templates"),
         autoescape=True,
@@ -67,8 +59,9 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     def shown(svg: str) -> Markup:
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
-    results, tables = archive.results, _tables(archive)
-    states = [state for state in CAPTIONS if state in archive.states and "rod_nodes" in archive.states]
+    results = archive.results
+    shown_as = ("flat", *shells_among(archive.states))
+    states = [name for name in shape_names(archive) if name in shown_as and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
         name=archive.name,
         note=NOTE,
@@ -82,14 +75,15 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         supports=supports_table(results),
         checks=checks_table(results),
         pictures=[(caption_of(archive, state), shown(picture_svg(archive, state))) for state in states],
-        one_scale=sum(state in SHELLS for state in states) > 1,
+        one_scale=sum(map(is_shell, states)) > 1,
         loads=loads_page(archive),
         figures=key_figures(results, plan),
         levels=levels_table(results),
-        plan=shown(_on_page(files["plan"])),
+        plan=shown(_on_page(files["plan"])) if "plan" in files else "",
         drawings=[(drawings[name].title, shown(_on_page(files[name]))) for name in IN_PAGE if name in drawings],
         tables=[
-            (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
+            (title, [heading(column) for column in table], zip(*table.values(), strict=True), note)
+            for title, table, note in _tables(archive)
         ],
         case=shown_case(archive.case_toml, archive.inputs),
         version=results.version_rodshell or "unknown",
@@ -130,25 +124,20 @@ def _note(archive: Archive) -> str:
     return (PARTLY if unknown else FOLLOWED).format(share=whole_percent(unknown), gaps=gaps)
 
 
-def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
+def _tables(archive: Archive) -> Iterator[tuple[str, Table, str]]:
     """Title, table and note of the schedules in the page."""
-    tables = [
-        ("Rods", rods_table(archive, brief=True), "Where each joint is on its rods: schedule/rods.csv, joints.csv."),
-        ("Joints", joints(archive, brief=True), "Named by the rods that meet, a/b. Final: in the popped-up shell."),
-    ]
-    if archive.results.boundary:
-        tables.append(
-            (
-                "Supports",
-                supports(archive, brief=True),
-                "With the reactions of the unloaded shell: schedule/supports.csv.",
-            )
-        )
-    if archive.results.seams:
-        tables.append(("Seams", seams_table(archive), "Forces: the sum of both rods' support forces."))
-    if archive.results.fabrication and (stock := archive.results.fabrication.stock):
-        tables.append(("Stock", stock_table(archive), _plan_of(stock)))
-    return tables
+    fabrication = archive.results.fabrication
+    notes = {
+        "rods": "Where each joint is on its rods: schedule/rods.csv, joints.csv.",
+        "joints": "Named by the rods that meet, a/b. Final: in the popped-up shell.",
+        "supports": "With the reactions of the unloaded shell: schedule/supports.csv.",
+        "seams": "Forces: the sum of both rods' support forces.",
+        "stock": _plan_of(fabrication.stock) if fabrication and fabrication.stock else "",
+    }
+    for name, note in notes.items():
+        table = SCHEDULES[name].brief(archive)
+        if any(table.values()):
+            yield SCHEDULES[name].title, table, note
 
 
 def _plan_of(stock: Stock) -> str:
@@ -243,7 +232,7 @@ _NET_DEVIATION: tuple[Entry, ...] = (
 
 def supports_table(results: Results) -> dict[str, Any] | None:
     """Both end conditions side by side: `ends` and `rows` of (title, a value for each of the ends)."""
-    ends = [end for end in ENDS if end in results.agreement or end in results.pop_up]
+    ends = finals_first({**results.pop_up, **results.agreement})
     rounding = rounding_of(results)
     gaps = [results.agreement.get(end) or Agreement() for end in ends]
     rows = _side_by_side(_AGREEMENT, gaps, rounding)
@@ -284,7 +273,8 @@ def checks_table(results: Results) -> dict[str, Any] | None:
     shapes = results.bending.shapes() if results.bending else {}
     unknown, rounding = unknown_below(results), rounding_of(results)
     stages = "deployment" if "deployment" in shapes else "pop_up"  # the second with the final shape
-    columns = [shape for shape in (*ENDS, stages) if shape in shapes and (shape in ENDS or unknown < 1)]
+    columns = finals_first(shape for shape in shapes if shape not in OTHER_SHAPES)
+    columns += [stages] * (stages in shapes and unknown < 1)
     rows = _side_by_side(_BENDING, [shapes[column] for column in columns], rounding)
     rows = [row for title, values in rows for row in _with_strength(results, columns, title, values)]
     met = results.contact
@@ -304,18 +294,13 @@ def _with_strength(results: Results, columns: Sequence[str], title: str, values:
         return [(title, values)]
     design = "design " if by_design_strength(results) else ""
     whose = f"{bending.strength_of}'s {design}strength" if bending.strength_of else f"the given {design}strength"
-    strengths = [bending.strength if column in ENDS else bending.erection_strength for column in columns]
+    strengths = [bending.erection_strength if column in OTHER_SHAPES else bending.strength for column in columns]
     shown = [_shown(wording.stress, strength, rounding_of(results)) for strength in strengths]
     return [(title.replace("the strength", whose), values), ("\N{EN DASH} which is", shown)]
 
 
 def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]:
-    """Groups of key figures; what is not known is left out.
-
-    Parameters
-    ----------
-    plan : the flat plan of the archive.
-    """
+    """Groups of key figures; what is not known is left out."""
     rod, drape = results.rod, results.drape
     parts: list[Record | None] = [rod.section, rod.material, rod] if rod else []
     preset = _listed(rod.preset if rod else None, _PRESET, plan.rounding)
@@ -367,20 +352,16 @@ def _weight_rows(results: Results, ends: Sequence[Ends], rounding: Rounding) -> 
     if not any(found):
         return []
     shares = [wording.share_of_weight(weight) if weight else wording.UNKNOWN for weight in found]
-    deflections = [_shown(wording.millimetres, weight.deflection if weight else None, rounding) for weight in found]
     whose = "the weakest patch, its seam held," if results.patches else "it"
-    rows = [(f"Own weight that {whose} carries", shares)]
-    return (
-        rows
-        if set(deflections) == {wording.UNKNOWN}
-        else [*rows, ("Largest deflection under its own weight", deflections)]
-    )
+    deflection = (("Largest deflection under its own weight", "deflection", wording.millimetres),)
+    weights = [weight or SelfWeight() for weight in found]
+    return [(f"Own weight that {whose} carries", shares), *_side_by_side(deflection, weights, rounding)]
 
 
 def _listed(record: Record | None, listed: tuple[Entry, ...], rounding: Rounding) -> list[Row]:
     """The figures of a record that are known."""
-    known = [(title, getattr(record, name), show) for title, name, show in listed] if record else []
-    return [(title, _shown(show, value, rounding)) for title, value, show in known if value is not None]
+    rows = _side_by_side(listed, [record], rounding) if record else []
+    return [(title, value) for title, (value,) in rows]
 
 
 def _drape_rows(drape: Drape | None, rounding: Rounding) -> list[Row]:

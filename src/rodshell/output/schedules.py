@@ -9,23 +9,28 @@ import csv
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from math import ceil, isnan, log, pi
 
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.figures.checks import JointLoad
+from rodshell.figures.fabrication import Brace, Stock
 from rodshell.figures.form import Meeting, Stiffness
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends, printable
 from rodshell.geometry.frames import unit
-from rodshell.output.grid import GridRod, joints_of, rods_of
+from rodshell.output.grid import GridJoint, GridRod, end_nodes, joints_of, lies_flat, node_stations, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
-from rodshell.results.strength_used import ENDS
+from rodshell.results.laths import laths_on
+from rodshell.results.states import POPPED
 from rodshell.results.wording import FINEST, Rounding, rounding_of
+from rodshell.rods.supports import finals_first
 
-Rows = list[list[str]]
-Table = tuple[list[str], Rows]
+Table = dict[str, list[str]]  # the cells of each column, from row to row
 UNITS = {
     "Nm2": "N m\N{SUPERSCRIPT TWO}",
     "mm": "mm",
@@ -35,7 +40,7 @@ UNITS = {
     "N": "N",
     "Nm": "N m",
 }
-UNKNOWN = np.full(3, np.nan)  # tangent
+UNKNOWN = (np.nan, np.nan, np.nan)  # force
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
 Show = Callable[[float | None], str]
 
@@ -54,55 +59,55 @@ def heading(column: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def rods_table(archive: Archive, *, brief: bool = False) -> Table:
+def rods_table(archive: Archive) -> Table:
     """One row a rod; `joints_from_cut_end_mm` lists every joint (ends: 0, 1).
 
     Splices and joints are measured from the cut end of the rod's start, as on the strips.
 
     Bending is that of the final shape; in columns named `pop_up` it is the worst of all shapes of the deployment.
-
-    Parameters
-    ----------
-    brief : only the columns that have room on a sheet.
     """
-    final, mm = archive.final, rounding_of(archive.results).mm
-    columns: list[tuple[str, bool, Callable[[GridRod], str]]] = [
-        ("id", True, lambda rod: rod.id),
-        ("family", False, lambda rod: rod.family),
-        ("layer", True, lambda rod: "" if rod.record.layer is None else str(rod.record.layer)),
-        ("offset_mm", False, lambda rod: mm(rod.record.offset)),
-        ("start_mm", False, lambda rod: mm(rod.record.start)),
-        ("end_mm", False, lambda rod: mm(rod.record.end)),
-        ("length_mm", True, lambda rod: mm(rod.length)),
-        ("cut_length_mm", True, lambda rod: mm(rod.cut_length)),
-        ("mass_kg", True, lambda rod: _significant(rod.record.mass)),
-        ("joints", True, lambda rod: str(len(rod.joints))),
-        ("min_radius_mm", True, lambda rod: _significant(rod.record.min_radius, 1e3)),
-        ("max_normal_curvature_per_m", False, lambda rod: _significant(rod.record.normal_curvature)),
-        ("max_geodesic_curvature_per_m", False, lambda rod: _significant(rod.record.geodesic_curvature)),
-        ("max_twist_deg_per_m", False, lambda rod: _significant(rod.record.twist_rate, 180 / pi)),
-        ("max_strain", True, lambda rod: _number(rod.record.max_strain, 6)),
-        ("max_stress_MPa", True, lambda rod: _mpa(rod.record.max_stress)),
-        ("max_torsion_stress_MPa", False, lambda rod: _mpa(rod.record.torsion_stress)),
-        ("max_stress_pop_up_MPa", True, lambda rod: _mpa(rod.record.pop_up.max_stress if rod.record.pop_up else None)),
-        ("utilisation_pop_up", True, lambda rod: _number(_utilisation(rod), 3)),
-        ("splices_from_cut_end_mm", True, lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.record.splices)),
-        ("second_laths_mm", True, lambda rod: "; ".join(mm(stop - start) for start, stop in rod.laths)),
-        (
-            "second_laths_splices_from_cut_end_mm",
-            True,
-            lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
-        ),
-        *_ends(mm, "flat", 2, lambda rod: rod.flat),
-        ("final_state", False, lambda rod: final or "" if len(rod.nodes) else ""),
-        *_ends(
-            mm, "final", 3, lambda rod: archive.states[final][rod.nodes[[0, -1]]] if final and len(rod.nodes) else None
-        ),
-        ("joints_from_cut_end_mm", False, lambda rod: _joints_at(rod, mm)),
-    ]
-    chosen = [column for column in columns if column[1] or not brief]
-    rows = [[cell(rod) for _, _, cell in chosen] for rod in rods_of(archive)]
-    return _pruned(([name for name, _, _ in chosen], rows), brief)
+    rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
+    columns: dict[str, Callable[[GridRod], str]] = {
+        "id": lambda rod: rod.id,
+        "family": lambda rod: rod.family,
+        "layer": lambda rod: "" if rod.record.layer is None else str(rod.record.layer),
+        "offset_mm": lambda rod: mm(rod.record.offset),
+        "start_mm": lambda rod: mm(rod.record.start),
+        "end_mm": lambda rod: mm(rod.record.end),
+        "length_mm": lambda rod: mm(rod.length),
+        "cut_length_mm": lambda rod: mm(rod.cut_length),
+        "mass_kg": lambda rod: _significant(rod.record.mass),
+        "joints": lambda rod: str(len(rod.joints)),
+        "min_radius_mm": lambda rod: _significant(rod.record.min_radius, 1e3),
+        "max_normal_curvature_per_m": lambda rod: _significant(rod.record.normal_curvature),
+        "max_geodesic_curvature_per_m": lambda rod: _significant(rod.record.geodesic_curvature),
+        "max_twist_deg_per_m": lambda rod: _significant(rod.record.twist_rate, 180 / pi),
+        "max_strain": lambda rod: _number(rod.record.max_strain, 6),
+        "max_stress_MPa": lambda rod: _mpa(rod.record.max_stress),
+        "max_torsion_stress_MPa": lambda rod: _mpa(rod.record.torsion_stress),
+        "max_stress_pop_up_MPa": lambda rod: _mpa(rod.record.pop_up.max_stress if rod.record.pop_up else None),
+        "utilisation_pop_up": lambda rod: _number(rod.record.pop_up.utilisation if rod.record.pop_up else None, 3),
+        "splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.record.splices),
+        "second_laths_mm": lambda rod: "; ".join(mm(stop - start) for start, stop in laths_on(rod.record)),
+        "second_laths_splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
+    }
+    table = {name: [cell(rod) for rod in rods] for name, cell in columns.items()}
+    for end in (0, 1):
+        table |= _by_axis("flat_", f"{end}_mm", [rod.flat[end] for rod in rods], mm, "xy")
+    table["final_state"] = [final or "" if len(rod.nodes) else "" for rod in rods]
+    for end in (0, 1):
+        points = [archive.states[final][rod.nodes[-end]] if final and len(rod.nodes) else None for rod in rods]
+        table |= _by_axis("final_", f"{end}_mm", points, mm)
+    table["joints_from_cut_end_mm"] = [_joints_at(rod, mm) for rod in rods]
+    return _of_a_flat_grid(table, archive)
+
+
+def _of_a_flat_grid(table: Table, archive: Archive) -> Table:
+    """What is said of the flat grid is left empty where there is none, as the shell is assembled in place."""
+    if lies_flat(archive):
+        return table
+    flat = {name for name in table if name.startswith("flat_")} | {"scissor_deg"}
+    return {name: [""] * len(cells) if name in flat else cells for name, cells in table.items()}
 
 
 def sections_table(archive: Archive) -> Table:
@@ -115,8 +120,7 @@ def sections_table(archive: Archive) -> Table:
     """
     mm, known = rounding_of(archive.results).mm, archive.results.rod
     unchanged = None if known is None else known.EI if known.EI is not None else known.EI1
-    columns = ["rod", "varies", "from_mm", "to_mm", "EI_from_Nm2", "EI_to_Nm2"]
-    columns += ["size_from_mm", "size_to_mm", "laths"]
+    columns = ("rod", "varies", "from_mm", "to_mm", "EI_from_Nm2", "EI_to_Nm2", "size_from_mm", "size_to_mm", "laths")
     rows = []
     for rod in rods_of(archive):
         along = rod.record.stiffness
@@ -132,9 +136,8 @@ def sections_table(archive: Archive) -> Table:
             stiffness = ["" if unchanged is None else _six(factor * unchanged) for factor in factors]
             cut = [_significant(size, 1e3) for size in sizes] or ["", ""]
             laths = f"{factors[0]:g}" if along.varies == "laths" else ""
-            row = [rod.id, along.varies or "", mm(stops[k]), mm(stops[k + 1]), *stiffness, *cut, laths]
-            rows.append(row)
-    return columns, rows
+            rows.append([rod.id, along.varies or "", mm(stops[k]), mm(stops[k + 1]), *stiffness, *cut, laths])
+    return _in_columns(columns, rows)
 
 
 def _segments(along: Stiffness) -> tuple[list[float], list[float], list[float]]:
@@ -154,99 +157,56 @@ def _segments(along: Stiffness) -> tuple[list[float], list[float], list[float]]:
     return at, factors, sizes
 
 
-def joints_table(archive: Archive, *, brief: bool = False) -> Table:
+@made_once
+def joints_table(archive: Archive) -> Table:
     """One row a joint: where it is on both rods, in plan and in space, the angle between them, and the upper rod.
 
     The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines.
-
-    Parameters
-    ----------
-    brief : only the columns that have room on a sheet.
     """
-    columns, rows = _all_of_joints(archive)
-    kept = [k for k, name in enumerate(columns) if not (brief and name in _NOT_BRIEF)]
-    return [columns[k] for k in kept], [[row[k] for k in kept] for row in rows]
-
-
-@made_once
-def _all_of_joints(archive: Archive) -> Table:
-    """All columns. Each entry of `columns` is a name and what it says of a joint: more may be added there."""
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
-    placed = [_joints_in_space(archive, rod, final) for rod in rods]
-    joints, along = joints_of(rods), np.array([rod.flat[1] - rod.flat[0] for rod in rods]).reshape(-1, 2)
-    in_space = [(placed[i].get(rods[j].id), placed[j].get(rods[i].id)) for i, j in (joint.rods for joint in joints)]
-    first, second = np.array([joint.rods for joint in joints], dtype=np.intp).reshape(-1, 2).T
-    flats = _degrees(along[first], along[second])
-    tangents = np.array([[UNKNOWN if on is None else on[1] for on in pair] for pair in in_space]).reshape(-1, 2, 3)
-    angles = _degrees(tangents[:, 0], tangents[:, 1])
-    loads = _joint_loads(archive, final)
-    rows, columns = list[list[str]](), dict[str, str]()
-    for joint, (on_a, _), flat, angle in zip(joints, in_space, flats.tolist(), angles.tolist(), strict=True):
-        a, b = (rods[k] for k in joint.rods)
-        x, y = a.point(joint.at[0])
-        space = map(mm, on_a[0]) if on_a else ("", "", "")
-        columns = {
-            "id": joint.id,
-            "rod_a": a.id,
-            "rod_b": b.id,
-            "at_a_from_cut_end_mm": mm(a.from_cut_end(joint.at[0])),
-            "at_b_from_cut_end_mm": mm(b.from_cut_end(joint.at[1])),
-            "over": joint.over(rods),
-            "flat_x_mm": mm(x),
-            "flat_y_mm": mm(y),
-            "final_state": (final or "") if on_a else "",
-            **dict(zip(("final_x_mm", "final_y_mm", "final_z_mm"), space, strict=True)),
-            "flat_deg": f"{flat:.2f}",
-            "final_deg": "" if isnan(angle) else f"{angle:.2f}",
-            "scissor_deg": "" if isnan(angle) else f"{round(angle - flat, 2) + 0.0:.2f}",
-            **loads.get((a.id, b.id), dict.fromkeys(_LOADS, "") if loads else {}),
-        }  # fmt: skip
-        rows.append(list(columns.values()))
-    return list(columns), rows
+    joints = joints_of(rods)
+    pairs = [(rods[i], rods[j]) for i, j in (joint.rods for joint in joints)]
+    ways = np.array([[rods[k].heading(s) for k, s in zip(joint.rods, joint.at, strict=True)] for joint in joints])
+    ways = ways.reshape(-1, 2, 2)
+    points, tangents = _in_space(archive, rods, joints, final)
+    flats, angles = _degrees(ways[:, 0], ways[:, 1]), _degrees(tangents[:, 0], tangents[:, 1])
+    known = np.isfinite(points[:, 0, 0]).tolist()
+    at = [[rods[k].from_cut_end(s) for k, s in zip(joint.rods, joint.at, strict=True)] for joint in joints]
+    table = {
+        "id": [joint.id for joint in joints],
+        **_in_columns(("rod_a", "rod_b"), [(a.id, b.id) for a, b in pairs]),
+        **_by_axis("at_", "_from_cut_end_mm", at, mm, "ab"),
+        "over": [joint.over(rods) for joint in joints],
+        **_by_axis("flat_", "_mm", [rods[joint.rods[0]].point(joint.at[0]) for joint in joints], mm, "xy"),
+        "final_state": [(final or "") if there else "" for there in known],
+        **_by_axis("final_", "_mm", points[:, 0].tolist(), mm),
+        "flat_deg": [_number(angle, 2) for angle in flats.tolist()],
+        "final_deg": [_number(angle, 2) for angle in angles.tolist()],
+        "scissor_deg": [_number(angle, 2) for angle in (angles - flats).tolist()],
+    }
+    loads = {load.rods: load for load in archive.results.joint_loads.get((final or "").removeprefix(POPPED), ())}
+    if loads:
+        joint_loads = [loads.get((a.id, b.id), JointLoad(rods=(a.id, b.id))) for a, b in pairs]
+        forces = np.array([load.force or UNKNOWN for load in joint_loads], dtype=float).reshape(-1, 3)
+        table["force_N"] = [_six(force) for force in np.linalg.norm(forces, axis=1).tolist()]
+        table["normal_force_N"] = [_six(load.normal_force) for load in joint_loads]
+        table["shear_moment_Nm"] = [_six(load.shear_moment) for load in joint_loads]
+        table["out_of_plane_moment_Nm"] = [_six(load.out_of_plane_moment) for load in joint_loads]
+    return _of_a_flat_grid(table, archive)
 
 
-_LOADS = ("force_N", "normal_force_N", "shear_moment_Nm", "out_of_plane_moment_Nm")
-_NOT_BRIEF = {"rod_a", "rod_b", "flat_x_mm", "flat_y_mm", "final_state", "scissor_deg", *_LOADS}
-
-
-def _joint_loads(archive: Archive, final: str | None) -> dict[tuple[str, str], dict[str, str]]:
-    """By the two rods: what the joint carries, as the second rod feels it."""
-    ends = next((ends for ends in ENDS if final == f"popped_{ends}"), None)
-    loads = archive.results.joint_loads.get(ends, ()) if ends else ()
-    found = dict[tuple[str, str], dict[str, str]]()
-    for load in loads:
-        force = None if load.force is None else float(np.linalg.norm(np.array(load.force, dtype=float)))
-        values = (force, load.normal_force, load.shear_moment, load.out_of_plane_moment)
-        found[load.rods] = {name: _six(value) for name, value in zip(_LOADS, values, strict=True)}
-    return found
-
-
-def supports_table(archive: Archive, *, brief: bool = False) -> Table:
-    """One row a rod end: its place on the final boundary, its outward direction, and its reactions.
-
-    Parameters
-    ----------
-    brief : only the columns that have room on a sheet, and directions only where they are known.
-    """
+def supports_table(archive: Archive) -> Table:
+    """One row a rod end: its place on the final boundary, its outward direction, and its reactions."""
     results, mm = archive.results, rounding_of(archive.results).mm
-    columns = ["id", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"tangent_{a}" for a in "xyz")]
-    columns += [f"{kind}_{a}_{unit}_{ends}" for ends in results.reactions for kind, unit in _REACTIONS for a in "xyz"]
-    names = [(rod.id, end) for rod in rods_of(archive) for end in (0, 1)]
-    rows = []
-    for k, ((name, end), place) in enumerate(zip(names, results.boundary, strict=False)):
-        row = [f"{name}.{end}", name, str(end), *map(mm, place)]
-        tangent = results.end_tangents[k] if k < len(results.end_tangents) else (None, None, None)
-        row += ["" if t is None else f"{round(t, 5) + 0.0:.5f}" for t in tangent]
-        for held in results.reactions.values():
-            row += [_six(value) for kind in (held.forces, held.moments) for value in kind[k]]
-        rows.append(row)
-    if brief:
-        stop = 9 if results.end_tangents else 6
-        columns, rows = [columns[0], *columns[3:stop]], [[row[0], *row[3:stop]] for row in rows]
-    return columns, rows
-
-
-_REACTIONS = (("force", "N"), ("moment", "Nm"))
+    names = [(rod.id, end) for rod in rods_of(archive) for end in "01"][: len(results.boundary)]
+    table = {"id": [f"{rod}.{end}" for rod, end in names]} | _in_columns(("rod", "end"), names)
+    table |= _by_axis("", "_mm", results.boundary, mm)
+    tangents = results.end_tangents[: len(names)] or [None] * len(names)
+    table |= _by_axis("tangent_", "", tangents, lambda share: _number(share, 5))
+    for ends, held in results.reactions.items():
+        table |= _by_axis("force_", f"_N_{ends}", held.forces[: len(names)], _six)
+        table |= _by_axis("moment_", f"_Nm_{ends}", held.moments[: len(names)], _six)
+    return table
 
 
 def seam_meetings(results: Results) -> Iterator[tuple[str, Meeting]]:
@@ -259,62 +219,54 @@ def seam_meetings(results: Results) -> Iterator[tuple[str, Meeting]]:
 def seams_table(archive: Archive) -> Table:
     """One row a meeting: the two rod ends (0 start, 1 end), their place, and the sum of both rods' support forces."""
     seams, mm = archive.results.seams, rounding_of(archive.results).mm
-    ends = [end for end in ENDS if all(end in seam.forces for seam in seams)]
-    columns = ["meeting", "first_end", "second_end", "x_mm", "y_mm", "z_mm"]
-    columns += [f"{end}_f{axis}_N" for end in ends for axis in "xyz"]
-    rows = [[number, *meeting.ends, *map(mm, meeting.point)] for number, meeting in seam_meetings(archive.results)]
-    forces = [
-        [_six(force) for end in ends for force in seam.forces[end].each[k]]
-        for seam in seams
-        for k in range(len(seam.meetings))
-    ]
-    return columns, [[*row, *of_row] for row, of_row in zip(rows, forces, strict=True)]
+    meetings = list(seam_meetings(archive.results))
+    table = {"meeting": [number for number, _ in meetings]}
+    table |= _in_columns(("first_end", "second_end"), [meeting.ends for _, meeting in meetings])
+    table |= _by_axis("", "_mm", [meeting.point for _, meeting in meetings], mm)
+    for ends in finals_first(seams[0].forces if seams else ()):
+        if all(ends in seam.forces for seam in seams):
+            forces = [force for seam in seams for force in seam.forces[ends].each]
+            table |= _by_axis(f"{ends}_f", "_N", forces, _six)
+    return table
 
 
-def bracing_table(archive: Archive, *, brief: bool = False) -> Table:
+def bracing_table(archive: Archive) -> Table:
     """One row a diagonal: its length flat and in the final shape, of cables also free of stress; where loads were
     checked its axial force under each combination, tension positive, and which leave it slack.
-
-    Parameters
-    ----------
-    brief : only the columns that have room on a sheet.
     """
     results, mm = archive.results, rounding_of(archive.results).mm
-    braces = results.fabrication.bracing if results.fabrication else ()
-    columns = ["from", "to", "flat_mm", "final_mm"]
-    rows = [[brace.start, brace.end, mm(brace.flat), mm(brace.final)] for brace in braces]
+    braces = _bracing_of(archive)
+    table = {
+        "from": [brace.start for brace in braces],
+        "to": [brace.end for brace in braces],
+        "flat_mm": [mm(brace.flat) for brace in braces],
+        "final_mm": [mm(brace.final) for brace in braces],
+    }
     cables = any(brace.cut is not None for brace in braces)
     if cables:
-        columns.append("cut_mm")
-        rows = [[*row, mm(brace.cut)] for row, brace in zip(rows, braces, strict=True)]
+        table["cut_mm"] = [mm(brace.cut) for brace in braces]
     loaded = {(name, ends): shell.bracing for name, ends, shell in loaded_shells(results) if shell.bracing}
-    if loaded and not brief:
-        columns += [f"force_N_{ends}_{name}" for name, ends in loaded]
-        rows = [[*row, *(_six(forces[k]) for forces in loaded.values())] for k, row in enumerate(rows)]
+    for (name, ends), forces in loaded.items():
+        table[f"force_N_{ends}_{name}"] = [_six(force) for force in forces]
     if loaded and cables:
-        columns.append("slack_under")
-        slack = [
-            [f"{name} ({ends})" for (name, ends), forces in loaded.items() if forces[k] == 0] for k in range(len(rows))
-        ]
-        rows = [[*row, "; ".join(names)] for row, names in zip(rows, slack, strict=True)]
-    return columns, rows
+        slack = [[f"{name} ({ends})" for (name, ends), forces in loaded.items() if forces[k] == 0]
+                 for k in range(len(braces))]  # fmt: skip
+        table["slack_under"] = ["; ".join(names) for names in slack]
+    return _of_a_flat_grid(table, archive)
 
 
 def foundations_table(archive: Archive) -> Table:
     """One row a rod end: its place, and what its support exerts on the shell under each combination of loads, with what
     it exerts on the unloaded shell; the foundation carries the opposite.
     """
-    results, mm = archive.results, rounding_of(archive.results).mm
-    columns = ["id", *(f"{axis}_mm" for axis in "xyz")]
-    names = [f"{rod.id}.{end}" for rod in rods_of(archive) for end in (0, 1)]
-    rows = [[name, *map(mm, place)] for name, place in zip(names, results.boundary, strict=True)]
+    results = archive.results
+    table = {"id": [f"{rod.id}.{end}" for rod in rods_of(archive) for end in (0, 1)]}
+    table |= _by_axis("", "_mm", results.boundary, rounding_of(results).mm)
     for name, ends, shell in loaded_shells(results):
-        held = {"force": ("N", shell.support_forces)}
+        table |= _by_axis("force_", f"_N_{ends}_{name}", shell.support_forces, _six)
         if np.nan_to_num(shell.support_moments).any():
-            held["moment"] = ("Nm", shell.support_moments)
-        columns += [f"{what}_{axis}_{unit}_{ends}_{name}" for what, (unit, _) in held.items() for axis in "xyz"]
-        rows = [[*row, *(_six(value) for _, each in held.values() for value in each[k])] for k, row in enumerate(rows)]
-    return columns, rows
+            table |= _by_axis("moment_", f"_Nm_{ends}_{name}", shell.support_moments, _six)
+    return table
 
 
 def loaded_shells(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
@@ -327,13 +279,13 @@ def loaded_shells(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
 def stock_table(archive: Archive) -> Table:
     """One row a bar of stock: its pieces, named rod.number from the datum end, those of a lath on it
     rod-2.number, and what is left of it."""
-    stock = archive.results.fabrication.stock if archive.results.fabrication else None
-    mm = rounding_of(archive.results).mm
-    rows = [
-        [str(k), "; ".join(f"{piece.piece} {mm(piece.length)}" for piece in bar.pieces), mm(bar.left)]
-        for k, bar in enumerate(stock.bars if stock else (), start=1)
-    ]
-    return ["bar", "pieces_mm", "left_mm"], rows
+    stock, mm = _stock_of(archive), rounding_of(archive.results).mm
+    bars = stock.bars if stock else ()
+    return {
+        "bar": [str(k) for k in range(1, len(bars) + 1)],
+        "pieces_mm": ["; ".join(f"{piece.piece} {mm(piece.length)}" for piece in bar.pieces) for bar in bars],
+        "left_mm": [mm(bar.left) for bar in bars],
+    }
 
 
 def end_paths_table(archive: Archive) -> Table:
@@ -341,18 +293,25 @@ def end_paths_table(archive: Archive) -> Table:
 
     It is read by finite element programs, in which a rounded displacement is a stress: it has all digits to 0.001 mm.
     """
-    mm = Rounding(FINEST).mm
-    history, shares = archive.states["history"], archive.states["history_share"]
-    columns = ["share", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"u{a}_mm" for a in "xyz")]
+    mm, shares = Rounding(FINEST).mm, archive.states["history_share"].tolist()
     ends = [(rod.id, end) for rod in rods_of(archive) for end in "01"]
-    nodes = np.concatenate([rod.nodes[[0, -1]] for rod in rods_of(archive)])
-    points = history[:, nodes]
-    rows = [
-        [f"{share:.6f}", *end, *map(mm, point), *map(mm, way)]
-        for share, here, moved in zip(shares.tolist(), points.tolist(), (points - points[0]).tolist(), strict=True)
-        for end, point, way in zip(ends, here, moved, strict=True)
-    ]
-    return columns, rows
+    points = archive.states["history"][:, end_nodes(rods_of(archive))]
+    table = _in_columns(("share", "rod", "end"), [(f"{share:.6f}", *end) for share in shares for end in ends])
+    table |= _by_axis("", "_mm", points.reshape(-1, 3).tolist(), mm)
+    return table | _by_axis("u", "_mm", (points - points[0]).reshape(-1, 3).tolist(), mm)
+
+
+def _by_axis(
+    before: str, after: str, vectors: Iterable[Sequence[float | None] | Floats | None], show: Show, axes: str = "xyz"
+) -> Table:
+    """A column for each component of vectors, named by its axis; None: not known."""
+    rows = [[""] * len(axes) if vector is None else [*map(show, vector)] for vector in vectors]
+    return _in_columns([before + axis + after for axis in axes], rows)
+
+
+def _in_columns(names: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    columns = list(zip(*rows, strict=True)) or [()] * len(names)
+    return {name: list(cells) for name, cells in zip(names, columns, strict=True)}
 
 
 def _on(rod: GridRod) -> list[float]:
@@ -367,40 +326,23 @@ def _joints_at(rod: GridRod, mm: Show) -> str:
     )
 
 
-def _ends(
-    mm: Show, name: str, axes: int, coordinates: Callable[[GridRod], Floats | None]
-) -> list[tuple[str, bool, Callable[[GridRod], str]]]:
-    """Columns of the coordinates of both ends."""
-
-    def cell(end: int, axis: int) -> Callable[[GridRod], str]:
-        def show(rod: GridRod) -> str:
-            found = coordinates(rod)
-            return "" if found is None else mm(found[end][axis])
-
-        return show
-
-    return [(f"{name}_{'xyz'[k]}{end}_mm", False, cell(end, k)) for end in (0, 1) for k in range(axes)]
-
-
-def _pruned(table: Table, brief: bool) -> Table:
-    """A table for paper goes without the columns that say nothing."""
-    columns, rows = table
-    keep = [k for k in range(len(columns)) if not brief or any(row[k] for row in rows)]
-    return [columns[k] for k in keep], [[row[k] for k in keep] for row in rows]
-
-
-def _joints_in_space(archive: Archive, rod: GridRod, state: str | None) -> dict[str, tuple[Floats, Floats]]:
-    """Position (3,) [m] and a tangent (3,) of a rod at its joints, by the rod that is met; empty if not known."""
-    if state is None or len(rod.nodes) < 2 or "flat" not in archive.states:
-        return {}
-    flat, x = archive.states["flat"][rod.nodes], archive.states[state][rod.nodes]
-    stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(flat, axis=0), axis=1))])
-    at = np.array([at for _, at in rod.joints])
-    step = 0.5 * np.diff(stations).min()  # stays within the edges on both sides
-    before, position, after = (
-        np.column_stack([np.interp(s, stations, x[:, axis]) for axis in range(3)]) for s in (at - step, at, at + step)
-    )
-    return {other: (position[k], after[k] - before[k]) for k, (other, _) in enumerate(rod.joints)}
+def _in_space(
+    archive: Archive, rods: Sequence[GridRod], joints: Sequence[GridJoint], state: str | None
+) -> tuple[Floats, Floats]:
+    """Position (c, 2, 3) [m] of both rods at each joint, and a tangent (c, 2, 3); NaN where they are not known."""
+    on = np.array([joint.rods for joint in joints], dtype=np.intp).reshape(-1, 2)
+    at = np.array([joint.at for joint in joints]).reshape(-1, 2)
+    points, tangents = np.full((2, len(joints), 2, 3), np.nan)
+    for k, rod in enumerate(rods if state in archive.states and "flat" in archive.states else ()):
+        x, stations = archive.states[state or ""][rod.nodes], node_stations(archive, rod)
+        if len(x):
+            here, step = on == k, 0.5 * np.diff(stations).min()  # stays within the edges on both sides
+            before, points[here], after = (
+                np.column_stack([np.interp(s, stations, x[:, axis]) for axis in range(3)])
+                for s in (at[here] - step, at[here], at[here] + step)
+            )
+            tangents[here] = after - before
+    return points, tangents
 
 
 def _degrees(a: Floats, b: Floats) -> Floats:
@@ -420,7 +362,8 @@ def _significant(value: float | None, unit: float = 1.0) -> str:
 
 
 def _number(value: float | None, digits: int) -> str:
-    return "" if value is None else f"{value:.{digits}f}"
+    """With so many decimals, and no minus before a zero."""
+    return "" if value is None or isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _six(value: float | None) -> str:
@@ -428,9 +371,61 @@ def _six(value: float | None) -> str:
     return "" if value is None or isnan(value) else f"{value:.6g}"
 
 
-def _utilisation(rod: GridRod) -> float | None:
-    """In all shapes, those of the deployment included."""
-    return rod.record.pop_up.utilisation if rod.record.pop_up else None
+# Where they are shown
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A schedule: all of it in its file, and the columns for which sheets and pages have room.
+
+    Args:
+        title: on sheets.
+        wide: patterns of the columns that only the file has.
+        optional: patterns of those that only the file has where they say nothing.
+        known: whether a result has it.
+    """
+
+    title: str
+    table: Callable[[Archive], Table]
+    wide: tuple[str, ...] = ()
+    optional: tuple[str, ...] = ()
+    known: Callable[[Archive], bool] = lambda archive: True
+
+    def brief(self, archive: Archive) -> Table:
+        """The columns that have room on a sheet."""
+
+        def shown(name: str, cells: list[str]) -> bool:
+            left_out = self.wide if any(cells) else (*self.wide, *self.optional)
+            return not any(fnmatchcase(name, pattern) for pattern in left_out)
+
+        return {name: cells for name, cells in self.table(archive).items() if shown(name, cells)}
+
+
+def _stock_of(archive: Archive) -> Stock | None:
+    return archive.results.fabrication.stock if archive.results.fabrication else None
+
+
+def _bracing_of(archive: Archive) -> Sequence[Brace]:
+    return archive.results.fabrication.bracing if archive.results.fabrication else ()
+
+
+SCHEDULES = {
+    "rods": Schedule(
+        "Rods", rods_table, ("family", "offset_mm", "start_mm", "end_mm", "max_*_curvature_per_m", "max_twist_*",
+        "max_torsion_*", "flat_*", "final_*", "joints_from_*"), ("*",),
+    ),
+    "joints": Schedule("Joints", joints_table, ("rod_?", "flat_?_mm", "final_state", "scissor_deg", "*_N", "*_Nm")),
+    "supports": Schedule("Supports", supports_table, ("rod", "end", "force_*", "moment_*"), ("tangent_*",)),
+    "bracing": Schedule("Bracing", bracing_table, ("force_*",), known=lambda archive: bool(_bracing_of(archive))),
+    "foundations": Schedule("Foundations", foundations_table, known=lambda archive: bool(archive.results.loads)),
+    "stock": Schedule("Stock", stock_table, known=lambda archive: _stock_of(archive) is not None),
+    "sections": Schedule(
+        "Sections along the rods", sections_table,
+        known=lambda archive: any(rod.stiffness for rod in archive.results.rods),
+    ),
+    "seams": Schedule("Seams", seams_table, known=lambda archive: bool(archive.results.seams)),
+    "end_paths": Schedule("End paths", end_paths_table, known=lambda archive: "history" in archive.states),
+}  # fmt: skip
 
 
 # CSV
@@ -441,25 +436,20 @@ WHOLE = re.compile(NUMBER)
 FORMULA = re.compile(rf'(^[\s"]*|[;,][\s"]*(?!{NUMBER}\s*(?:[;,]|$)))(?=[{re.escape("".join(sorted(RUN)))}])')
 
 
-def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """Rows as CSV; a number stays as it is, a text that a spreadsheet would run gets an apostrophe.
+def table_csv(table: Table) -> str:
+    """A schedule as CSV."""
+    return csv_text([list(table), *zip(*table.values(), strict=True)])
 
-    Parameters
-    ----------
-    rows : cells; numbers are written by `str`.
-    """
+
+def csv_text(rows: Iterable[Sequence[object]]) -> str:
+    """Rows as CSV; a number stays as `str` writes it, a text that a spreadsheet would run gets an apostrophe."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows([[safe_cell(str(cell)) for cell in row] for row in rows])
     return stream.getvalue()
 
 
 def safe_cell(cell: str) -> str:
-    """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons.
-
-    Parameters
-    ----------
-    cell : a number or a text.
-    """
+    """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons."""
     if RUN.isdisjoint(cell):
         return printable(cell)
     return cell if WHOLE.fullmatch(cell) else FORMULA.sub(r"\1'", printable(cell))

@@ -16,14 +16,7 @@ PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1"
 
 @dataclass(frozen=True)
 class CheckOptions:
-    """What is checked, and by which strength of the material.
-
-    Parameters
-    ----------
-    strength : of the rods' material [Pa], by which utilisation is counted; None: a preset's, or it is not counted.
-    stages : equilibria of the deployment from flat; 0: it is not followed.
-    shear_strength : [Pa]; None: in the proportion of a preset, or stress is counted by von Mises.
-    """
+    """What is checked, and by which strength of the material."""
 
     strength: Annotated[Stress | None, "design strength in bending; default: a preset's by its code"] = None
     stages: Annotated[Stages, "equilibria of the deployment from flat; 0: it is not computed"] = 8
@@ -82,12 +75,11 @@ class Layers:
 class DrawingStyle:
     """What the drawings of a set have in common.
 
-    Parameters
-    ----------
-    tolerance : of lengths [m], by which they are also rounded (see `wording.rounding_of`); None:
-        the title block says that it is not given.
-    layers : for some of the layers (CUT, MARK, LABEL, BOUNDARY-FLAT, BOUNDARY-FINAL, DIM, TITLE) another name; a
-        mapping becomes `Layers`.
+    Args:
+        tolerance: of lengths [m], by which they are also rounded (see `wording.rounding_of`); None:
+            the title block says that it is not given.
+        layers: for some of the layers (CUT, MARK, LABEL, BOUNDARY-FLAT, BOUNDARY-FINAL, DIM, TITLE) another name; a
+            mapping becomes `Layers`.
     """
 
     paper: Annotated[Literal["A4", "A3", "A2", "A1", "A0"], "size of the PDF's sheets, landscape"] = "A3"

@@ -12,17 +12,12 @@ import numpy as np
 from rodshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Text
 
 SCALE = "1:1 in mm"  # of a drawing's file, after its title
-FLIP = np.array([1.0, -1.0])
+_FLIP = np.array([1.0, -1.0])
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans Condensed', sans-serif"
 
 
 def number(value: float, digits: int = 2) -> str:
-    """A number with at most `digits` decimals, without zeros at its end: "2.5", "-0.01", "0".
-
-    Parameters
-    ----------
-    digits : most decimals that are shown.
-    """
+    """A number with at most `digits` decimals, without zeros at its end: "2.5", "-0.01", "0"."""
     text = f"{value:.{digits}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
@@ -32,43 +27,28 @@ def number(value: float, digits: int = 2) -> str:
 def tag(name: str, *children: str, **attributes: Any) -> str:
     """An element.
 
-    Parameters
-    ----------
-    name : such as "path".
-    attributes : "-" is written "_"; a "_" at the end, which Python's own words need, is dropped: `class_`.
+    Args:
+        attributes: "-" is written "_"; a "_" at the end, which Python's own words need, is dropped: `class_`.
     """
     words = [name]
     for key, value in attributes.items():
         shown = escape(value) if isinstance(value, str) else number(value, 3)
-        words.append(f'{_attribute(key)}="{shown}"')
+        attribute = key.rstrip("_").replace("_", "-")
+        words.append(f'{attribute}="{shown}"')
     opening = " ".join(words)
     return f"<{opening}>{''.join(children)}</{name}>" if children else f"<{opening}/>"
 
 
-@cache
-def _attribute(key: str) -> str:
-    """The name of an attribute, by that of Python's argument."""
-    return key.rstrip("_").replace("_", "-")
-
-
 def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:
-    """One line of text.
-
-    Parameters
-    ----------
-    x, y : where its baseline begins [units of the view box], y down.
-    size : of the font [units].
-    """
+    """One line of text, whose baseline begins at x, y, y down."""
     return tag("text", escape(text), x=x, y=y, font_size=size, **attributes)
 
 
 def document(view: tuple[float, float, float, float], *children: str, unit: str = "") -> str:
-    """A complete SVG file.
+    """A complete SVG file; `view` is x, y, width and height of its view box.
 
-    Parameters
-    ----------
-    view : x, y, width and height of the view box.
-    unit : of the file's size, which is that of the view box: "mm", or "" for pixels.
+    Args:
+        unit: of the file's size, which is that of the view box: "mm", or "" for pixels.
     """
     x, y, width, height = (number(value, 3) for value in view)
     body = "\n".join(child for child in children if child)
@@ -85,12 +65,7 @@ def inline(svg: str) -> str:
 
 
 def drawing_svg(drawing: Drawing) -> str:
-    """An SVG file at true scale, a unit a millimetre; neighbours of one layer and pen are one path or group.
-
-    Parameters
-    ----------
-    drawing : y up; paths in space are not drawn.
-    """
+    """An SVG file at true scale, a unit a millimetre; neighbours of one layer and pen are one path or group."""
     margin = 2 * drawing.text
     low, high = drawing.box()
     width, height = high - low + 2 * margin
@@ -105,10 +80,7 @@ def drawing_svg(drawing: Drawing) -> str:
 
 
 def picture_document(drawing: Drawing) -> str:
-    """An SVG file of a picture, which has no scale.
-
-    drawing : in units of about a pixel, y up.
-    """
+    """An SVG file of a picture in units of about a pixel, y up, which has no scale."""
     low, high = drawing.box()
     view = (float(low[0]), float(-high[1]), *(high - low).tolist())
     return document(view, *_shapes(drawing), *(_text(text) for text in drawing.texts))
@@ -129,7 +101,7 @@ def _shapes(drawing: Drawing) -> Iterator[str]:
 
 def _data(paths: Sequence[Path]) -> str:
     """Data of paths without names, to 0.01 of a unit; zeros have no sign."""
-    points = np.round(np.concatenate([path.points for path in paths]) * FLIP, 2) + 0.0
+    points = np.round(np.concatenate([path.points for path in paths]) * _FLIP, 2) + 0.0
     return "".join([_data_of(len(path.points), path.closed) for path in paths]) % tuple(points.ravel().tolist())
 
 

@@ -41,7 +41,7 @@ from rodshell.results.wording import nice_ticks
 
 FALL = Fall(height=HEIGHT)  # shared DOFs: the paper's *mapping*
 METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")
-METHOD_COLOURS = {"paper": FAMILY["v"], "gravity": FAMILY["u"], "bound": FLAT}
+_METHOD_COLOURS = {"paper": FAMILY["v"], "gravity": FAMILY["u"], "bound": FLAT}
 WORDS = {"paper": "paper's, in time", "gravity": "gravity statics", "bound": "bound to the target"}
 COLUMNS = (
     "target", "rods", "method", "unknowns", "time [s]", "ends off the net, max [mm]", "rms [mm]", "how it rests",
@@ -52,20 +52,19 @@ TITLES = (
     "3  trimmed",
     "4  ends of the drape (dots), of the exact net (dashed)",
 )
-WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
+_WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
 
 
 @dataclass(frozen=True, eq=False)
 class DrapeRun:
     """One case by one method.
 
-    Parameters
-    ----------
-    case, method : what was draped, and how.
-    seconds : time of drape and trim.
-    ends : (m, 2) start and end of each rod at the target's end [m]: those of G0; for the bound drape, whose G0 is that
-        of the net, those of the draped rods.
-    net : (m, 2) those of the exact net [m].
+    Args:
+        case, method: what was draped, and how.
+        seconds: time of drape and trim.
+        ends: (m, 2) start and end of each rod at the target's end [m]: those of G0; for the bound drape, whose G0 is
+            that of the net, those of the draped rods.
+        net: (m, 2) those of the exact net [m].
     """
 
     case: Case
@@ -125,11 +124,10 @@ def drape_all(
 ) -> tuple[DrapeRun, ...]:
     """Every case by every method, the falls with the settings `fall`.
 
-    Parameters
-    ----------
-    progress : is called at each iteration.
-    fall : settings of the paper's method.
-    methods : by which each case is draped.
+    Args:
+        progress: is called at each iteration.
+        fall: settings of the paper's method.
+        methods: by which each case is draped.
     """
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
@@ -156,7 +154,7 @@ def rows_svg(drapes: Sequence[DrapeRun]) -> str:
     for run in drapes:
         name, spacing = run.case.target.name, 1e3 * run.case.spacing
         title = f"({run.case.label})  {name}, spacing {spacing:g} mm: {WORDS[run.method]}"
-        captions = TITLES if _sought(run) is None else (*TITLES[:3], WITH_SOUGHT)
+        captions = TITLES if _sought(run) is None else (*TITLES[:3], _WITH_SOUGHT)
         rows.append((title, list(zip(captions, _panels(run), strict=True))))
     return rows_of_panels(rows)
 
@@ -173,17 +171,16 @@ def _panels(run: DrapeRun) -> list[list[str]]:
     ]
 
 
-def differences_svg(drapes: Sequence[DrapeRun]) -> str:
+def _differences_svg(drapes: Sequence[DrapeRun]) -> str:
     """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm.
 
-    Parameters
-    ----------
-    drapes : case by case, each by every method.
+    Args:
+        drapes: case by case, each by every method.
     """
     panels = []
     for name in dict.fromkeys(run.case.label for run in drapes if run.draped.converged):
         same = [run for run in drapes if run.case.label == name and run.draped.converged]
-        drawn = [(WORDS[run.method], METHOD_COLOURS[run.method], 1e3 * run.errors) for run in same]
+        drawn = [(WORDS[run.method], _METHOD_COLOURS[run.method], 1e3 * run.errors) for run in same]
         if (sought := _sought(same[0])) is not None:
             along = np.abs(np.where(_along_u(same[0]), sought[:, 0], sought[:, 1]))
             drawn.append(("genetic algorithm", FINAL, 1e3 * (along - np.abs(same[0].net.ravel()))))
@@ -245,10 +242,9 @@ def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:
 class DrapeFigure(Figure):
     """Every case by every method.
 
-    Parameters
-    ----------
-    name : of the figure, such as "fig6".
-    drapes : case by case, each by every method.
+    Args:
+        name: of the figure, such as "fig6".
+        drapes: case by case, each by every method.
     """
 
     name: str
@@ -278,7 +274,7 @@ class DrapeFigure(Figure):
 
     def pictures(self) -> dict[str, str]:
         """The paper's method in NAME.svg, each other in NAME-METHOD.svg; the ends of all in NAME-differences.svg."""
-        return {f"{self.name}-differences": differences_svg(self.drapes)} | {
+        return {f"{self.name}-differences": _differences_svg(self.drapes)} | {
             self.name if method == "paper" else f"{self.name}-{method}": rows_svg(
                 [run for run in self.drapes if run.method == method]
             )

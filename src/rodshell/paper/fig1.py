@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.formfinding import PatchForm, find_stages
+from rodshell.formfinding import Stages, find_stages
 from rodshell.output.svg import tag
 from rodshell.paper.figure import (
     CASES,
@@ -30,6 +30,7 @@ from rodshell.paper.figure import (
     standing,
 )
 from rodshell.progress import Progress
+from rodshell.rods.supports import PINNED, SUPPORTS
 
 EDGE = 0.005  # [m], the paper's
 TITLE = "Fig 1 [HQK]: three shells popped up, their ends moved from G0 to G"
@@ -48,7 +49,7 @@ class PopUpCase:
     """One shell, and the time from target to popped up, pinned and clamped [s]."""
 
     case: Case
-    form: PatchForm
+    form: Stages
     seconds: float
 
     @property
@@ -65,7 +66,7 @@ class PopUpCase:
         return (
             self.case.target.name, f"{self.case.rods[0]}x{self.case.rods[1]}", str(len(grid.crossings.rods)),
             f"{min(lengths):.1f} to {max(lengths):.1f}", *(f"{area:.0f}" for area in areas),
-            *(f"{1e3 * gap:.3f}" for ends in ("pinned", "clamped") for gap in (gaps[ends].rms, gaps[ends].max)),
+            *(f"{1e3 * gap:.3f}" for ends in SUPPORTS for gap in (gaps[ends].rms, gaps[ends].max)),
             "yes" if self.stable else "no", f"{self.seconds:.2g}",
         )  # fmt: skip
 
@@ -80,7 +81,7 @@ class PopUpCase:
 
     def shell(self) -> list[str]:
         """The shell on its target, whose body hides its far side."""
-        popped = self.form.popped["pinned"]
+        popped = self.form.popped[PINNED.name]
         return standing(self.case.target, popped.footprint.mesh, popped.positions)
 
     def plan(self) -> list[str]:
@@ -134,10 +135,9 @@ class Fig1(Figure):
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, edge: float = EDGE) -> Fig1:
     """Form and pop up all `cases` with edges of the length `edge` [m], the first twice: compilation does not count.
 
-    Parameters
-    ----------
-    progress : is called at each iteration.
-    edge : length of the edges [m].
+    Args:
+        progress: is called at each iteration.
+        edge: length of the edges [m].
     """
     _popped(replace(cases[0], edge=edge), progress)
     return Fig1(tuple(_popped(replace(case, edge=edge), progress) for case in cases))

@@ -41,22 +41,21 @@ EDGE, LENGTH = 5e-3, 20e-3
 RATE = 10 * 2 * pi / 60  # 10 rpm
 STEP = 5e-3
 NODES = 5
-SAFE = 0.6  # of the step limit of explicit ties
+_SAFE = 0.6  # of the step limit of explicit ties
 SLOW = 1e6  # times slower: inertia is negligible, each step is an equilibrium
-STATIC_STEPS = 60  # of such a revolution
+_STATIC_STEPS = 60  # of such a revolution
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
     """A demonstration.
 
-    Parameters
-    ----------
-    step : of the time stepping [s]; None for statics.
-    times : (k,) [s]; of statics those at which the motion reaches each equilibrium.
-    angles : (k,) by which rod 2 has turned about the axis of the motion [rad].
-    nodes : (k, 2, 5, 3) of rod 1 and rod 2 [m].
-    twists : (k, 4) twist angles of rod 1 [rad].
+    Args:
+        step: of the time stepping [s]; None for statics.
+        times: (k,) [s]; of statics those at which the motion reaches each equilibrium.
+        angles: (k,) by which rod 2 has turned about the axis of the motion [rad].
+        nodes: (k, 2, 5, 3) of rod 1 and rod 2 [m].
+        twists: (k, 4) twist angles of rod 1 [rad].
     """
 
     demonstration: Demonstration
@@ -115,17 +114,16 @@ def run_in_time(
 ) -> Run:
     """The motion from rest.
 
-    Parameters
-    ----------
-    until : end of the motion [s].
-    step : of the record [s]; with explicit ties the time step divides it until it is stable.
+    Args:
+        until: end of the motion [s].
+        step: of the record [s]; with explicit ties the time step divides it until it is stable.
     """
     shell = _shell(joint, coupling)
     motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE))
     start = shell.state(shell.mesh.flat)
     every = 1
     if isinstance(coupling, ExplicitPenalty):
-        every = int(np.ceil(step / (SAFE * step_limit(motion, start))))
+        every = int(np.ceil(step / (_SAFE * step_limit(motion, start))))
     series = simulate(motion, start, until=until, step=step / every, every=every)
     return _record(shell, demonstration, joint, coupling, step / every, series.times, series.states)
 
@@ -133,13 +131,12 @@ def run_in_time(
 def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, *, until: float = 2 * pi / RATE) -> Run:
     """The equilibria along the motion, which is so slow that each step is one; the joint must hold both rods.
 
-    Parameters
-    ----------
-    until : end of the motion [s].
+    Args:
+        until: end of the motion [s].
     """
     shell = _shell(joint, coupling)
     motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE / SLOW))
-    step = SLOW * 2 * pi / RATE / STATIC_STEPS
+    step = SLOW * 2 * pi / RATE / _STATIC_STEPS
     series = simulate(motion, shell.state(shell.mesh.flat), until=SLOW * until, step=step)
     return _record(shell, demonstration, joint, coupling, None, series.times / SLOW, series.states)
 
@@ -183,27 +180,27 @@ def _record(
     return Run(demonstration, joint.name, coupling.name, step, times, angles, nodes, twists)
 
 
-DEMONSTRATIONS: tuple[Demonstration, ...] = ("twisting", "bending")
+_DEMONSTRATIONS: tuple[Demonstration, ...] = ("twisting", "bending")
 LETTER = {"twisting": "a", "bending": "b"}
 SHOWN: tuple[tuple[Demonstration, str], ...] = (("twisting", "linker"), ("bending", "linker"), ("bending", "pin"))
 COLUMNS = (
     "demonstration", "joint", "coupling", "step [ms]", "start-up lag [deg]", "steady lag [deg]",
     "rate error [%]", "rod 2 follows",
 )  # fmt: skip
-FAINT = "#c9cdd0"
+_FAINT = "#c9cdd0"
 RODS = ("#1f5f8b", "#a8552a")
 PANEL = 190.0  # drawing units
-GAP, TEXT, HEAD, FOOT = 14.0, 12.0, 44.0, 30.0
-INSTANTS = 5  # from the start to half a revolution
+GAP, TEXT, HEAD, _FOOT = 14.0, 12.0, 44.0, 30.0
+_INSTANTS = 5  # from the start to half a revolution
 FRAMES = 73  # of the animation
-LAG_CHART, CHART_EDGE = (380.0, 210.0), 56.0
-LOOKS = ((INK, "none"), ("#f28c3a", "5 4"), ("#39b5e6", "none"), ("#4cb873", "2 3"))  # colour and dashes of the lines
+_LAG_CHART, CHART_EDGE = (380.0, 210.0), 56.0
+_LOOKS = ((INK, "none"), ("#f28c3a", "5 4"), ("#39b5e6", "none"), ("#4cb873", "2 3"))  # colour and dashes of the lines
 TITLES = {
     "twisting": "(a)  Rod 1 is twisted: \N{GREEK SMALL LETTER THETA}\u2081\u2081 = \N{GREEK SMALL LETTER OMEGA}t",
     "bending": "(b)  Rod 1 is turned: x\u2081\u2081 circles at \N{GREEK SMALL LETTER OMEGA}",
 }
 SCALE = 0.92 * PANEL / LENGTH  # drawing units per metre
-BIG = 1.4  # panels of the animation, against those of the instants
+_BIG = 1.4  # panels of the animation, against those of the instants
 
 
 @dataclass(frozen=True)
@@ -247,7 +244,7 @@ class Fig4(Figure):
     def pictures(self) -> dict[str, str]:
         """Instants, an animation, and the lag against time."""
         shown = [self._first(demonstration, joint) for demonstration, joint in SHOWN]
-        return {"fig4": instants_svg(shown), "fig4-animated": animation_svg(shown), "fig4-lag": lag_svg(self.runs)}
+        return {"fig4": _instants_svg(shown), "fig4-animated": _animation_svg(shown), "fig4-lag": _lag_svg(self.runs)}
 
     def tables(self) -> Mapping[str, Iterable[Sequence[object]]]:
         """The angles of both rods against time."""
@@ -274,16 +271,15 @@ def _angles(runs: Sequence[Run]) -> list[Sequence[object]]:
 def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
     """All runs, over so many revolutions (`turns`).
 
-    Parameters
-    ----------
-    progress : is called before each run.
-    turns : revolutions of rod 1 [-].
+    Args:
+        progress: is called before each run.
+        turns: revolutions of rod 1 [-].
     """
     until = turns * 2 * np.pi / RATE
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
     cases: list[tuple[Joint, Coupling]] = [(Linker(), coupling) for coupling in couplings]
     runs = []
-    for demonstration in DEMONSTRATIONS:
+    for demonstration in _DEMONSTRATIONS:
         for joint, coupling in (*cases, (Pin(), SharedDofs())):
             progress(f"{demonstration}, {joint.name}, {coupling.name}", "in time", 0.0)
             runs.append(run_in_time(demonstration, joint, coupling, until=until))
@@ -296,14 +292,14 @@ def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
 # Pictures
 
 
-def instants_svg(runs: Sequence[Run]) -> str:
+def _instants_svg(runs: Sequence[Run]) -> str:
     """A row for each run: the rods at a few instants, side by side."""
-    width, down, rows = INSTANTS * PANEL + (INSTANTS + 1) * GAP, 0.0, list[str]()
+    width, down, rows = _INSTANTS * PANEL + (_INSTANTS + 1) * GAP, 0.0, list[str]()
     for run in runs:
         top, height = _extent(run)
         rows.append(tag("g", *_title(run), transform=f"translate({number(GAP)} {number(down)})"))
         last = min(np.pi / RATE, run.times[-1])
-        for across, time in enumerate(np.linspace(0, last, INSTANTS)):
+        for across, time in enumerate(np.linspace(0, last, _INSTANTS)):
             k = int(np.abs(run.times - time).argmin())
             turned = f"{np.degrees(run.prescribed[k]):.0f}\N{DEGREE SIGN}"
             caption = f"t = {number(run.times[k], 3)} s, \N{GREEK SMALL LETTER OMEGA}t = {turned}"
@@ -317,13 +313,13 @@ def instants_svg(runs: Sequence[Run]) -> str:
             ]
             at = f"translate({number(GAP + across * (PANEL + GAP))} {number(down + HEAD - top)})"
             rows.append(tag("g", *panel, transform=at))
-        down += HEAD + height + FOOT
+        down += HEAD + height + _FOOT
     return document((0, 0, width, down), _paper(width, down), *rows)
 
 
-def animation_svg(runs: Sequence[Run]) -> str:
+def _animation_svg(runs: Sequence[Run]) -> str:
     """The runs side by side, in an endless loop; a browser plays it."""
-    width, height = len(runs) * BIG * PANEL + (len(runs) + 1) * GAP, HEAD + BIG * PANEL
+    width, height = len(runs) * _BIG * PANEL + (len(runs) + 1) * GAP, HEAD + _BIG * PANEL
     panels = []
     for across, run in enumerate(runs):
         frames = np.unique(np.linspace(0, len(run.times) - 1, FRAMES).round().astype(int))
@@ -333,30 +329,29 @@ def animation_svg(runs: Sequence[Run]) -> str:
             ticks = [[_tick(run, k, edge) for k in frames] for edge in range(run.twists.shape[1])]
             lines += [(tick, RODS[0], 1.6) for tick in ticks]
         moving = [_polyline(drawn[0], colour, _moves(drawn, seconds), width=wide) for drawn, colour, wide in lines]
-        left = GAP + across * (BIG * PANEL + GAP)
+        left = GAP + across * (_BIG * PANEL + GAP)
         panels.append(tag("g", *_title(run), transform=f"translate({number(left)} 0)"))
-        at = f"translate({number(left)} {number(HEAD)}) scale({BIG})"
+        at = f"translate({number(left)} {number(HEAD)}) scale({_BIG})"
         panels.append(tag("g", *_scene(run), *moving, transform=at))
     return document((0, 0, width, height), _paper(width, height), *panels)
 
 
-def lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
+def _lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
     """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows.
 
-    Parameters
-    ----------
-    until : end of the time axis [s].
+    Args:
+        until: end of the time axis [s].
     """
     shown = [run for run in runs if run.step is not None and run.follows]
-    looks = dict(zip(dict.fromkeys(run.name for run in shown), LOOKS, strict=False))
+    looks = dict(zip(dict.fromkeys(run.name for run in shown), _LOOKS, strict=False))
     lags = np.concatenate([np.degrees(run.lag[run.times <= until]) for run in shown])
     low, high = float(lags.min()), 1.08 * float(lags.max())
     demonstrations = list(dict.fromkeys(run.demonstration for run in shown))
-    width, height = CHART_EDGE + len(demonstrations) * (LAG_CHART[0] + CHART_EDGE), LAG_CHART[1] + HEAD + 66
+    width, height = CHART_EDGE + len(demonstrations) * (_LAG_CHART[0] + CHART_EDGE), _LAG_CHART[1] + HEAD + 66
     parts = [_paper(width, height)]
     for across, demonstration in enumerate(demonstrations):
         same = [run for run in shown if run.demonstration == demonstration]
-        left = CHART_EDGE + across * (LAG_CHART[0] + CHART_EDGE)
+        left = CHART_EDGE + across * (_LAG_CHART[0] + CHART_EDGE)
         chart = _chart(same, looks, until, low, high)
         title = label(TITLES[demonstration], 0, 20 - HEAD, TEXT + 1, fill=INK)
         parts.append(tag("g", title, *chart, transform=f"translate({number(left)} {number(HEAD)})"))
@@ -369,7 +364,7 @@ def lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
 
 def _chart(runs: Sequence[Run], looks: dict[str, tuple[str, str]], until: float, low: float, high: float) -> list[str]:
     """Lag [degrees] against time [s]; the chart's corner is at (0, 0)."""
-    wide, tall = LAG_CHART
+    wide, tall = _LAG_CHART
 
     def height_of(value: float) -> float:
         return tall * (high - value) / (high - low)
@@ -377,7 +372,7 @@ def _chart(runs: Sequence[Run], looks: dict[str, tuple[str, str]], until: float,
     parts = [label("lag of rod 2, degrees", 0, 37 - HEAD, TEXT, fill=SOFT)]
     for tick in nice_ticks(low, high, 5):
         y, shown = height_of(tick), number(tick, 3).replace("-", "\N{MINUS SIGN}")
-        parts.append(tag("line", x1=0, y1=y, x2=wide, y2=y, stroke=FAINT, stroke_width=0.8))
+        parts.append(tag("line", x1=0, y1=y, x2=wide, y2=y, stroke=_FAINT, stroke_width=0.8))
         parts.append(label(shown, -6, y + 4, TEXT, fill=SOFT, text_anchor="end"))
     for tick in nice_ticks(0, until, 4):
         x = wide * tick / until
@@ -424,9 +419,9 @@ def _circle(run: Run) -> Floats:
 
 def _scene(run: Run) -> list[str]:
     """What does not move: the initial rods, and the circle of their ends."""
-    still = [_polyline(_projected(_circle(run)), FAINT, width=1.0)]
+    still = [_polyline(_projected(_circle(run)), _FAINT, width=1.0)]
     moving = (0, 1) if run.demonstration == "bending" else (1,)
-    return still + [_polyline(_projected(run.nodes[0, rod]), FAINT, width=3.0) for rod in moving]
+    return still + [_polyline(_projected(run.nodes[0, rod]), _FAINT, width=3.0) for rod in moving]
 
 
 def _tick(run: Run, k: int, edge: int) -> Floats:

@@ -28,18 +28,18 @@ from rodshell.solve.problem import NO_CURVATURE
 FALLING = 2.0  # [s]
 STEPS = {"explicit": (0.01, 0.005, 0.0025), "shared": (0.1, 0.01), "implicit": (0.01,)}  # [s]
 USUAL_STEP = 0.01  # [s]; explicit ties of C1 = 1e6 EI are stable up to 10.8 ms at 15 mm edges
-SIZE_STEP = 0.005  # [s] of the falls of all sizes: explicit ties are stable up to 5.5 ms at 4 mm edges
+_SIZE_STEP = 0.005  # [s] of the falls of all sizes: explicit ties are stable up to 5.5 ms at 4 mm edges
 SIZES = ((2.0, 1.0), (2.0, 0.5), (1.0, 1.0), (1.0, 0.5), (1.0, 0.25), (1.0, 2 / 15))
 """Spacings over the paper's, and edges a spacing: from 1,000 to 31,000 unknowns. The fourth is the usual mesh."""
-STATED = {"hemisphere": 50.0, "paraboloid": 30.0, "ellipsoid": 20.0}  # [s] at STATED_DOFS [HQK 3.3]
-STATED_DOFS = 8000
+STATED = {"hemisphere": 50.0, "paraboloid": 30.0, "ellipsoid": 20.0}  # [s] at _STATED_DOFS [HQK 3.3]
+_STATED_DOFS = 8000
 C1 = 1e6 * ROD.bend_stiffness  # the paper's number, taken as N/m
 REPEATS = 4  # of our own drape, and of all that a fall costs but its steps; the least time counts
 COLUMNS = (
     "target", "method", "step [ms]", "edge [mm]", "unknowns", "time [s]", "steps", "factorisations",
     "each, in bare solves by LAPACK", "by our band", "a step, in bare solves by LAPACK",
 )  # fmt: skip
-SIGNS = {
+_SIGNS = {
     "explicit": "\N{BLACK CIRCLE}",
     "shared": "\N{WHITE CIRCLE}",
     "implicit": "\N{WHITE SQUARE}",
@@ -52,15 +52,15 @@ SIGNS = {
 class Timing:
     """One run.
 
-    Parameters
-    ----------
-    method : "explicit", "implicit", "shared" in time, or "ours".
-    step : time step [s], 0 for ours.
-    edge : length of the edges [m].
-    seconds : processor time of the drape, for ours with trim and map back.
-    steps : taken; those refused and repeated in halves count among the factorisations.
-    in_lapack, in_own : time of the steps per factorisation, in bare solves by LAPACK and by our band; 0 without a band.
-    step_in_lapack : time of a step with all its iterations and corrections for contact, in bare solves by LAPACK.
+    Args:
+        method: "explicit", "implicit", "shared" in time, or "ours".
+        step: time step [s], 0 for ours.
+        edge: length of the edges [m].
+        seconds: processor time of the drape, for ours with trim and map back.
+        steps: taken; those refused and repeated in halves count among the factorisations.
+        in_lapack, in_own: time of the steps per factorisation, in bare solves by LAPACK and by our band; 0 without a
+            band.
+        step_in_lapack: time of a step with all its iterations and corrections for contact, in bare solves by LAPACK.
     """
 
     target: str
@@ -133,16 +133,15 @@ class Fig8(Figure):
 
     def pictures(self) -> dict[str, str]:
         """Both charts."""
-        return {"fig8": times_svg(self.timings)}
+        return {"fig8": _times_svg(self.timings)}
 
 
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float = FALLING) -> Fig8:
     """Time everything, falls of `falling` seconds; the first run of each kind, which compiles, does not count.
 
-    Parameters
-    ----------
-    progress : is called at each time step.
-    falling : simulated time of each fall [s].
+    Args:
+        progress: is called at each time step.
+        falling: simulated time of each fall [s].
     """
     couplings: tuple[Coupling, ...] = (ExplicitPenalty(C1=C1), SharedDofs(), ImplicitPenalty())
     for coupling in couplings:
@@ -150,11 +149,11 @@ def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float 
     timings = list[Timing]()
     for case in cases:
         for coupling in couplings:
-            timings += [timed_fall(case, coupling, step, falling, progress) for step in STEPS[coupling.name]]
+            timings += [_timed_fall(case, coupling, step, falling, progress) for step in STEPS[coupling.name]]
         for size in sizes_of(case):
             if size.edge != case.edge:
-                timings.append(timed_fall(size, couplings[0], SIZE_STEP, falling, progress, counted=False))
-            timings.append(timed_ours(size))
+                timings.append(_timed_fall(size, couplings[0], _SIZE_STEP, falling, progress, counted=False))
+            timings.append(_timed_ours(size))
     return Fig8(tuple(timings))
 
 
@@ -175,7 +174,7 @@ def _slope(x: Sequence[float], y: Sequence[float]) -> float:
 
 def of_sizes(timings: Sequence[Timing], method: str) -> list[Timing]:
     """The runs of a method at all sizes."""
-    return [run for run in timings if run.method == method and run.step in (0.0, SIZE_STEP)]
+    return [run for run in timings if run.method == method and run.step in (0.0, _SIZE_STEP)]
 
 
 def _by_target(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
@@ -183,17 +182,16 @@ def _by_target(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
     return {name: [timing for timing in timings if timing.target == name] for name in names}
 
 
-def timed_fall(
+def _timed_fall(
     case: Case, coupling: Coupling, step: float, falling: float, progress: Progress, *, counted: bool = True
 ) -> Timing:
     """A fall in the paper's scheme, of `falling` seconds with the time step `step` [s]; without its bare solves.
 
-    Parameters
-    ----------
-    step : time step [s].
-    falling : simulated time [s].
-    progress : is called at each time step.
-    counted : whether explicit ties are counted in bare solves.
+    Args:
+        step: time step [s].
+        falling: simulated time [s].
+        progress: is called at each time step.
+        counted: whether explicit ties are counted in bare solves.
     """
     bare = BareSolves(case, coupling, step) if counted and isinstance(coupling, ExplicitPenalty) else None
 
@@ -223,7 +221,7 @@ def _fall(case: Case, coupling: Coupling, step: float, falling: float, progress:
     return drape(case.layout, ROD, case.target, method=fall, progress=progress)
 
 
-def timed_ours(case: Case) -> Timing:
+def _timed_ours(case: Case) -> Timing:
     """Our drape, trim and map back."""
 
     def form() -> Draped:
@@ -253,14 +251,12 @@ class BareSolves:
     solves once; it starts from the band, nothing is summed. It is done by LAPACK (`scipy.linalg.solveh_banded`, all
     rods in one call, which is faster than a call for each) and by our `solve.banded`, on one thread.
 
-    Parameters
-    ----------
-    case, coupling : the grid and its ties.
-    step : time step [s] of the matrix.
+    Args:
+        case, coupling: the grid and its ties.
+        step: time step [s] of the matrix.
 
-    Attributes
-    ----------
-    spent : processor time of all of them [s].
+    Attributes:
+        spent: processor time of all of them [s].
     """
 
     def __init__(self, case: Case, coupling: ExplicitPenalty, step: float) -> None:
@@ -306,14 +302,14 @@ class BareSolves:
         return process_time() - begun
 
 
-def times_svg(timings: Sequence[Timing]) -> str:
+def _times_svg(timings: Sequence[Timing]) -> str:
     """Both charts, and what the signs mean."""
     edge = next(timing.edge for timing in timings if timing.in_lapack)  # the usual mesh
     by_step = [timing for timing in timings if timing.step and timing.edge == edge]
     by_size = [*of_sizes(timings, "explicit"), *of_sizes(timings, "ours")]
     names = dict.fromkeys(timing.target for timing in timings)
     stated = [
-        Series([STATED_DOFS], [STATED[name]], TARGET_COLOURS[name], SIGNS["the paper's own"])
+        Series([_STATED_DOFS], [STATED[name]], TARGET_COLOURS[name], _SIGNS["the paper's own"])
         for name in names
         if name in STATED
     ]
@@ -323,7 +319,7 @@ def times_svg(timings: Sequence[Timing]) -> str:
         Chart([*_series(by_size, lambda timing: float(timing.dofs)), *stated], "(b)  unknowns", "time [s]"),
     )
     methods = {*(timing.method for timing in timings), "the paper's own"}
-    return charts_svg(charts, "   ".join(f"{sign} {method}" for method, sign in SIGNS.items() if method in methods))
+    return charts_svg(charts, "   ".join(f"{sign} {method}" for method, sign in _SIGNS.items() if method in methods))
 
 
 def _series(timings: Sequence[Timing], across: Callable[[Timing], float]) -> list[Series]:
@@ -333,5 +329,5 @@ def _series(timings: Sequence[Timing], across: Callable[[Timing], float]) -> lis
         same = [timing for timing in timings if (timing.target, timing.method) == (target, method)]
         points = sorted((across(timing), timing.seconds) for timing in same)
         x, y = zip(*points, strict=True)
-        result.append(Series(x, y, TARGET_COLOURS.get(target, INK), SIGNS[method], lined=True))
+        result.append(Series(x, y, TARGET_COLOURS.get(target, INK), _SIGNS[method], lined=True))
     return result

@@ -31,11 +31,10 @@ EDGE = 0.015  # [m]; the paper's "8000 DOFs" are this mesh, its stated 5 mm have
 class Case:
     """A target and a grid.
 
-    Parameters
-    ----------
-    label : its letter in the paper's figure.
-    rods : number of rods of the two families.
-    spacing, edge : of the rods, and length of their edges [m].
+    Args:
+        label: its letter in the paper's figure.
+        rods: number of rods of the two families.
+        spacing, edge: of the rods, and length of their edges [m].
     """
 
     label: str
@@ -64,7 +63,7 @@ WIDE_CASES = (
 """Of Fig 7."""
 
 
-PAPER, INK, SOFT, BODY = "#fdfdfb", "#22282f", "#7b838a", "#e2dccd"
+PAPER, INK, SOFT, _BODY = "#fdfdfb", "#22282f", "#7b838a", "#e2dccd"
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a"}
 FLAT, FINAL = "#2f8f4e", "#8a3fa0"  # G0, G
 PANEL, GAP, HEAD, TEXT = 230.0, 16.0, 40.0, 12.0  # drawing units
@@ -75,9 +74,8 @@ FAR = 0.22  # opacity of what lies behind
 def rows_of_panels(rows: list[tuple[str, list[tuple[str, list[str]]]]]) -> str:
     """A drawing of rows of panels.
 
-    Parameters
-    ----------
-    rows : each a title and panels, each panel a caption and its marks.
+    Args:
+        rows: each a title and panels, each panel a caption and its marks.
     """
     across = max(len(panels) for _, panels in rows)
     width, height = across * PANEL + (across + 1) * GAP, len(rows) * (PANEL + HEAD) + GAP
@@ -108,7 +106,7 @@ def from_above(points: Floats) -> Floats:
     return points[:, :2] * [1.0, -1.0]
 
 
-def from_aside(points: Floats) -> Floats:
+def _from_aside(points: Floats) -> Floats:
     """(n, 2) of points (n, 3) in the axonometric view, y down."""
     return np.column_stack([points @ RIGHT, -(points @ UP)])
 
@@ -116,28 +114,26 @@ def from_aside(points: Floats) -> Floats:
 def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool = True) -> list[str]:
     """A grid on or above its target in the axonometric view.
 
-    Parameters
-    ----------
-    target : drawn as a filled body.
-    positions : (n, 3) of its nodes [m].
-    hides : draw the rods on the body's far side pale.
+    Args:
+        target: drawn as a filled body.
+        positions: (n, 3) of its nodes [m].
+        hides: draw the rods on the body's far side pale.
     """
     body = _body(target)
-    to_panel = PanelScale(from_aside(np.vstack([body, positions])))
+    to_panel = PanelScale(_from_aside(np.vstack([body, positions])))
     near = np.ones(len(positions), dtype=bool)
     if hides:
         near = target.contact(positions).normal @ TOWARDS >= 0
-    filled = tag("polygon", points=joined(_hull(to_panel(from_aside(body)))), fill=BODY, stroke="none")
-    return [filled, *rod_lines(mesh, to_panel(from_aside(positions)), near)]
+    filled = tag("polygon", points=joined(_hull(to_panel(_from_aside(body)))), fill=_BODY, stroke="none")
+    return [filled, *rod_lines(mesh, to_panel(_from_aside(positions)), near)]
 
 
 def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attributes: Any) -> Iterator[str]:
     """Every rod by its nodes' points `at` (n, 2); pale where a node of an edge is not `near` (n,).
 
-    Parameters
-    ----------
-    at : (n, 2) points of its nodes in the drawing.
-    near : (n,) bool, nodes in front; None: all.
+    Args:
+        at: (n, 2) points of its nodes in the drawing.
+        near: (n,) bool, nodes in front; None: all.
     """
     for k, rod in enumerate(mesh.grid.rods):
         nodes = mesh.nodes_of(k)
@@ -154,10 +150,9 @@ def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attribute
 def dots(at: Floats, colour: str, radius: float = 2.2) -> Iterator[str]:
     """Dots at the points `at` (n, 2).
 
-    Parameters
-    ----------
-    at : (n, 2) points in the drawing.
-    radius : [drawing units].
+    Args:
+        at: (n, 2) points in the drawing.
+        radius: [drawing units].
     """
     for x, y in at.tolist():
         yield tag("circle", cx=x, cy=y, r=radius, fill=colour)
@@ -166,9 +161,8 @@ def dots(at: Floats, colour: str, radius: float = 2.2) -> Iterator[str]:
 def closed(at: Floats, colour: str, **attributes: Any) -> str:
     """A closed curve through the points `at` (n, 2), in the order of their angle about their middle.
 
-    Parameters
-    ----------
-    at : (n, 2) points in the drawing.
+    Args:
+        at: (n, 2) points in the drawing.
     """
     apart = at - at.mean(axis=0)
     order = np.argsort(np.arctan2(apart[:, 1], apart[:, 0]))
@@ -202,7 +196,7 @@ def _hull(points: Floats) -> Floats:
 
 # Logarithmic charts
 
-CHART, CHART_EDGE, CHART_GAP, CHART_TEXT = (360.0, 260.0), 56.0, 40.0, 11.0  # drawing units
+_CHART, CHART_EDGE, _CHART_GAP, _CHART_TEXT = (360.0, 260.0), 56.0, 40.0, 11.0  # drawing units
 MARGIN = 0.06  # of a chart's logarithmic span, at each end
 LEGENDS = 3  # in a row
 LINE = "#e2e4e5"
@@ -232,24 +226,24 @@ class Chart:
 def charts_svg(charts: Sequence[Chart], words: str = "") -> str:
     """Logarithmic charts side by side, with `words` below all of them."""
     lines = max(-(-len(chart.legend) // LEGENDS) for chart in charts)
-    wide, tall = CHART
-    width, height = len(charts) * (wide + CHART_EDGE) + CHART_GAP, tall + 90 + 15 * lines + (22 if words else 0)
+    wide, tall = _CHART
+    width, height = len(charts) * (wide + CHART_EDGE) + _CHART_GAP, tall + 90 + 15 * lines + (22 if words else 0)
     parts = [tag("rect", x=0, y=0, width=width, height=height, fill=PAPER)]
     for across, chart in enumerate(charts):
         left = CHART_EDGE + across * (wide + CHART_EDGE)
         parts.append(tag("g", *_marks(chart), transform=f"translate({number(left)} 24)"))
-    parts.append(label(words, CHART_EDGE, height - 14, CHART_TEXT, fill=INK))
+    parts.append(label(words, CHART_EDGE, height - 14, _CHART_TEXT, fill=INK))
     return document((0, 0, width, height), *parts)
 
 
 def _marks(chart: Chart) -> list[str]:
-    wide, tall = CHART
+    wide, tall = _CHART
     x, y = (np.concatenate([getattr(series, name) for series in chart.series]) for name in "xy")
     at_x, at_y = _scale(x, wide), _scale(y, tall)
     parts = [
         tag("rect", x=0, y=0, width=wide, height=tall, fill="none", stroke=SOFT, stroke_width=0.8),
-        label(chart.across, wide / 2, tall + 34, CHART_TEXT, fill=INK, text_anchor="middle"),
-        label(chart.up, 0, -8, CHART_TEXT, fill=INK),
+        label(chart.across, wide / 2, tall + 34, _CHART_TEXT, fill=INK, text_anchor="middle"),
+        label(chart.up, 0, -8, _CHART_TEXT, fill=INK),
     ]
     for value in _ticks(x):
         at = float(at_x(value))
@@ -267,7 +261,7 @@ def _marks(chart: Chart) -> list[str]:
             parts.append(label(series.sign, px, py + 4, 13.0, fill=series.colour, text_anchor="middle"))
     for k, (text, colour) in enumerate(chart.legend):
         left, down = k % LEGENDS * wide / LEGENDS, tall + 56 + 15 * (k // LEGENDS)
-        parts.append(label(text, left, down, CHART_TEXT, fill=colour))
+        parts.append(label(text, left, down, _CHART_TEXT, fill=colour))
     return parts
 
 
@@ -294,10 +288,9 @@ VERSION = 1  # of the keys of a figure's result.json
 class Figure(ABC):
     """A figure or a study of the paper, computed.
 
-    Attributes
-    ----------
-    name : such as "fig6".
-    columns : heads of the table's columns.
+    Attributes:
+        name: such as "fig6".
+        columns: heads of the table's columns.
     """
 
     name: str
@@ -338,7 +331,7 @@ class Figure(ABC):
 
     def summary(self) -> str:
         """The table as text."""
-        parts = (self.heading(), aligned(self.columns, self.rows()), self.footing())
+        parts = (self.heading(), _aligned(self.columns, self.rows()), self.footing())
         return "\n\n".join(part for part in parts if part)
 
     def result(self) -> dict[str, Any]:
@@ -349,9 +342,8 @@ class Figure(ABC):
     def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
         """Write the figure's files to `folder`.
 
-        Raises
-        ------
-        OutputError : it cannot be written, or files that rodshell did not write would have to be replaced.
+        Raises:
+            OutputError: it cannot be written, or files that rodshell did not write would have to be replaced.
         """
         tables = {"table": [self.columns, *self.rows()], **self.tables()}
         files = {"result.json": json.dumps(self.result(), indent=1) + "\n", "table.txt": self.summary() + "\n"}
@@ -363,7 +355,7 @@ class Figure(ABC):
             place.commit()
 
 
-def aligned(columns: Row, rows: Sequence[Row]) -> str:
+def _aligned(columns: Row, rows: Sequence[Row]) -> str:
     """A table as text, with its `columns` aligned."""
     table = [columns, *rows]
     widths = [max(len(row[k]) for row in table) for k in range(len(columns))]

@@ -15,11 +15,12 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
+from rodshell.formfinding import Agreement, Stages, agreement, find_stages
 from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
 from rodshell.paper.genetic_records import History, stored
 from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
 from rodshell.progress import Progress, silent
+from rodshell.rods.supports import PINNED
 
 SEED = 1
 SEARCHES = Path("out") / "genetic-searches"
@@ -35,10 +36,9 @@ COLUMNS = (
 class Sought:
     """What one search found.
 
-    Parameters
-    ----------
-    best : agreement of its best footprint, popped up again; None if that is not stable.
-    apart : (2m,) distance of its rod ends from those of the direct method's G0 [m].
+    Args:
+        best: agreement of its best footprint, popped up again; None if that is not stable.
+        apart: (2m,) distance of its rod ends from those of the direct method's G0 [m].
     """
 
     history: History
@@ -176,18 +176,16 @@ def make(
 ) -> Genetic:
     """Compare both methods, with the searches that come with the package, or with new ones.
 
-    Parameters
-    ----------
-    seed : of searches that are run, or continued, now; None: those of the package.
-    jobs : number of processes of new searches.
-    generations : largest number of generations of new searches.
-    target : name of the only target; None: all.
-    folder : of the values of new searches.
+    Args:
+        seed: of searches that are run, or continued, now; None: those of the package.
+        jobs: number of processes of new searches.
+        generations: largest number of generations of new searches.
+        target: name of the only target; None: all.
+        folder: of the values of new searches.
 
-    Raises
-    ------
-    InputError : jobs or generations without a seed; an unknown target; pymoo is needed and not installed; a file of
-        values is broken or of a different search.
+    Raises:
+        InputError: jobs or generations without a seed; an unknown target; pymoo is needed and not installed; a file of
+            values is broken or of a different search.
     """
     if seed is None and (jobs is not None or generations is not None):
         raise InputError("jobs and generations belong to a new search: give its seed, too")
@@ -214,9 +212,8 @@ def find(
 ) -> History:  # fmt: skip
     """A whole search (see `search`), whose values are written to `folder`.
 
-    Parameters
-    ----------
-    seed, jobs, population, most, progress : see `search`.
+    Args:
+        seed, jobs, population, most, progress: see `search`.
     """
     times = []
     for _ in range(REPEATS):
@@ -242,7 +239,7 @@ def compare(case: Case, histories: Sequence[History]) -> Comparison:
         return Sought(history, best, np.linalg.norm(history.footprint - direct.footprint.points, axis=1))
 
     ordered = sorted(histories, key=lambda history: history.best)
-    return Comparison(case, direct.agreement["pinned"], tuple(again(history) for history in ordered))
+    return Comparison(case, direct.agreement[PINNED.name], tuple(again(history) for history in ordered))
 
 
 def convergence_svg(comparisons: Sequence[Comparison]) -> str:
@@ -261,8 +258,8 @@ def convergence_svg(comparisons: Sequence[Comparison]) -> str:
     return charts_svg([chart], "\N{WHITE DIAMOND} the direct method, one run")
 
 
-def _direct(case: Case) -> PatchForm:
-    return find_stages(case.target, case.layout, ROD, ends=("pinned",))
+def _direct(case: Case) -> Stages:
+    return find_stages(case.target, case.layout, ROD, ends=PINNED)
 
 
 def _shape(gap: Agreement | None) -> tuple[str, str]:

@@ -30,12 +30,11 @@ GAIN, WINDOW = 0.01, 20  # converged: the best gains less than this share in so 
 class Generation:
     """One generation of a search.
 
-    Parameters
-    ----------
-    best : objective of the best individual so far [m].
-    mean : mean objective of the survivors [m].
-    fallen : those of them that were not stable.
-    seconds : processor time of this generation's pop-ups [s].
+    Args:
+        best: objective of the best individual so far [m].
+        mean: mean objective of the survivors [m].
+        fallen: those of them that were not stable.
+        seconds: processor time of this generation's pop-ups [s].
     """
 
     best: float
@@ -52,11 +51,10 @@ class Generation:
 class History:
     """A whole search.
 
-    Parameters
-    ----------
-    variables : (n,) of the best footprint [m].
-    footprint : (2m, 2) its rod ends, start and end of each rod in turn [m].
-    direct_seconds : processor time of the direct method on the same machine [s].
+    Args:
+        variables: (n,) of the best footprint [m].
+        footprint: (2m, 2) its rod ends, start and end of each rod in turn [m].
+        direct_seconds: processor time of the direct method on the same machine [s].
     """
 
     target: str
@@ -145,11 +143,10 @@ class StoredValues:
     The algorithm depends only on its seed and on these values, which therefore restore it exactly; digests of the
     individuals show whether it is the same search.
 
-    Parameters
-    ----------
-    digests : of the individuals of each generation.
-    values : of the individuals of each generation.
-    seconds : processor time of each generation [s].
+    Args:
+        digests: of the individuals of each generation.
+        values: of the individuals of each generation.
+        seconds: processor time of each generation [s].
     """
 
     file: Path
@@ -161,9 +158,8 @@ class StoredValues:
     def read(file: Path) -> "StoredValues":
         """The content of the `file`; empty if there is no file yet.
 
-        Raises
-        ------
-        InputError : it cannot be read, or does not hold the values of a search.
+        Raises:
+            InputError: it cannot be read, or does not hold the values of a search.
         """
         if not file.exists():
             return StoredValues(file)
@@ -182,9 +178,8 @@ class StoredValues:
     def write(self) -> None:
         """Replace the file in one step.
 
-        Raises
-        ------
-        OutputError : it cannot be written.
+        Raises:
+            OutputError: it cannot be written.
         """
         content = {
             "format": FORMAT, "version": VERSION,
@@ -206,15 +201,13 @@ class StoredValues:
 
         If this is interrupted, the values that were found are in the file.
 
-        Parameters
-        ----------
-        individuals : (k, n) variables.
-        evaluate : yields the values of some of them.
-        report : is called with the number of values after each.
+        Args:
+            individuals: (k, n) variables.
+            evaluate: yields the values of some of them.
+            report: is called with the number of values after each.
 
-        Raises
-        ------
-        InputError : the individuals in the file were others.
+        Raises:
+            InputError: the individuals in the file were others.
         """
         self._open(generation, individuals)
         values = self.values[generation]

@@ -17,15 +17,17 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.formfinding import PatchForm, agreement, pop_up
+from rodshell.formfinding import Stages, agreement, pop_up
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
 from rodshell.layout.flatgrid import Family
+from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.layout.mesh import CROWDED
 from rodshell.paper.figure import ROD
 from rodshell.paper.genetic_records import GAIN, Evaluate, Generation, Judged, StoredValues, gain
 from rodshell.progress import Progress
+from rodshell.rods.supports import PINNED
 from rodshell.sweeps.asktell import AskTell
 from rodshell.targets import Target
 
@@ -37,7 +39,6 @@ MOST = 300  # generations
 NEVER_REACHED = (
     10**6
 )  # factorisations: patience ends first, and what Newton's method loses is not followed in short steps
-DIFFERENCE, CROSSED = 0.6, 0.9  # smaller steps or populations converge to a worse minimum
 ROUGHNESS = 0.04  # of the first footprints; rougher ones are stable more rarely, and after many more iterations
 
 
@@ -48,15 +49,14 @@ class Design:
     G is given, from the direct result, and the rod ends are pinned on it. The unknown is G0, one coordinate for each
     rod end along its rod. Nothing else of the direct result enters: neither its G0 nor its draped shape.
 
-    Parameters
-    ----------
-    lines : the flat grid's rods, whose lines count, not their ends.
-    boundary : G, without a draped state.
-    orbit : (2m,) index of the variable of each rod end, start and end of each rod in turn: the same for all ends that
-        the symmetry of target and grid takes into each other.
-    lower, upper : (n,) bounds of the variables, which are distances along the rod from its middle [m]: from a rod
-        that is straight in plan to the longest convex arch over its chord that is no higher than the target there,
-        since a convex curve is no longer than its chord and twice its height.
+    Args:
+        lines: the flat grid's rods, whose lines count, not their ends.
+        boundary: G, without a draped state.
+        orbit: (2m,) index of the variable of each rod end, start and end of each rod in turn: the same for all ends
+            that the symmetry of target and grid takes into each other.
+        lower, upper: (n,) bounds of the variables, which are distances along the rod from its middle [m]: from a rod
+            that is straight in plan to the longest convex arch over its chord that is no higher than the target there,
+            since a convex curve is no longer than its chord and twice its height.
     """
 
     target: Target
@@ -68,7 +68,7 @@ class Design:
     upper: Floats
 
     @staticmethod
-    def of(direct: PatchForm) -> "Design":
+    def of(direct: Stages) -> "Design":
         """The design with the target, the grid and the boundary of a `direct` result."""
         target, lines, points = direct.target, direct.footprint.rods, direct.trimmed.boundary.points
         orbit = _orbits(target, lines, points)
@@ -77,7 +77,7 @@ class Design:
         # rounded, so that a search does not depend on the last digits of the direct result
         lower, upper = (np.round(np.bincount(orbit, bound) / count, MICRON) for bound in (taut, taut + high))
         boundary = Boundary(points, direct.trimmed.boundary.tangents)
-        return Design(target, direct.layout, lines, boundary, orbit, lower, upper)
+        return Design(target, require_chebyshev(direct.layout, "searches"), lines, boundary, orbit, lower, upper)
 
     def footprint(self, variables: Floats) -> Footprint:
         """The flat grid of `variables` (n,), meshed as by the direct method: a node at every line of the lattice."""
@@ -104,9 +104,8 @@ class Design:
         None if a rod has too few joints, or after `patience` iterations. Always from flat: a shell has other stable
         states than the one that it reaches from there.
 
-        Parameters
-        ----------
-        variables : (n,) distances of the rod ends from the middle of their rods [m].
+        Args:
+            variables: (n,) distances of the rod ends from the middle of their rods [m].
         """
         footprint = self.footprint(variables)
         if footprint.mesh.grid.joint_counts().min() < FEWEST_JOINTS:
@@ -121,7 +120,7 @@ class Design:
 
         try:
             return pop_up(
-                footprint, self.boundary, ROD, ends="pinned", start="flat", most_factorizations=NEVER_REACHED,
+                footprint, self.boundary, ROD, ends=PINNED, start="flat", most_factorizations=NEVER_REACHED,
                 progress=count_iteration,
             )  # fmt: skip
         except _OutOfPatience:
@@ -134,9 +133,8 @@ class Design:
         distance of the target's size: a rod with fewer than three joints, no stable state with the ends on G, or none
         within `PATIENCE` iterations.
 
-        Parameters
-        ----------
-        variables : (n,) distances of the rod ends from the middle of their rods [m].
+        Args:
+            variables: (n,) distances of the rod ends from the middle of their rods [m].
         """
         popped = self.pop_up(variables, patience=PATIENCE)
         if popped is None or not popped.report.stable:
@@ -148,9 +146,8 @@ class Design:
 
         Along each side of each family the share of the bounds is a parabola of Bernstein form with random coefficients.
 
-        Parameters
-        ----------
-        roughness : share of the bounds that is random at every end [-].
+        Args:
+            roughness: share of the bounds that is random at every end [-].
         """
         sides = np.array([[f"{line.family}-", f"{line.family}+"] for line in self.lines]).ravel()
         offsets = np.repeat([line.offset for line in self.lines], 2)
@@ -224,19 +221,17 @@ def search(
     """Search from the random footprints of a seed, or continue, until the best gains less than `GAIN` in `WINDOW`
     generations.
 
-    By differential evolution, see `AskTell.differential_evolution`.
+    By differential evolution, see `AskTell`.
 
-    Parameters
-    ----------
-    file : of all values, written after each generation and when interrupted; the search continues from it.
-    jobs : number of processes; the result does not depend on it.
-    most : generations after which a search that has not converged ends.
-    progress : is called after each value.
+    Args:
+        file: of all values, written after each generation and when interrupted; the search continues from it.
+        jobs: number of processes; the result does not depend on it.
+        most: generations after which a search that has not converged ends.
+        progress: is called after each value.
 
-    Raises
-    ------
-    InputError : pymoo is not installed; the file is broken or of a different search.
-    OutputError : the file cannot be written.
+    Raises:
+        InputError: pymoo is not installed; the file is broken or of a different search.
+        OutputError: the file cannot be written.
     """
     algorithm, stored, generations = _algorithm(design, seed, population), StoredValues.read(file), list[Generation]()
     stage = f"{design.target.name}, generation 1"
@@ -273,9 +268,7 @@ def _algorithm(design: Design, seed: int, population: int) -> AskTell:
     """Ready to be asked."""
     first = design.random(np.random.default_rng(seed), population, ROUGHNESS)
     try:
-        return AskTell.differential_evolution(
-            design.lower, design.upper, first, seed=seed, difference=DIFFERENCE, crossed=CROSSED
-        )
+        return AskTell(design.lower, design.upper, first, seed=seed)
     except ImportError as error:
         raise InputError('the genetic algorithm needs the package pymoo: pip install "rodshell[paper]"') from error
 

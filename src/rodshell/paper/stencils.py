@@ -11,18 +11,17 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.joints import Coupling, ImplicitPenalty, Linker, SharedDofs
-from rodshell.joints.crossings import LinkerBend
-from rodshell.joints.ties import Ties
 from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell
 from rodshell.model.elastic_rod import ElasticRod
 from rodshell.output.svg import label, tag
 from rodshell.paper.figure import FAMILY, FINAL, FLAT, INK, PANEL, ROD, SOFT, Figure, joined, rows_of_panels
 from rodshell.progress import Progress
+from rodshell.rods.elements import is_bends
 from rodshell.targets import Hemisphere
 
 EDGE, NODES = 5e-3, 5
-RADIUS, DEPTH, HANGING = 0.2, 0.02, 0.04  # [m] of the section in contact; deep, to be seen
+RADIUS, DEPTH = 0.2, 0.02  # [m] of the section in contact; deep, to be seen
 COLUMNS = ("figure", "what", "unknowns", "bend stencils", "ties of nodes", "of angles")
 Drawn = dict[int, Floats]  # of blocks, in a panel
 
@@ -82,9 +81,7 @@ def _shell(coupling: Coupling) -> Shell:
 def _counts(shell: Shell) -> tuple[str, ...]:
     bends = sum(len(element.blocks) for element in shell.elements if element.blocks.shape[1] == NODES)
     nodes = shell.like < shell.mesh.node_count
-    of_nodes = [
-        bool(nodes[tie[0]]) for element in shell.elements if isinstance(element, Ties) for tie in element.blocks
-    ]
+    of_nodes = [bool(nodes[tie[0]]) for element in shell.between for tie in element.blocks]
     return str(shell.freedom().size), str(bends), str(sum(of_nodes)), str(len(of_nodes) - sum(of_nodes))
 
 
@@ -102,7 +99,7 @@ def _rod(rod: ElasticRod) -> Iterator[str]:
 
 def _element(shell: Shell) -> Iterator[str]:
     """Two rods and two linkers, each on its own blocks; those that are tied are joined by dashed lines."""
-    linkers = next(element for element in shell.elements if isinstance(element, LinkerBend)).blocks
+    linkers = next(element for element in shell.within if not is_bends(element)).blocks
     apart = _apart(shell)
     drawn = _drawn(shell, linkers)
     for number, blocks in enumerate(linkers.tolist()):
@@ -116,10 +113,9 @@ def _element(shell: Shell) -> Iterator[str]:
             yield from _mark(
                 drawn[block], f"x{rod + 1},{k + 1}" if apart or k != 2 else "joint" if rod else "", FAMILY[family]
             )
-    for element in shell.elements:
-        if isinstance(element, Ties):
-            for a, b in element.blocks.tolist():
-                yield _line(np.array([drawn[a], drawn[b]]), SOFT, 0.9, stroke_dasharray="3 2")
+    for element in shell.between:
+        for a, b in element.blocks.tolist():
+            yield _line(np.array([drawn[a], drawn[b]]), SOFT, 0.9, stroke_dasharray="3 2")
 
 
 def _apart(shell: Shell) -> bool:

@@ -19,6 +19,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Draped, Fall, Gravity, drape, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
+from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.nets import chebyshev_net
 from rodshell.paper.figure import EDGE, HEIGHT, LENGTH, ROD, Chart, Figure, Series, charts_svg
 from rodshell.progress import Progress
@@ -37,12 +38,12 @@ COLUMNS = (
     "changed", "to", "times the base", "on", "G0 change, rms [mm]", "max [mm]", "G0 off the net, rms [mm]",
     "largest strain", "how it rests",
 )  # fmt: skip
-FULL, RING, BOX = "\N{BLACK CIRCLE}", "\N{LARGE CIRCLE}", "\N{WHITE SQUARE}"
+FULL, _RING, BOX = "\N{BLACK CIRCLE}", "\N{LARGE CIRCLE}", "\N{WHITE SQUARE}"
 PARAMETERS = {
     "E": ("#1f5f8b", FULL), "r": ("#a8552a", FULL), "g": ("#2f8f4e", FULL), "H": ("#8a3fa0", FULL),
-    "EA alone": ("#22282f", RING), "EI alone": ("#b8862a", BOX),
+    "EA alone": ("#22282f", _RING), "EI alone": ("#b8862a", BOX),
 }  # fmt: skip
-PENALTIES = {
+_PENALTIES = {
     "C1 explicit": ("#1f5f8b", FULL), "C1 implicit": ("#a8552a", BOX), "C2, 2 linkers": ("#2f8f4e", FULL),
     "C2, 4 linkers": ("#8a3fa0", FULL),
 }  # fmt: skip
@@ -53,14 +54,13 @@ LEAST = 1e-5  # [mm]: smaller changes are not drawn
 class Line:
     """One run.
 
-    Parameters
-    ----------
-    value : its value, with its unit.
-    factor : its value over that of the base case.
-    change_rms, change_max : change of G0's rod ends against the base case [m]; NaN without a G0.
-    off_net : rms distance of G0's rod ends from those of the exact net [m]; NaN without a G0.
-    strain : largest axial strain of the draped grid [-].
-    rests : its state of rest, in a word or two.
+    Args:
+        value: its value, with its unit.
+        factor: its value over that of the base case.
+        change_rms, change_max: change of G0's rod ends against the base case [m]; NaN without a G0.
+        off_net: rms distance of G0's rod ends from those of the exact net [m]; NaN without a G0.
+        strain: largest axial strain of the draped grid [-].
+        rests: its state of rest, in a word or two.
     """
 
     changed: str
@@ -106,20 +106,19 @@ class Studies(Figure):
 
     def pictures(self) -> dict[str, str]:
         """Both charts."""
-        return {"studies": studies_svg(self.lines)}
+        return {"studies": _studies_svg(self.lines)}
 
 
 def make(progress: Progress) -> Studies:
     """All runs."""
-    return Studies((*of_statics(progress), *of_height(progress), *of_penalties(progress)))
+    return Studies((*of_statics(progress), *of_height(progress), *_of_penalties(progress)))
 
 
 def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Line]:
     """E, r, g, EA and EI by gravity statics.
 
-    Parameters
-    ----------
-    progress : is called before each drape.
+    Args:
+        progress: is called before each drape.
     """
     base = drape(layout, ROD, TARGET, method=Gravity())
     for changed, (powers, given) in _PARAMETERS.items():
@@ -133,10 +132,9 @@ def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Lin
 def of_height(progress: Progress, *, factors: tuple[float, ...] = HEIGHTS) -> Iterator[Line]:
     """H, by falls.
 
-    Parameters
-    ----------
-    progress : is called before each fall.
-    factors : heights over the paper's [-].
+    Args:
+        progress: is called before each fall.
+        factors: heights over the paper's [-].
     """
     base = _fallen(Fall(drag=DRAG))
     for factor in factors:
@@ -145,7 +143,7 @@ def of_height(progress: Progress, *, factors: tuple[float, ...] = HEIGHTS) -> It
         yield _line("H", f"{1e3 * height:g} mm", factor, base, partial(_fallen, Fall(drag=DRAG, height=height)))
 
 
-def of_penalties(progress: Progress) -> Iterator[Line]:
+def _of_penalties(progress: Progress) -> Iterator[Line]:
     """C1 and C2, by falls."""
     runs: list[tuple[str, str, float, Coupling, Joint | None]] = []
     for power in range(6, 9):
@@ -180,7 +178,8 @@ def _line(changed: str, value: str, factor: float, base: Draped, run: Callable[[
     except InputError:  # no rod has three joints on the target
         nothing = float("nan")
         return Line(changed, value, factor, on, nothing, nothing, nothing, nothing, "does not cover the target")
-    first, net = _ends(base), {rod.name: (rod.start, rod.end) for rod in chebyshev_net(TARGET, draped.layout).rods}
+    layout = require_chebyshev(draped.layout, "studies")
+    first, net = _ends(base), {rod.name: (rod.start, rod.end) for rod in chebyshev_net(TARGET, layout).rods}
     change, report = _apart(ends, first), draped.report
     return Line(
         changed, value, factor, on, _rms(change), float(np.abs(change).max()), _rms(_apart(ends, net)),
@@ -210,7 +209,7 @@ def _stiff(EA: float = 1.0, EI: float = 1.0) -> Rod:
     return Rod(section)
 
 
-def studies_svg(lines: Sequence[Line]) -> str:
+def _studies_svg(lines: Sequence[Line]) -> str:
     """Both charts."""
     across = ("(a)  times the base case", "(b)  C1 over 1e6 EI, C2 over GJ/l")
     return charts_svg(
@@ -221,7 +220,7 @@ def studies_svg(lines: Sequence[Line]) -> str:
                 "change of G0, rms [mm]",
                 [(f"{sign} {name}", colour) for name, (colour, sign) in looks.items()],
             )
-            for looks, title in zip((PARAMETERS, PENALTIES), across, strict=True)
+            for looks, title in zip((PARAMETERS, _PENALTIES), across, strict=True)
         ]
     )
 

@@ -16,14 +16,13 @@ STIFFNESSES = 4  # EA, EI1, EI2, GJ
 class Change:
     """The effect of n variables on e edges and on k held blocks, with its derivatives.
 
-    Parameters
-    ----------
-    stiffness : (e, 4) logarithms of the factors on EA, EI1, EI2 and GJ.
-    stiffness_slopes : (4e, n).
-    lengths : (e,) what is added to the rest lengths [m].
-    length_slopes : (e, n) [m].
-    held : (k, 3) displacement of the rod ends, and of the ghost nodes of clamps after them [m].
-    held_slopes : (n, k, 3) [m].
+    Args:
+        stiffness: (e, 4) logarithms of the factors on EA, EI1, EI2 and GJ.
+        stiffness_slopes: (4e, n).
+        lengths: (e,) what is added to the rest lengths [m].
+        length_slopes: (e, n) [m].
+        held: (k, 3) displacement of the rod ends, and of the ghost nodes of clamps after them [m].
+        held_slopes: (n, k, 3) [m].
     """
 
     stiffness: Floats
@@ -44,11 +43,8 @@ class Change:
 
     @staticmethod
     def together(parts: Sequence["Change"]) -> "Change":
-        """The effect of several sets of variables, one after the other.
-
-        Parameters
-        ----------
-        parts : of each set; factors multiply, lengths and displacements add up.
+        """The effect of several sets of variables, one after the other: factors multiply, lengths and displacements add
+        up.
         """
         return Change(
             sum(part.stiffness for part in parts),  # type: ignore[arg-type]
@@ -60,24 +56,14 @@ class Change:
         )
 
     def table(self, base: Floats) -> Floats:
-        """(e, 5) properties of the edges.
-
-        Parameters
-        ----------
-        base : (e, 5) properties before.
-        """
+        """(e, 5) properties of the edges, by those (e, 5) before."""
         result = base.copy()
         result[:, :LENGTH] *= np.exp(self.stiffness)
         result[:, LENGTH] += self.lengths
         return result
 
     def property_slopes(self, table: Floats) -> csc_array:
-        """(5e, n) derivatives of the logarithms of the properties.
-
-        Parameters
-        ----------
-        table : (e, 5) the properties.
-        """
+        """(5e, n) derivatives of the logarithms of the properties (e, 5)."""
         stiff, long = coo_array(self.stiffness_slopes), coo_array(self.length_slopes)
         rows = np.append(
             PROPERTIES * (stiff.row // STIFFNESSES) + stiff.row % STIFFNESSES, PROPERTIES * long.row + LENGTH

@@ -15,6 +15,9 @@ from rodshell.refining.length_families import FIRST, MOST, usual_span
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
+from rodshell.rods.supports import CLAMPED
+from rodshell.targets import Target
+from rodshell.units import shown
 
 MOST_TURN, FIRST_TURN = radians(15.0), radians(1.0)
 PROBE = 1e-5  # of the target's size: differences of points on it are then exact to 1e-8
@@ -23,13 +26,11 @@ CORRECTIONS = 4  # of a support's place
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Two tangents of angles for each clamp: how much it is tilted out of the surface, and turned within it.
+    """Variables: two tangents of angles for each clamp, by which it is tilted out of the surface and turned within it.
 
-    Parameters
-    ----------
-    axes : (2, 2m, 3) unit vectors across the clamp's direction: out of the surface, and within it.
-    box : of the variables, the tilts and turns of each end in turn [-].
-    image : where an operation maps the variables.
+    Args:
+        axes: (2, 2m, 3) unit vectors across the clamp's direction: out of the surface, and within it.
+        box: (4m,) the tilts and turns of each end in turn [-].
     """
 
     structure: Structure
@@ -43,21 +44,14 @@ class Directions:
     def tangents(self, values: Floats) -> Floats:
         """(2m, 3) directions of the clamps.
 
-        Parameters
-        ----------
-        values : (4m,) of the variables.
+        Args:
+            values: (4m,) of the variables.
         """
         first = self.structure.popped.boundary.tangents
         tilt, turn = values.reshape(-1, 2).T[:, :, None] * self.axes
         return unit(first + tilt + turn)
 
     def change(self, values: Floats) -> Change:
-        """What a design does.
-
-        Parameters
-        ----------
-        values : (4m,) the design [-].
-        """
         structure = self.structure
         first, now = structure.popped.boundary.tangents, self.tangents(values)
         tilt, turn = values.reshape(-1, 2).T[:, :, None] * self.axes
@@ -72,12 +66,6 @@ class Directions:
         return replace(none, held=held, held_slopes=slopes)
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid with these clamps.
-
-        Parameters
-        ----------
-        values : (4m,) the design [-].
-        """
         return replace(grid, boundary=replace(grid.boundary, tangents=self.tangents(values)))
 
 
@@ -90,18 +78,16 @@ class Clamps:
     def on(self, structure: Structure) -> Directions:
         """How much each clamp is tilted and turned.
 
-        Raises
-        ------
-        InputError : its ends are pinned.
+        Raises:
+            InputError: its ends are pinned.
         """
         if not len(structure.popped.shell.ghosts):
-            raise InputError('the directions of clamps can only vary with ends = "clamped"')
+            raise InputError(f"the directions of clamps can only vary with ends = {shown(CLAMPED.name)}")
         boundary = structure.popped.boundary
         normals = structure.target.gap(boundary.points).normal
         within = unit(cross(normals, boundary.tangents))
         axes = np.stack([cross(boundary.tangents, within), within])
-        zero = np.zeros(2 * len(boundary.points))
-        box = Box(zero, zero - np.tan(MOST_TURN), zero + np.tan(MOST_TURN), zero + np.tan(FIRST_TURN))
+        box = Box.about_zero(2 * len(boundary.points), np.tan(MOST_TURN), np.tan(FIRST_TURN))
 
         def image(by: Operation) -> Image:
             index = np.column_stack([2 * by.ends, 2 * by.ends + 1]).ravel()
@@ -112,13 +98,11 @@ class Clamps:
 
 @dataclass(frozen=True, eq=False)
 class Slides:
-    """How far each rod end is moved along the target's end, with its clamp; on the target it stays as near to its end.
+    """Variables: how far each rod end is moved along the target's end, with its clamp; it stays as near to that end.
 
-    Parameters
-    ----------
-    along, inwards : (2m, 3) unit vectors in the surface, along its end and across it.
-    box : of the variables [m].
-    image : where an operation maps the variables.
+    Args:
+        along, inwards: (2m, 3) unit vectors in the surface, along its end and across it.
+        box: (2m,) [m].
     """
 
     structure: Structure
@@ -136,19 +120,12 @@ class Slides:
         Each end goes along a straight line, and from there back to the surface and to its distance from the end. What
         that does to an end that is not moved at all is taken away: so no variable has an effect at zero.
 
-        Parameters
-        ----------
-        values : (2m,) of the variables [m].
+        Args:
+            values: (2m,) of the variables [m].
         """
         return np.asarray(self._placed(values) - self._placed(0.0 * values))
 
     def change(self, values: Floats) -> Change:
-        """What a design does.
-
-        Parameters
-        ----------
-        values : (2m,) the design [m].
-        """
         structure, count = self.structure, len(values)
         held = len(structure.held)
         none = Change.none(len(structure.mesh.edges), held, count)
@@ -162,24 +139,23 @@ class Slides:
         return replace(none, held=moved, held_slopes=slopes)
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid with these supports.
-
-        Parameters
-        ----------
-        values : (2m,) the design [m].
-        """
         return replace(grid, boundary=replace(grid.boundary, points=grid.boundary.points + self.moved(values)))
 
     def _placed(self, values: Floats) -> Floats:
         target, points = self.structure.target, self.structure.popped.boundary.points
         height, margin = target.distance(points), target.margin(points)
-        x, step = points + values[:, None] * self.along, PROBE * target.size
+        x = points + values[:, None] * self.along
         for _ in range(CORRECTIONS):
             gap = target.gap(x)
             x = x - (gap.distance - height)[:, None] * gap.normal
-            steep = (target.margin(x + step * self.inwards) - target.margin(x - step * self.inwards)) / (2.0 * step)
-            x = x + ((margin - target.margin(x)) / steep)[:, None] * self.inwards
+            x = x + ((margin - target.margin(x)) / _steepness(target, x, self.inwards))[:, None] * self.inwards
         return x
+
+
+def _steepness(target: Target, points: Floats, axes: Floats) -> Floats:
+    """(k,) growth of the distance from the target's end along unit vectors [-]."""
+    step = PROBE * target.size
+    return np.asarray((target.margin(points + step * axes) - target.margin(points - step * axes)) / (2.0 * step))
 
 
 @dataclass(frozen=True)
@@ -191,17 +167,11 @@ class Supports:
     def on(self, structure: Structure) -> Slides:
         """How far each rod end is moved."""
         target, points = structure.target, structure.popped.boundary.points
-        normals, step = target.gap(points).normal, PROBE * target.size
-        steep = np.stack(
-            [
-                (target.margin(points + step * axis) - target.margin(points - step * axis)) / (2 * step)
-                for axis in np.eye(3)
-            ],
-            axis=1,
-        )
+        normals = target.gap(points).normal
+        steep = np.stack([_steepness(target, points, axis) for axis in np.eye(3)], axis=1)
         inwards = unit(steep - np.einsum("ex,ex->e", steep, normals)[:, None] * normals)
-        span, zero = usual_span(structure.mesh), np.zeros(len(points))
-        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        span = usual_span(structure.mesh)
+        box = Box.about_zero(len(points), MOST * span, FIRST * span)
         return Slides(
             structure, cross(normals, inwards), inwards, box, lambda by: Image(by.ends, np.full(len(points), by.handed))
         )

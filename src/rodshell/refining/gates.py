@@ -9,20 +9,20 @@
 All sizes are relative to the target's.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, eye_array
 from scipy.sparse.linalg import spsolve
 
-from rodshell.arrays import Floats, Ints
-from rodshell.formfinding.pipeline import PatchForm, agreement, meshed_again
+from rodshell.arrays import Floats
+from rodshell.formfinding.pipeline import Stages, agreement, meshed_again
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.layout import GridMesh
-from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES, EdgeProperties
-from rodshell.model.rod_sections import RodSections
+from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES
 from rodshell.progress import Progress, silent
+from rodshell.refining.structure import Structure, spans
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
 from rodshell.solve.problem import Problem
 from rodshell.solve.sensitivity import Parameters, Sensitivity
@@ -49,11 +49,10 @@ FITS = 20  # steps of the fit of rods in a plane
 class Gates:
     """Which gates a design passes.
 
-    Parameters
-    ----------
-    passed : by name, in the order of `GATES`; a gate that was not reached is not among them.
-    reason : why the first one refuses it, beginning with the gate's name; "" where none does.
-    factorizations : that all of them took.
+    Args:
+        passed: by name, in the order of `GATES`; a gate that was not reached is not among them.
+        reason: why the first one refuses it, beginning with the gate's name; "" where none does.
+        factorizations: that all of them took.
     """
 
     passed: dict[str, bool]
@@ -67,37 +66,31 @@ class Gates:
 
 
 def gates(
-    form: PatchForm, *, all_of_them: bool = True, span_error: float | None = None, progress: Progress = silent
+    form: Stages, *, all_of_them: bool = True, span_error: float | None = None, progress: Progress = silent
 ) -> Gates:
     """Try a design at every gate.
 
-    Parameters
-    ----------
-    form : the design, popped up with one end condition.
-    all_of_them : try the others too after a gate has refused it.
-    span_error : largest error of each span as it is built [m]; None: `SPAN_ERROR` of the target's size.
-    progress : called as progress(stage, detail, residual).
+    Args:
+        form: the design, popped up with one end condition.
+        all_of_them: try the others too after a gate has refused it.
+        span_error: largest error of each span as it is built [m]; None: `SPAN_ERROR` of the target's size.
+        progress: called as progress(stage, detail, residual).
     """
     passed, first, factorizations = dict[str, bool](), "", 0
     for name in GATES:
         progress("refine", f"gate {name}", 0.0)
-        if name == "tolerance":
-            reason, made = _tolerance(form, span_error, progress)
-        else:
-            reason, made = _TRIALS[name](form, progress)
+        reason, made = _TRIALS[name](form, span_error, progress)
         passed[name], factorizations = not reason, factorizations + made
         if reason and not first:
             first = f"{name}: {reason}"
         if first and (not all_of_them or name == "stable"):
             break
     if all_of_them:
-        passed |= {
-            name: False for name in GATES if name not in passed
-        }  # without a stable shell there is nothing to try
+        passed = dict.fromkeys(GATES, False) | passed  # without a stable shell there is nothing to try
     return Gates(passed, first, factorizations)
 
 
-def _stable(form: PatchForm, progress: Progress) -> tuple[str, int]:
+def _stable(form: Stages, *_: object) -> tuple[str, int]:
     report = _popped(form).report
     if not report.converged:
         return f"the pop-up {report.sentence}", 0
@@ -105,7 +98,7 @@ def _stable(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return (f"the shell is not stable, with {count} negative mode{'s' if count > 1 else ''}" if count else ""), 0
 
 
-def _flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
+def _flat(form: Stages, *_: object) -> tuple[str, int]:
     worst = misfit(form.footprint.mesh) / form.target.size
     if worst <= MISFIT:
         return "", 0
@@ -115,7 +108,7 @@ def _flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
     ), 0
 
 
-def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
+def _remeshed(form: Stages, *_: object) -> tuple[str, int]:
     (ends,) = form.popped
     again = meshed_again(form, ends)
     made = _popped(again).report.factorizations
@@ -127,7 +120,7 @@ def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return f"meshed again, its gap is {percent_text(after)} rms and not {percent_text(before)}", made
 
 
-def _tolerance(form: PatchForm, span_error: float | None, progress: Progress) -> tuple[str, int]:
+def _tolerance(form: Stages, span_error: float | None, progress: Progress) -> tuple[str, int]:
     error = SPAN_ERROR * form.target.size if span_error is None else span_error
     built = f"built with errors of up to {length_text(error)} in every span"
     most = WORSE * _rms(form) + WORSE_BY
@@ -139,18 +132,16 @@ def _tolerance(form: PatchForm, span_error: float | None, progress: Progress) ->
     return f"{built}, its gap is up to {percent_text(worst)} rms, more than {percent_text(most)}", made
 
 
-def worst_with_errors(form: PatchForm, span_error: float, progress: Progress = silent) -> tuple[float | None, int]:
+def worst_with_errors(form: Stages, span_error: float, progress: Progress = silent) -> tuple[float | None, int]:
     """The largest rms gap of the shell built with errors, over the target's size, and the factorisations that it took.
 
-    Parameters
-    ----------
-    form : the design, popped up with one end condition.
-    span_error : largest error of each span's length [m].
-    progress : called as progress(stage, detail, residual).
+    Args:
+        form: the design, popped up with one end condition.
+        span_error: largest error of each span's length [m].
+        progress: called as progress(stage, detail, residual).
 
-    Returns
-    -------
-    None in place of the gap where one of them has no stable state nearby.
+    Returns:
+        None in place of the gap where one of them has no stable state nearby.
     """
     worst, made = 0.0, 0
     for sample, popped in enumerate(with_errors(form, span_error=span_error), start=1):
@@ -162,10 +153,10 @@ def worst_with_errors(form: PatchForm, span_error: float, progress: Progress = s
     return worst, made
 
 
-def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
-    (ends,) = form.popped
+def _from_flat(form: Stages, _: object, progress: Progress) -> tuple[str, int]:
+    (shell,) = form.popped.values()
     found = pop_up(
-        form.footprint, form.boundary, form.rod, ends=ends, start="flat", joint=form.joint,
+        form.footprint, form.boundary, form.rod, ends=shell.support, start="flat", joint=form.joint,
         most_factorizations=MOST_FROM_FLAT, progress=progress,
     )  # fmt: skip
     made = found.report.factorizations
@@ -182,33 +173,31 @@ def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return f"pushed up from flat, it comes to another shape, {percent_text(apart)} of the size away", made
 
 
-_TRIALS = {"stable": _stable, "flat": _flat, "remeshed": _remeshed, "from_flat": _from_flat}
+_TRIALS: dict[str, Callable[[Stages, float | None, Progress], tuple[str, int]]] = {
+    "stable": _stable, "flat": _flat, "remeshed": _remeshed, "tolerance": _tolerance, "from_flat": _from_flat,
+}  # fmt: skip
 
 
-def with_errors(form: PatchForm, samples: int = SAMPLES, *, span_error: float | None = None) -> Iterator[PopUp]:
+def with_errors(form: Stages, samples: int = SAMPLES, *, span_error: float | None = None) -> Iterator[PopUp]:
     """The shell built with errors: each span is too long or too short, each rod too stiff or too soft, by chance.
 
     It is solved from the state that is foreseen to first order. Where that does not lead to a stable equilibrium, the
     errors grow in steps, and a shell that loses its stability on the way slides to the stable state next to it.
 
-    Parameters
-    ----------
-    form : the design, popped up with one end condition.
-    samples : of a random generator with the seeds 0, 1, ...
-    span_error : largest error of each span's length [m]; None: `SPAN_ERROR` of the target's size.
+    Args:
+        form: the design, popped up with one end condition.
+        samples: of a random generator with the seeds 0, 1, ...
+        span_error: largest error of each span's length [m]; None: `SPAN_ERROR` of the target's size.
     """
     popped = _popped(form)
-    mesh, shell, found = popped.shell.mesh, popped.shell, popped.equilibrium
-    sections = RodSections.of(mesh, [form.rod] * len(mesh.grid.rods))
-    table = np.column_stack([sections.stretch, sections.edges, mesh.edge_lengths])
-    exact = EdgeProperties.of(shell, form.joint, table)
+    found, exact = popped.equilibrium, Structure(popped, form.rod, form.joint, form.target).edges
     errors = np.stack([_errors(form, span_error, seed) for seed in range(samples)])
     by_errors = np.log1p(errors).reshape(samples, -1).T
     foreseen = Sensitivity(found, exact).response(Parameters(csc_array(by_errors)))
     for sample, error in enumerate(errors):
 
         def built(here: Equilibrium, share: float, error: Floats = error) -> Problem:
-            other = exact.at(here.elements).varied(table * (1.0 + share * error)).shell
+            other = exact.at(here.elements).varied(exact.table * (1.0 + share * error)).shell
             return replace(here.problem, elements=other.elements, stretch=other.stretch)
 
         state, forces = found.state + foreseen.motions[sample], found.forces + foreseen.forces[sample]
@@ -223,11 +212,11 @@ def with_errors(form: PatchForm, samples: int = SAMPLES, *, span_error: float | 
                 if not here.report.stable:
                     break
         report = here.report.after(*(report for report in reports if report is not here.report))
-        other = exact.at(here.elements).varied(table * (1.0 + error)).shell
+        other = exact.at(here.elements).varied(exact.table * (1.0 + error)).shell
         yield replace(popped, shell=other.with_elements(here.elements), equilibrium=replace(here, report=report))
 
 
-def _errors(form: PatchForm, span_error: float | None, seed: int) -> Floats:
+def _errors(form: Stages, span_error: float | None, seed: int) -> Floats:
     """(e, 5) relative errors of the edges' properties: of the lengths of spans, and of the EI and GJ of rods."""
     mesh, random = form.footprint.mesh, np.random.default_rng(seed)
     span = spans(mesh)
@@ -240,17 +229,8 @@ def _errors(form: PatchForm, span_error: float | None, seed: int) -> Floats:
     return result
 
 
-def spans(mesh: GridMesh) -> Ints:
-    """(e,) number of the span, between two joints or from a joint to an end, that each edge belongs to."""
-    joint = np.zeros(mesh.node_count, dtype=bool)
-    joint[mesh.joint_pairs.ravel()] = True
-    rods = mesh.edge_rods
-    begins = np.append(True, (rods[1:] != rods[:-1]) | joint[mesh.edges[1:, 0]])
-    return np.cumsum(begins) - 1
-
-
 def span_lengths(mesh: GridMesh) -> Floats:
-    """(spans,) lengths [m]; see `spans`."""
+    """(spans,) lengths [m]; see `structure.spans`."""
     return np.bincount(spans(mesh), weights=mesh.edge_lengths).astype(float)
 
 
@@ -259,11 +239,10 @@ def misfit(mesh: GridMesh) -> float:
 
     Each rod is turned and moved until the sum of the squares of all distances is smallest.
 
-    Parameters
-    ----------
-    mesh : the rods, with the distances of their joints along them.
+    Args:
+        mesh: the rods, with the distances of their joints along them.
     """
-    rods, at = mesh.grid.crossings.rods, _joint_stations(mesh)
+    rods, at = mesh.grid.crossings.rods, mesh.stations[mesh.at_crossings]  # from the points of `FlatRod.origin`
     lines = mesh.grid.rods
     origin = np.array([rod.origin for rod in lines])
     direction = np.array([rod.direction for rod in lines])
@@ -293,17 +272,12 @@ def misfit(mesh: GridMesh) -> float:
     return worst
 
 
-def _joint_stations(mesh: GridMesh) -> Floats:
-    """(c, 2) distance of each crossing's node along its two rods [m], from the points that `FlatRod.origin` names."""
-    return np.asarray(mesh.stations[mesh.at_crossings])
-
-
-def _popped(form: PatchForm) -> PopUp:
+def _popped(form: Stages) -> PopUp:
     """Of a form with one end condition."""
     (popped,) = form.popped.values()
     return popped
 
 
-def _rms(form: PatchForm) -> float:
+def _rms(form: Stages) -> float:
     (gap,) = form.agreement.values()
     return gap.rms_relative

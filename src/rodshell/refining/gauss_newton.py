@@ -13,26 +13,25 @@ from scipy.optimize import lsq_linear
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
-from rodshell.refining.objectives import Objective, residuals, slopes
+from rodshell.refining.objectives import LowestEigenvalue, Objective, residuals, slopes
 from rodshell.refining.structure import Point
-from rodshell.refining.variables import Variables
+from rodshell.refining.variables import Design
 
 ENOUGH = 0.01  # relative decrease of the root of the sum of squares below which a foreseen step is not worth taking
-NEAR_ENOUGH = 1e-5  # relative gap, of which the mesh knows no more
-POOR, GOOD = 0.25, 0.75  # actual over foreseen decrease
-FIRM, LEAST_RADIUS = 0.1, 1e-3  # radius that must not bound a step which says that there is no more to gain; the least
+_NEAR_ENOUGH = 1e-5  # relative gap, of which the mesh knows no more
+_POOR, GOOD = 0.25, 0.75  # actual over foreseen decrease
+FIRM, _LEAST_RADIUS = 0.1, 1e-3  # radius that must not bound a step which says that there is no more to gain; the least
 
 
 @dataclass(frozen=True)
 class Step:
     """One evaluation: for progress and records.
 
-    Parameters
-    ----------
-    rms : relative gap, or None where no equilibrium was found.
-    lowest : lowest eigenvalue over that before, or None.
-    accepted : whether the design became the new one.
-    values : (n,) of the variables.
+    Args:
+        rms: relative gap, or None where no equilibrium was found.
+        lowest: lowest eigenvalue over that before, or None.
+        accepted: whether the design became the new one.
+        values: (n,) of the variables.
     """
 
     number: int
@@ -47,11 +46,10 @@ class Step:
 class Found:
     """Where the search ended.
 
-    Parameters
-    ----------
-    accepted : the designs that were accepted, the best last.
-    converged : whether no step is foreseen to gain more.
-    stopped : when and where the search was out of time, or "".
+    Args:
+        accepted: the designs that were accepted, the best last.
+        converged: whether no step is foreseen to gain more.
+        stopped: when and where the search was out of time, or "".
     """
 
     accepted: tuple[Point, ...]
@@ -62,31 +60,27 @@ class Found:
 
 
 def gauss_newton(
-    variables: Variables,
+    variables: Design,
     first: Point,
     objectives: Sequence[Objective],
+    floor: LowestEigenvalue,
     *,
-    allows: Callable[[Point], bool] = lambda point: True,
-    lowest_before: float | None = None,
-    radius: float = 1.0,
-    most: int = 30,
-    progress: Callable[[Step], None] = lambda step: None,
+    most: int,
+    progress: Callable[[Step], None],
 ) -> Found:
     """Make a sum of squares small.
 
-    Parameters
-    ----------
-    first : the design to start from.
-    allows : limits that a design must keep to be accepted.
-    lowest_before : eigenvalue to which those of the steps are related; None: they are not computed.
-    radius : first trust radius, in scales of the variables.
-    progress : called after each evaluation; an OutOfTimeError that it raises ends the search with what was found.
+    Args:
+        first: the design to start from.
+        floor: one of the objectives, whose limit a design must keep to be accepted.
+        most: designs that are tried.
+        progress: called after each evaluation; an OutOfTimeError that it raises ends the search with what was found.
     """
-    box = variables.box
+    box, radius = variables.box, 1.0
     here, accepted, steps, factorizations = first, [first], list[Step](), 1
     converged, fresh, stopped = False, True, ""
-    while len(steps) < most and radius >= LEAST_RADIUS:
-        if here.rms < NEAR_ENOUGH:
+    while len(steps) < most and radius >= _LEAST_RADIUS:
+        if here.rms < _NEAR_ENOUGH:
             converged = True
             break
         if fresh:
@@ -111,12 +105,11 @@ def gauss_newton(
         good = there is not None and gain > 1e-2
         if there is not None and good:
             factorizations += 1
-            if lowest_before is not None:
-                lowest = float(there.modes.values[0]) / lowest_before
-            good = allows(there)
+            lowest = float(there.modes.values[0]) / floor.before
+            good = floor.allows(there)
         rms = None if there is None else there.rms
         steps.append(Step(len(steps) + 1, rms, lowest, radius, good, tuple(values.tolist())))
-        if not good or gain < POOR:
+        if not good or gain < _POOR:
             radius *= 0.3 if there is None else 0.5
         elif gain > GOOD and reached:
             radius *= 2.0

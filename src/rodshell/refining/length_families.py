@@ -26,44 +26,32 @@ FIRST = 0.05  # of the usual span: the change that counts as one
 class Stations:
     """Variables that move points along rods.
 
-    Parameters
-    ----------
-    shifts : (k, n) displacement of every rod node along its rod by each variable [-].
-    box : of the variables [m].
-    image : where an operation maps the variables.
-    across : (m, n) growth of the rods' offsets by each variable [-].
+    Args:
+        shifts: (k, n) displacement of every rod node along its rod by each variable [-].
+        box: (n,) [m].
+        across: (m, n) growth of the rods' offsets by each variable [-]; None: they stay.
     """
 
     structure: Structure
     shifts: csr_array
     box: Box
     image: Callable[[Operation], Image]
-    across: csr_array
+    across: csr_array | None = None
 
     stock = None
     common = False
 
     def change(self, values: Floats) -> Change:
-        """What a design does.
-
-        Parameters
-        ----------
-        values : (n,) the design [m].
-        """
         mesh, held = self.structure.mesh, len(self.structure.held)
-        before, after = edge_entries(mesh)
+        before, after = _edge_entries(mesh)
         slopes = csc_array(self.shifts[after] - self.shifts[before])
         none = Change.none(len(mesh.edges), held, len(values))
         return replace(none, lengths=slopes @ values, length_slopes=slopes)
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid with these points moved.
-
-        Parameters
-        ----------
-        values : (n,) the design [m].
-        """
-        return replace(grid, mesh=restationed(grid.mesh, self.shifts @ values, self.across @ values))
+        rods = len(grid.mesh.grid.rods)
+        across = np.zeros(rods) if self.across is None else self.across @ values
+        return replace(grid, mesh=_restationed(grid.mesh, self.shifts @ values, across))
 
 
 @dataclass(frozen=True)
@@ -75,17 +63,13 @@ class Tails:
     def on(self, structure: Structure) -> Stations:
         """The change of the tail at the start and the end of each rod."""
         mesh = structure.mesh
-        ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
-        points = np.unique(np.append(ends, mesh.at_crossings))
+        points, ends = moved_points(mesh), _end_entries(mesh)
         inner = points[np.searchsorted(points, ends) + np.tile([1, -1], len(mesh.rod_start))]
         tails = np.abs(mesh.stations[ends] - mesh.stations[inner])
         span, outward = usual_span(mesh), np.tile([-1.0, 1.0], len(mesh.rod_start))
         moved = csr_array((outward, (ends, np.arange(len(ends)))), shape=(len(mesh.stations), len(ends)))
         box = Box(0 * tails, -np.minimum(MOST * span, 0.5 * tails), 0 * tails + MOST * span, 0 * tails + FIRST * span)
-        none = csr_array((len(mesh.rod_start), len(ends)))
-        return Stations(
-            structure, between(mesh, points) @ moved, box, lambda by: Image(by.ends, np.ones(len(ends))), none
-        )
+        return Stations(structure, between(mesh) @ moved, box, lambda by: Image(by.ends, np.ones(len(ends))))
 
 
 @dataclass(frozen=True)
@@ -97,9 +81,8 @@ class Offsets:
     def on(self, structure: Structure) -> Stations:
         """The growth of each rod's offset.
 
-        Raises
-        ------
-        InputError : rods are not of two orthogonal families.
+        Raises:
+            InputError: rods are not of two orthogonal families.
         """
         mesh, rods = structure.mesh, structure.mesh.grid.rods
         if any(rod.family == "free" for rod in rods):
@@ -109,15 +92,13 @@ class Offsets:
         rows, columns = crossing[:, ::-1].ravel(), pairs.ravel()  # a rod moves the joints on those that it crosses
         moved = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(mesh.stations), count))
         moved.data = np.minimum(moved.data, 1.0)
-        span, zero = usual_span(mesh), np.zeros(count)
-        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        box = Box.about_zero(count, MOST * usual_span(mesh), FIRST * usual_span(mesh))
         across = np.array([(0.0, 1.0) if rod.family == "u" else (1.0, 0.0) for rod in rods])
 
         def image(by: Operation) -> Image:
             return Image(by.rods, np.round(np.einsum("mi,mi->m", across @ by.turn.T, across[by.rods])))
 
-        points = np.unique(np.append(crossing, np.column_stack([mesh.rod_start, mesh.rod_stop - 1])))
-        return Stations(structure, between(mesh, points) @ moved, box, image, csr_array(np.eye(count)))
+        return Stations(structure, between(mesh) @ moved, box, image, csr_array(np.eye(count)))
 
 
 @dataclass(frozen=True)
@@ -131,11 +112,9 @@ class Holes:
         mesh = structure.mesh
         holes = np.unique(mesh.at_crossings)
         rod = mesh.rod_of
-        points = np.unique(np.append(holes, np.column_stack([mesh.rod_start, mesh.rod_stop - 1])))
         columns = np.arange(len(holes))
         moved = csr_array((np.ones(len(holes)), (holes, columns)), shape=(len(mesh.stations), len(holes)))
-        span, zero = usual_span(mesh), np.zeros(len(holes))
-        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        box = Box.about_zero(len(holes), MOST * usual_span(mesh), FIRST * usual_span(mesh))
         key = rod[holes] * mesh.node_count + mesh.rod_nodes[holes]
         order = np.argsort(key)
 
@@ -144,11 +123,10 @@ class Holes:
             index = order[np.searchsorted(key[order], wanted)]
             return Image(index, np.where(by.reversed[rod[holes]], -1.0, 1.0))
 
-        none = csr_array((len(mesh.rod_start), len(holes)))
-        return Stations(structure, between(mesh, points) @ moved, box, image, none)
+        return Stations(structure, between(mesh) @ moved, box, image)
 
 
-def edge_entries(mesh: GridMesh) -> tuple[Ints, Ints]:
+def _edge_entries(mesh: GridMesh) -> tuple[Ints, Ints]:
     """(e,) entries of `rod_nodes` at which each edge begins and ends."""
     begins = np.setdiff1d(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
     return begins, begins + 1
@@ -161,14 +139,19 @@ def usual_span(mesh: GridMesh) -> float:
     return float(np.median(np.diff(mesh.stations[entries])[same]))
 
 
-def between(mesh: GridMesh, points: Ints) -> csr_array:
-    """(k, k) displacements of all rod nodes by those of some, linear between these.
+def _end_entries(mesh: GridMesh) -> Ints:
+    """(2m,) entries of `rod_nodes` at which each rod starts and ends."""
+    return np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
 
-    Parameters
-    ----------
-    points : entries of `rod_nodes`, ascending, with the ends of all rods among them.
-    """
-    every, s = np.arange(len(mesh.rod_nodes)), mesh.stations
+
+def moved_points(mesh: GridMesh) -> Ints:
+    """Entries of `rod_nodes` that variables move, ascending: joints and ends of rods."""
+    return np.unique(np.append(mesh.at_crossings, _end_entries(mesh)))
+
+
+def between(mesh: GridMesh) -> csr_array:
+    """(k, k) displacements of all rod nodes by those of `moved_points`, linear between these."""
+    every, s, points = np.arange(len(mesh.rod_nodes)), mesh.stations, moved_points(mesh)
     after = np.searchsorted(points, every)
     low, high = points[np.where(points[after] == every, after, after - 1)], points[after]
     span = s[high] - s[low]
@@ -177,16 +160,15 @@ def between(mesh: GridMesh, points: Ints) -> csr_array:
     return csr_array((np.append(1.0 - share, share), (rows, columns)), shape=(len(every), len(every)))
 
 
-def restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
+def _restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
     """A mesh whose nodes are moved along their rods, and whose rods are moved across themselves.
 
-    Parameters
-    ----------
-    along : (k,) displacement of every rod node along its rod [m].
-    across : (m,) growth of the rods' offsets [m].
+    Args:
+        along: (k,) displacement of every rod node along its rod [m].
+        across: (m,) growth of the rods' offsets [m].
     """
     stations = mesh.stations + along
-    ends = stations[np.column_stack([mesh.rod_start, mesh.rod_stop - 1])]
+    ends = stations[_end_entries(mesh)].reshape(-1, 2)
     rods = tuple(
         _moved(rod, float(start), float(end), float(by))
         for rod, (start, end), by in zip(mesh.grid.rods, ends, across, strict=True)

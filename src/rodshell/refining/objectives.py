@@ -4,7 +4,7 @@ Each has residuals r (q,), whose squares are added up, and slopes J (q, n) by th
 the sum, exactly, and J'J stands for half of its Hessian. A limit is a residual that is zero where it is kept.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,76 +19,35 @@ class Objective(Protocol):
     """A part of the sum of squares."""
 
     def residuals(self, here: Point) -> Floats:
-        """(q,) residuals [-].
-
-        Parameters
-        ----------
-        here : a design and its equilibrium.
-        """
+        """(q,) residuals [-] at a design and its equilibrium."""
         ...
 
     def slopes(self, here: Point) -> Floats:
-        """(q, n) slopes of the residuals by the variables.
-
-        Parameters
-        ----------
-        here : a design and its equilibrium.
-        """
+        """(q, n) slopes of the residuals by the variables."""
         ...
 
 
-@dataclass(frozen=True, eq=False)
 class Gap:
-    """The mean distance of the rods from the target over its size, G = (mean of |g|^p)^(1/p).
-
-    The residuals g (|g|/G)^(p/2 - 1) / sqrt(q) have the sum of squares G^2: with p = 2 the mean square.
-
-    Parameters
-    ----------
-    power : p, 2 or more; large ones count the largest gaps.
-    weight : of each point (q, 3) of the rods [m] in the mean, from its coordinates; None: the same for all.
-    """
-
-    power: float = 2.0
-    weight: Callable[[Floats], Floats] | None = None
+    """Distances of the rods from the target over its size, whose mean square is counted."""
 
     def residuals(self, here: Point) -> Floats:
-        gaps, weights = here.gaps[0] / here.structure.target.size, self._weights(here)
-        return np.asarray(
-            np.sqrt(weights) * gaps * (np.abs(gaps) / self._mean(gaps, weights)) ** (0.5 * self.power - 1)
-        )
+        gaps = here.gaps[0]
+        return np.asarray(np.sqrt(1.0 / len(gaps)) * (gaps / here.structure.target.size))
 
     def slopes(self, here: Point) -> Floats:
-        structure, (distances, normals) = here.structure, here.gaps
-        size, nodes = structure.target.size, structure.mesh.node_count
-        motions = here.response.motions[:, :nodes]
+        structure, (gaps, normals) = here.structure, here.gaps
+        motions = here.response.motions[:, : structure.mesh.node_count]
         by_gap = np.stack([np.einsum("qx,qx->q", normals, structure.sampled @ motion) for motion in motions], axis=1)
-        gaps, weights = distances / size, self._weights(here)
-        relative = np.abs(gaps) / self._mean(gaps, weights)
-        # those of least squares with the present weights, whose gradient is that of G^2 [Nocedal and Wright 2006, 10.2]
-        return np.asarray((np.sqrt(weights) * relative ** (0.5 * self.power - 1))[:, None] * by_gap / size)
-
-    def _mean(self, gaps: Floats, weights: Floats) -> float:
-        largest = float(np.abs(gaps).max()) or 1.0
-        return float(largest * (weights @ (np.abs(gaps) / largest) ** self.power) ** (1 / self.power)) or 1.0
-
-    def _weights(self, here: Point) -> Floats:
-        structure, count = here.structure, len(here.gaps[0])
-        if self.weight is None:
-            return np.full(count, 1.0 / count)
-        points = structure.sampled @ structure.popped.state[: structure.mesh.node_count]
-        weights = self.weight(points)
-        return np.asarray(weights / weights.sum())
+        return np.asarray(np.sqrt(1.0 / len(gaps)) * by_gap / structure.target.size)
 
 
 @dataclass(frozen=True)
 class Prestress:
     """Compression of spans over a share of their Euler loads.
 
-    Parameters
-    ----------
-    most : share of the Euler load from which it counts [-].
-    weight : of an excess of one Euler load in every span, over a gap of the target's size [-].
+    Args:
+        most: share of the Euler load from which it counts [-].
+        weight: of an excess of one Euler load in every span, over a gap of the target's size [-].
     """
 
     most: float = 0.3
@@ -122,11 +81,10 @@ class Prestress:
 class LowestEigenvalue:
     """The lowest modes stay above a share of the lowest one before.
 
-    Parameters
-    ----------
-    least : share of the lowest eigenvalue before [-].
-    margin : the limit is approached from so much above it [-].
-    weight : of an eigenvalue of zero, over a gap of the target's size [-].
+    Args:
+        least: share of the lowest eigenvalue before [-].
+        margin: the limit is approached from so much above it [-].
+        weight: of an eigenvalue of zero, over a gap of the target's size [-].
     """
 
     least: float
@@ -153,42 +111,11 @@ class LowestEigenvalue:
         return (1.0 + self.margin) * self.least
 
 
-@dataclass(frozen=True, eq=False)
-class Small:
-    """Variables stay near their values without effect.
-
-    Parameters
-    ----------
-    scale : (n,) change of each that counts as one.
-    weight : of a change of one in every variable, over a gap of the target's size [-].
-    """
-
-    scale: Floats
-    weight: float = 1e-6
-
-    def residuals(self, here: Point) -> Floats:
-        return np.asarray(self.weight * here.values / self.scale / np.sqrt(len(self.scale)))
-
-    def slopes(self, here: Point) -> Floats:
-        return np.asarray(np.diag(self.weight / self.scale / np.sqrt(len(self.scale))))
-
-
 def residuals(objectives: Sequence[Objective], here: Point) -> Floats:
-    """(q,) residuals of all objectives.
-
-    Parameters
-    ----------
-    objectives : what is to be made small.
-    here : a design and its equilibrium.
-    """
+    """(q,) residuals of all objectives, one after the other."""
     return np.concatenate([objective.residuals(here) for objective in objectives])
 
 
 def slopes(objectives: Sequence[Objective], here: Point) -> Floats:
-    """(q, n) derivatives of the residuals of all objectives; parameters as of `residuals`.
-
-    Parameters
-    ----------
-    objectives, here : as of `residuals`.
-    """
+    """(q, n) slopes of the residuals of all objectives."""
     return np.concatenate([objective.slopes(here) for objective in objectives])

@@ -12,15 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.errors import InputError, OutOfTimeError
-from rodshell.formfinding.patches import PatchedForm, merged_agreement
-from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
-from rodshell.formfinding.popup import Ends, PopUp
-from rodshell.formfinding.trim import Footprint
+from rodshell.figures.records import Ends
+from rodshell.formfinding.pipeline import Agreement, Stages, agreement
+from rodshell.formfinding.popup import PopUp
 from rodshell.layout.profile import DOUBLE, Profile
-from rodshell.model import Shell
 from rodshell.progress import Progress, silent
-from rodshell.solve.equilibrium import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.refining.structure import rebuilt
 from rodshell.units import percent_text
 
 FIRST, PROBE = 0.55, 0.1  # share of each rod that is double in the first design; the difference to the second
@@ -33,12 +30,10 @@ WORTH = 0.8  # of the gap before: a larger one after is a small gain
 class Offer:
     """What a refinement would gain.
 
-    Parameters
-    ----------
-    ends : how the rods' ends are held.
-    before, after : root mean square of the gap over the target's size, as the form is and with double laths.
-    shares : smallest and largest share of a rod's length that is then double, patch by patch.
-    others : the gap with the form's other ends, as it is.
+    Args:
+        before, after: root mean square of the gap over the target's size, as the form is and with double laths.
+        shares: smallest and largest share of a rod's length that is then double, patch by patch.
+        others: the gap with the form's other ends, as it is.
     """
 
     ends: Ends
@@ -75,30 +70,27 @@ class Offer:
         return words
 
 
-def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Offer | None:
+def offer(stages: Stages, *, progress: Progress = silent) -> Offer | None:
     """What double laths would gain, for pinned ends if the form has them.
 
-    Parameters
-    ----------
-    progress : called as progress(stage, detail, residual).
+    Args:
+        progress: called as progress(stage, detail, residual).
 
-    Returns
-    -------
-    None where the form has no target, no stable shell, or rods whose sections change along them; where no design of a
-    patch is stable; or where the time was over.
+    Returns:
+        None where the form has no target, no stable shell, or rods whose sections change along them; where no design of
+        a patch is stable; or where the time was over.
     """
     if stages.status != "converged" or not stages.agreement:
         return None
-    patches = [stages] if isinstance(stages, PatchForm) else list(stages.patches.values())
     ends: Ends = next(iter(stages.agreement))
-    if not all(patch.popped[ends].report.stable for patch in patches):
+    if not stages.popped[ends].report.stable or stages.popped[ends].shell.yields:
         return None
 
     def telling(number: int) -> None:
         progress("offer", f"double laths, design {number}", 0.0)
 
     try:
-        found = [_designs(patch, ends, telling) for patch in patches]
+        found = [_designs(patch, ends, telling) for patch in stages.parts]
     except InputError:
         return None
     if not all(designs for designs, _ in found):
@@ -108,7 +100,7 @@ def offer(stages: PatchForm | PatchedForm, *, progress: Progress = silent) -> Of
     return Offer(
         ends,
         stages.agreement[ends].rms_relative,
-        merged_agreement([design.gap for design in best]).rms_relative,
+        Agreement.of_all([design.gap for design in best]).rms_relative,
         (min(shares), max(shares)),
         {other: gap.rms_relative for other, gap in stages.agreement.items() if other != ends},
         sum(factorizations for _, factorizations in found),
@@ -123,7 +115,7 @@ class _Design:
     gap: Agreement
 
 
-def _designs(patch: PatchForm, ends: Ends, telling: Callable[[int], None]) -> tuple[list[_Design], int]:
+def _designs(patch: Stages, ends: Ends, telling: Callable[[int], None]) -> tuple[list[_Design], int]:
     """The designs of the search up to the first that is not stable, or to the end of the time, and the factorisations
     that all took; no designs for rods whose sections change already."""
     found, like, factorizations = list[_Design](), patch.popped[ends], 0
@@ -155,11 +147,7 @@ def _next_share(found: Sequence[_Design], before: Agreement) -> float | None:
     return None if gains or len(found) > 3 else NEAR_ALL
 
 
-def _popped_up(patch: PatchForm, share: float, like: PopUp) -> PopUp:
+def _popped_up(patch: Stages, share: float, like: PopUp) -> PopUp:
     """The shell with double laths over a share of every rod, from the equilibrium of one with others."""
     mesh = like.shell.mesh.with_profiles(Profile.double(share))
-    shell = Shell.of(mesh, patch.rod, clamped=like.ends == "clamped", joint=patch.joint)
-    shell = shell.with_frames_of(like.shell.elements)
-    problem = Problem.of_shell(shell, like.boundary.points, pattern=like.equilibrium.problem.pattern)
-    found = find_equilibrium(problem, like.state, like.forces)
-    return PopUp(like.ends, "draped", Footprint(mesh), like.boundary, shell.with_elements(found.elements), found)
+    return rebuilt(like, mesh, like.boundary, patch.rod, patch.joint, like.equilibrium)

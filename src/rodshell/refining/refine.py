@@ -12,23 +12,18 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
+from rodshell.figures.records import Ends
 from rodshell.formfinding.methods import STANDARD_GRAVITY
-from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
-from rodshell.formfinding.popup import Ends, PopUp
-from rodshell.formfinding.trim import Footprint
-from rodshell.model import Shell
+from rodshell.formfinding.pipeline import Agreement, Stages, agreement
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
-from rodshell.refining.load_limits import Deflection, LoadFactor
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress, residuals
 from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
-from rodshell.refining.structure import Point, Structure, under_load
+from rodshell.refining.structure import Point, Structure, rebuilt, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
-from rodshell.rods.joints import Elastic
 from rodshell.solve.equilibrium import find_equilibrium
-from rodshell.solve.problem import Problem
 from rodshell.units import percent_text
 from rodshell.validation import choice
 
@@ -46,45 +41,29 @@ Progress = Callable[[Step], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """One design on the way.
-
-    Parameters
-    ----------
-    point : its equilibrium on the mesh of the search.
-    """
-
-    point: Point
-    grid: Grid
-
-
-@dataclass(frozen=True, eq=False)
 class Refinement:
     """A shell before and after.
 
-    Parameters
-    ----------
-    ends : how the rods' ends are held.
-    before, after : the stages, with the popped-up shell of these ends alone.
-    designs : those that were accepted on the way, the last best; the first is the shell before.
-    converged : whether no further step would gain much.
-    stopped : when and where the search was out of time, or "".
-    loaded : gaps before and after under the loads, where it was refined under loads; else None.
-    as_found : whether its stiffnesses are built as they were found, see `built`.
+    Args:
+        before, after: the stages, with the popped-up shell of these ends alone.
+        designs: those that were accepted on the way, on the mesh of the search, the last best; the first is the shell
+            before.
+        converged: whether no further step would gain much.
+        stopped: when and where the search was out of time, or "".
+        loaded: gaps before and after under the loads, where it was refined under loads; else None.
     """
 
     vary: tuple[str, ...]
     ends: Ends
-    before: PatchForm
-    after: PatchForm
-    designs: tuple[Candidate, ...]
+    before: Stages
+    after: Stages
+    designs: tuple[Point, ...]
     converged: bool
     factorizations: int
     steps: tuple[Step, ...]
     variables: Design
     stopped: str = ""
     loaded: tuple[Agreement, Agreement] | None = None
-    as_found: bool = False
 
     def __repr__(self) -> str:
         gap = f"{percent_text(self.gap_before.rms_relative)} -> {percent_text(self.gap_after.rms_relative)} rms"
@@ -102,7 +81,7 @@ class Refinement:
 
 
 def refine(
-    stages: PatchForm,
+    stages: Stages,
     vary: str | Family | Sequence[str | Family] = ("taper",),
     *,
     ends: Ends | None = None,
@@ -116,24 +95,23 @@ def refine(
 ) -> Refinement:
     """Bring a popped-up shell nearer to its target.
 
-    Parameters
-    ----------
-    stages : of one shell, with a stable pop-up.
-    vary : what is varied: names of `FAMILIES`, or families with settings of their own.
-    ends : how the rods' ends are held; None: as first asked for.
-    objectives : what is made small; None: the mean square of the gap and, where not only stiffness varies, compression.
-    least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
-    under_weight : factor on its own weight with which the shell is brought to the target, such as 1.0; unloaded it then
-        stands above.
-    dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
-    start : values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
-    most_evaluations : designs that are tried; None: 60, or 30 on either side where no stiffness varies.
-    progress : called after each; an OutOfTimeError that it raises ends the search with what was found.
+    Args:
+        stages: of one shell, with a stable pop-up.
+        vary: what is varied: names of `FAMILIES`, or families with settings of their own.
+        ends: how the rods' ends are held; None: as first asked for.
+        objectives: what is made small; None: the mean square of the gap and, where not only stiffness varies,
+            compression.
+        least_eigenvalue: share of the lowest eigenvalue before below which no design is accepted [-].
+        under_weight: factor on its own weight with which the shell is brought to the target, such as 1.0; unloaded it
+            then stands above.
+        dead_loads: (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
+        start: values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
+        most_evaluations: designs that are tried; None: 60, or 30 on either side where no stiffness varies.
+        progress: called after each; an OutOfTimeError that it raises ends the search with what was found.
 
-    Raises
-    ------
-    InputError : no such family; the shell has no target, no pop-up with these ends, or is not stable.
-    ConvergenceError : it falls under the loads, or has no stable equilibrium with the design to start from.
+    Raises:
+        InputError: no such family; the shell has no target, no pop-up with these ends, or is not stable.
+        ConvergenceError: it falls under the loads, or has no stable equilibrium with the design to start from.
     """
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
@@ -143,15 +121,12 @@ def refine(
     before = structure.lowest if here.equilibrium.problem.load is None else float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
-    goals = [Gap(), *stressed] if objectives is None else list(objectives)
+    goals: list[Objective] = [*([Gap(), *stressed] if objectives is None else objectives), floor]
     stiff = any(family.name in STIFFNESSES for family in families)
     most = (60 if stiff else 30) if most_evaluations is None else most_evaluations
 
     def searched(first: Point) -> Found:
-        return gauss_newton(
-            variables, first, [*goals, floor],
-            allows=floor.allows, lowest_before=before, most=most, progress=progress,
-        )  # fmt: skip
+        return gauss_newton(variables, first, goals, floor, most=most, progress=progress)
 
     found = searched(here)
     accepted = found.accepted
@@ -161,25 +136,22 @@ def refine(
         if opposite is not None:
             other = searched(opposite)
             steps, made = (*found.steps, *other.steps), found.factorizations + other.factorizations
-            nearer = _cost([*goals, floor], other.accepted[-1]) < _cost([*goals, floor], accepted[-1])
+            nearer = _cost(goals, other.accepted[-1]) < _cost(goals, accepted[-1])
             accepted = (here, *other.accepted) if nearer else accepted
             found = replace(other if nearer else found, factorizations=made, steps=steps, stopped=other.stopped)
     if any(sizes is not None for sizes in variables.stock):
-        chosen, more = rounded(variables, accepted[-1], [*goals, floor], floor.allows)
+        chosen, more = rounded(variables, accepted[-1], goals, floor.allows)
         spent += more
         nearer = chosen is not None and chosen.rms < here.rms
         accepted = (here, chosen) if chosen is not None and nearer else (here,)
-    as_found = any(isinstance(goal, (Deflection, LoadFactor)) for goal in goals)
-    designs = tuple(Candidate(point, built(variables, point, as_found=as_found)) for point in accepted)
-    after, made = popped_up(stages, designs[-1], ends)
+    after, made = popped_up(stages, variables, accepted[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
-        loaded = loaded_gap(stages, designs[0], ends), loaded_gap(after, designs[-1], ends)
-    held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
+        loaded = loaded_gap(stages, here, ends), loaded_gap(after, accepted[-1], ends)
     names = tuple(family.name for family in families)
     return Refinement(
-        names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
-        found.steps, variables, found.stopped, loaded, as_found,
+        names, ends, alone(stages, ends), after, accepted, found.converged, spent + found.factorizations + made,
+        found.steps, variables, found.stopped, loaded,
     )  # fmt: skip
 
 
@@ -201,44 +173,41 @@ def _cost(goals: Sequence[Objective], here: Point) -> float:
     return float(np.sum(residuals(goals, here) ** 2))
 
 
-def between(refinement: Refinement, low: Candidate, high: Candidate, share: float) -> tuple[Candidate | None, int]:
+def alone(stages: Stages, ends: Ends) -> Stages:
+    """The same with one end condition."""
+    kept = {end: gap for end, gap in stages.agreement.items() if end == ends}
+    return replace(stages, ends=(ends,), popped={ends: stages.popped[ends]}, agreement=kept)
+
+
+def between(refinement: Refinement, low: Point, high: Point, share: float) -> tuple[Point | None, int]:
     """A design on the way from one to another.
 
-    Parameters
-    ----------
-    share : of the way [-].
+    Args:
+        share: of the way [-].
 
-    Returns
-    -------
-    The design, or None where it has no stable equilibrium near the first, or is of sizes in stock; and the
-    factorisations that it took.
+    Returns:
+        The design, or None where it has no stable equilibrium near the first, or is of sizes in stock; and the
+        factorisations that it took.
     """
-    variables, here = refinement.variables, low.point
+    variables = refinement.variables
     if any(sizes is not None for sizes in variables.stock):
         return None, 0
-    values = here.values + share * (high.point.values - here.values)
-    point, made = here.tried(values, variables.change(values))
-    if point is None:
-        return None, made + 1
-    return Candidate(point, built(variables, point, as_found=refinement.as_found)), made + 1
+    values = low.values + share * (high.values - low.values)
+    point, made = low.tried(values, variables.change(values))
+    return point, made + 1
 
 
-def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
+def built(variables: Design, point: Point) -> Grid:
     """The grid of a design.
 
     A common factor on all stiffnesses changes no unloaded shape, unless joints are springs. It is chosen such that the
     thickest place has the section itself, or more where the lowest eigenvalue would else be lower than before.
-
-    Parameters
-    ----------
-    as_found : leave that factor as it is, since limits under loads decide on it.
     """
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
     joint = structure.joint
-    given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
-    springs = any(0.0 < stiffness < inf for stiffness in given)
-    if point.equilibrium.problem.load is None and not springs and not as_found:
+    springs = any(0.0 < stiffness < inf for stiffness in (joint.shear, joint.out_of_plane, joint.twist))
+    if point.equilibrium.problem.load is None and not springs:
         profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
         thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)
         least = STIFFER * structure.lowest / float(point.modes.values[0])
@@ -249,9 +218,8 @@ def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
 def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:
     """The families that are meant.
 
-    Raises
-    ------
-    InputError : an unknown name, none, or one twice.
+    Raises:
+        InputError: an unknown name, none, or one twice.
     """
     given = vary if isinstance(vary, Sequence) and not isinstance(vary, str) else (vary,)
     families = tuple(
@@ -266,16 +234,11 @@ def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family
     return families
 
 
-def structure_of(stages: PatchForm, ends: Ends) -> Structure:
+def structure_of(stages: Stages, ends: Ends) -> Structure:
     """The shell that is refined.
 
-    Parameters
-    ----------
-    ends : how the rods' ends are held.
-
-    Raises
-    ------
-    InputError : it has no target, no pop-up with these ends, or is not stable.
+    Raises:
+        InputError: it has no target, no pop-up with these ends, or is not stable.
     """
     if stages.from_table:
         raise InputError("a table of rods has no target to come nearer to: refine the form of a target")
@@ -293,14 +256,12 @@ def structure_of(stages: PatchForm, ends: Ends) -> Structure:
 def first_point(structure: Structure, variables: Design, start: Sequence[float] | None = None) -> tuple[Point, int]:
     """The design to start from, and the factorisations that it took.
 
-    Parameters
-    ----------
-    start : other values than those without effect.
+    Args:
+        start: other values than those without effect.
 
-    Raises
-    ------
-    InputError : `start` is not as long as there are variables.
-    ConvergenceError : it has no stable equilibrium near the shell's own; the shell falls under the loads.
+    Raises:
+        InputError: `start` is not as long as there are variables.
+        ConvergenceError: it has no stable equilibrium near the shell's own; the shell falls under the loads.
     """
     box = variables.box
     values = box.start
@@ -331,47 +292,33 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
     return Point(structure, values, change, edges.at(here.elements), here), made
 
 
-def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchForm, int]:
+def popped_up(stages: Stages, variables: Design, design: Point, ends: Ends) -> tuple[Stages, int]:
     """The stages of a grid built to a design, and the factorisations that its pop-up took.
 
-    Parameters
-    ----------
-    design : what is built, and the equilibrium that was found for it.
-    ends : how the rods' ends are held.
-
-    Raises
-    ------
-    InputError : it has no stable equilibrium there after all.
+    Raises:
+        InputError: it has no stable equilibrium there after all.
     """
-    grid, here = design.grid, design.point.equilibrium
-    shell = Shell.of(grid.mesh, stages.rod, clamped=ends == "clamped", joint=stages.joint)
-    shell = shell.with_frames_of(here.elements)
-    problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
-    if here.problem.load is None:
-        found, made = find_equilibrium(problem, here.state, here.forces), 0
-    else:
-        found = find_equilibrium(replace(problem, load=here.problem.load), here.state, here.forces)
-        unloaded, made = under_load(found, np.zeros_like(here.state))
-        found = replace(unloaded or found, problem=replace((unloaded or found).problem, load=None))
-    shell = shell.with_elements(found.elements)
-    footprint = Footprint(grid.mesh)
-    popped = PopUp(ends, "draped", footprint, grid.boundary, shell, found)
+    grid, here = built(variables, design), design.equilibrium
+    popped, made = rebuilt(stages.popped[ends], grid.mesh, grid.boundary, stages.rod, stages.joint, here), 0
+    if here.problem.load is not None:
+        unloaded, made = under_load(popped.equilibrium, np.zeros_like(here.state))
+        found = unloaded or popped.equilibrium
+        found = replace(found, problem=replace(found.problem, load=None))
+        popped = replace(popped, shell=popped.shell.with_elements(found.elements), equilibrium=found)
     result = replace(
-        stages, ends=(ends,), footprint=footprint, boundary=grid.boundary,
+        stages, ends=(ends,), footprint=popped.footprint, boundary=grid.boundary,
         popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
     )  # fmt: skip
-    return result, found.report.factorizations + made
+    return result, popped.report.factorizations + made
 
 
-def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
+def loaded_gap(stages: Stages, design: Point, ends: Ends) -> Agreement:
     """Distance to the target of a shell under the loads that it was refined for.
 
-    Parameters
-    ----------
-    design : of which it is built, with its loaded equilibrium.
-    ends : how the rods' ends are held.
+    Args:
+        design: of which it is built, with its loaded equilibrium.
     """
-    popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
+    popped, here, structure = stages.popped[ends], design.equilibrium, design.structure
     load = np.zeros_like(popped.state)
     nodes = slice(0, popped.shell.first_angle)
     if structure.weight:

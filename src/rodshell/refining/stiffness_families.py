@@ -7,7 +7,7 @@ variables have the same profile. The stiffness of the edges by these numbers is 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -20,11 +20,9 @@ from rodshell.refining.change import STIFFNESSES, Change
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
-from rodshell.rods.section import Rod
 from rodshell.rods.varied import sizes
-from rodshell.validation import choice
 
-Per = Literal["shell", "family", "rod"]
+_Per = Literal["shell", "family", "rod"]
 PROBE = 1e-4  # of a number of a profile: differences are then exact to 1e-8
 
 
@@ -32,11 +30,8 @@ PROBE = 1e-4  # of a number of a profile: differences are then exact to 1e-8
 class Profiles:
     """Variables that are numbers of profiles.
 
-    Parameters
-    ----------
-    variable_of : (m, r) variable that is number r of each rod's profile.
-    stock : the only values that can be built, ascending; None: all within the box.
-    common : whether adding the same to all of them multiplies every stiffness alike.
+    Args:
+        variable_of: (m, r) variable that is number r of each rod's profile.
     """
 
     structure: Structure
@@ -47,36 +42,14 @@ class Profiles:
     common: bool = False
 
     def image(self, by: Operation) -> Image:
-        """Where an operation maps the variables."""
         index = np.empty(len(self.box.start), dtype=np.intp)
         index[self.variable_of] = self.variable_of[by.rods]
         return Image(index, np.ones(len(index)))
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid whose rods have these profiles.
-
-        Parameters
-        ----------
-        values : (n,) the design.
-        """
-        return replace(grid, mesh=grid.mesh.with_profiles(self.of_rods(values)))
-
-    def of_rods(self, values: Floats) -> tuple[Profile, ...]:
-        """The profile of each rod.
-
-        Parameters
-        ----------
-        values : (n,) the design.
-        """
-        return self._profiles(values[self.variable_of])
+        return replace(grid, mesh=grid.mesh.with_profiles(self._profiles(values[self.variable_of])))
 
     def change(self, values: Floats) -> Change:
-        """What a design does.
-
-        Parameters
-        ----------
-        values : (n,) the design.
-        """
         structure, numbers = self.structure, values[self.variable_of]
         none = Change.none(len(structure.mesh.edges), len(structure.held), len(values))
         rods, rows, columns, entries = structure.mesh.edge_rods, list[Ints](), list[Ints](), list[Floats]()
@@ -109,29 +82,17 @@ class Profiles:
 class Taper:
     """The bending stiffness changes along rods, between that of their section and a part of it.
 
-    Parameters
-    ----------
-    ratio : of the largest to the smallest EI that is allowed [-].
-    per : a profile for the whole shell, for each family, or for each rod.
-    stations : at which EI is chosen, from an end of a rod to its middle.
-    varies : what of the section is changed, see `Profile`.
-
-    Raises
-    ------
-    InputError : the ratio is not larger than 1, or there are fewer than two stations.
+    Args:
+        ratio: of the largest to the smallest EI that is allowed [-].
+        per: a profile for the whole shell, for each family, or for each rod.
+        stations: at which EI is chosen, from an end of a rod to its middle.
+        varies: what of the section is changed, see `Profile`.
     """
 
     ratio: float = 8.0
-    per: Per = "shell"
+    per: _Per = "shell"
     stations: int = 5
     varies: Varies = "size"
-
-    def __post_init__(self) -> None:
-        choice("per", self.per, get_args(Per))
-        if not self.ratio > 1.0:
-            raise InputError(f"the ratio of a taper must be larger than 1, not {self.ratio}")
-        if not self.stations >= 2:
-            raise InputError(f"a taper needs 2 stations or more from end to middle, not {self.stations}")
 
     name = "taper"
 
@@ -145,36 +106,24 @@ class Taper:
         else:
             group = np.arange(len(rods))
         variable_of = self.stations * group[:, None] + np.arange(self.stations)
-        count, half = int(variable_of.max()) + 1, 0.5 * np.log(self.ratio)
-        zero = np.zeros(count)
-        box = Box(zero, zero - half, zero + half, zero + 1.0)
-        return Profiles(
-            structure,
-            variable_of,
-            lambda logs: Profile.symmetric(np.exp(logs).tolist(), varies=self.varies),
-            box,
-            common=True,
-        )
+        box = Box.about_zero(int(variable_of.max()) + 1, 0.5 * np.log(self.ratio), 1.0)
+
+        def tapered(logs: Floats) -> Profile:
+            return Profile.symmetric(np.exp(logs).tolist(), varies=self.varies)
+
+        return Profiles(structure, variable_of, tapered, box, common=True)
 
 
 @dataclass(frozen=True)
 class DoubleLaths:
-    """Two equal laths on each other over the middle of every rod; they slip.
-
-    Parameters
-    ----------
-    least, most : share of each rod's length that is double [-].
-    """
-
-    least: float = DOUBLE[0]
-    most: float = DOUBLE[1]
+    """Two equal laths on each other over the middle of every rod; they slip."""
 
     name = "double"
 
     def on(self, structure: Structure) -> Profiles:
-        """The share, one for all rods."""
+        """The share of each rod's length that is double, one for all rods."""
         zero = np.zeros((len(structure.mesh.grid.rods), 1), dtype=np.intp)
-        box = Box(*np.array([[0.5], [self.least], [self.most], [0.3]]))
+        box = Box(*np.array([[0.5], [DOUBLE[0]], [DOUBLE[1]], [0.3]]))
         return Profiles(structure, zero, lambda share: Profile.double(float(share[0])), box)
 
 
@@ -183,48 +132,26 @@ RENARD = (0.63, 0.71, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6)  # preferred numbers,
 
 @dataclass(frozen=True)
 class Sections:
-    """One of several sizes in stock for each rod, which is the same from end to end.
-
-    Parameters
-    ----------
-    stock : sizes that are available, of the length of the section that varies: of a round rod its diameter [m]; None:
-        those of the rod's own size times preferred numbers from 0.63 to 1.6.
-    varies : what of the section is changed, see `Profile`.
-    """
-
-    stock: tuple[float, ...] | None = None
-    varies: Varies = "size"
+    """One of several sizes in stock for each rod, the same from end to end: its own times the numbers of `RENARD`."""
 
     name = "sections"
 
     def on(self, structure: Structure) -> Profiles:
         """The logarithm of the factor on EI of each rod.
 
-        Raises
-        ------
-        InputError : fewer than two sizes; the section has no such size.
+        Raises:
+            InputError: the section has no size.
         """
-        given = sizes(structure.rod, self.varies, np.ones(1))
-        if given is None:
-            raise InputError("sections of stock vary the size of a section: this rod has none; use taper")
-        wanted = given[0] * np.array(RENARD) if self.stock is None else np.array(sorted(self.stock))
-        if len(wanted) < 2 or wanted[0] <= 0:
-            raise InputError(f"sections of stock are two positive sizes or more in m, not {self.stock}")
         table = np.linspace(-6.0, 6.0, 601)  # of log EI; a size is a power of EI, and so are the values in between
-        stock = np.interp(np.log(wanted), np.log(_sizes(structure.rod, self.varies, table)), table)
-        count = len(structure.mesh.grid.rods)
-        zero = np.zeros(count)
-        box = Box(zero + np.clip(0.0, stock[0], stock[-1]), zero + stock[0], zero + stock[-1], zero + 1.0)
+        first, others = (sizes(structure.rod, "size", np.exp(logs)) for logs in (np.zeros(1), table))
+        if first is None or others is None:
+            raise InputError("sections of stock vary the size of a section: this rod has none; use taper")
+        stock = np.interp(np.log(first * RENARD), np.log(others), table)
+        zero = np.zeros(len(structure.mesh.grid.rods))
 
         def uniform(log: Floats) -> Profile:
             factor = float(np.exp(log[0]))
-            return Profile((0.0, 1.0), (factor, factor), self.varies)
+            return Profile((0.0, 1.0), (factor, factor))
 
-        return Profiles(structure, np.arange(count)[:, None], uniform, box, stock)
-
-
-def _sizes(rod: Rod, varies: Varies, logarithms: Floats) -> Floats:
-    """(n,) sizes [m] by the logarithm of the factor on EI."""
-    found = sizes(rod, varies, np.exp(logarithms))
-    assert found is not None
-    return found
+        box = Box(zero, zero + stock[0], zero + stock[-1], zero + 1.0)
+        return Profiles(structure, np.arange(len(zero))[:, None], uniform, box, stock)

@@ -14,7 +14,7 @@ from rodshell.refining.objectives import Objective, residuals, slopes
 from rodshell.refining.structure import Point
 from rodshell.refining.variables import Design
 
-REPAIRS = 4
+_REPAIRS = 4
 GAIN = 1e-3  # relative decrease of the sum of squares for which a size is changed
 PARTS = (1, 2, 4)  # the way to the rounded design, in so many steps where fewer do not lead there
 
@@ -25,22 +25,18 @@ def rounded(
     objectives: Sequence[Objective],
     allows: Callable[[Point], bool],
 ) -> tuple[Point | None, int]:
-    """The best design of sizes of stock near one that was found.
+    """The best design of sizes of stock near one with values in between that was found.
 
-    Parameters
-    ----------
-    variables : some of them with a list of values.
-    found : the design with values in between.
-    allows : limits that a design must keep.
+    Args:
+        allows: limits that a design must keep.
 
-    Returns
-    -------
-    The design, or None where none near it is stable and allowed; and the number of factorisations.
+    Returns:
+        The design, or None where none near it is stable and allowed; and the number of factorisations.
     """
     stock = variables.stock
     here, made = _towards(variables, found, nearest(stock, found.values))
     best = here if here is not None and allows(here) else None
-    for _ in range(REPAIRS):
+    for _ in range(_REPAIRS):
         if here is None:
             break
         made += 1
@@ -57,13 +53,7 @@ def rounded(
 
 
 def nearest(stock: Sequence[Floats | None], values: Floats) -> Floats:
-    """(n,) the nearest values that are available.
-
-    Parameters
-    ----------
-    stock : of each variable, or None.
-    values : (n,) of the variables.
-    """
+    """(n,) the nearest values that are available; of variables without stock their own."""
     chosen = [
         value if list_ is None else float(list_[np.argmin(np.abs(list_ - value))])
         for list_, value in zip(stock, values.tolist(), strict=True)
@@ -74,11 +64,10 @@ def nearest(stock: Sequence[Floats | None], values: Floats) -> Floats:
 def repaired(stock: Sequence[Floats | None], values: Floats, r: Floats, jacobian: Floats) -> Floats:
     """(n,) values that make the sum of squares of a linear model small, each at most one in its list away.
 
-    Parameters
-    ----------
-    stock : of each variable, or None for those that stay.
-    values : (n,) now, in their lists.
-    r, jacobian : (q,) residuals and (q, n) their slopes there.
+    Args:
+        stock: of each variable, or None for those that stay.
+        values: (n,) now, in their lists.
+        r, jacobian: (q,) residuals and (q, n) their slopes there.
     """
     result, left = values.copy(), r.copy()
     open_ = {k for k, list_ in enumerate(stock) if list_ is not None}

@@ -9,9 +9,11 @@ from scipy.sparse import csr_array
 from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.popup import PopUp
+from rodshell.formfinding.trim import Boundary, Footprint
 from rodshell.geometry.curves import on_curve
 from rodshell.joints import Joint
 from rodshell.layout import GridMesh
+from rodshell.model import Shell
 from rodshell.model.edge_properties import LENGTH, EdgeProperties
 from rodshell.model.rod_sections import RodSections
 from rodshell.refining.change import Change
@@ -19,6 +21,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.continuation import Continuation
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.path import farthest
+from rodshell.solve.problem import Problem
 from rodshell.solve.sensitivity import Parameters, Response, Sensitivity
 from rodshell.solve.tangent import Modes
 from rodshell.targets import Target
@@ -26,7 +29,7 @@ from rodshell.targets import Target
 MOST_ITERATIONS = 10  # from a predicted state
 STRAYED = 0.05  # of the length: an equilibrium further from the prediction may be another one
 SMALLEST_STEP = 0.01  # of a load
-FALLEN = 0.2  # of the length: a step of the load in which a node moves further is a fall
+_FALLEN = 0.2  # of the length: a step of the load in which a node moves further is a fall
 MODES = 3  # of which the lowest may become the lowest of all
 
 
@@ -34,12 +37,11 @@ MODES = 3  # of which the lowest may become the lowest of all
 class Structure:
     """A popped-up shell, its target, and the properties of its edges before any design.
 
-    Parameters
-    ----------
-    popped : the shell to be refined.
-    rod : section and material of its rods, which have no profiles.
-    weight : factor on the shell's own weight under which it is wanted there [-]; 0: without it.
-    dead_loads : (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
+    Args:
+        popped: the shell to be refined.
+        rod: section and material of its rods, which have no profiles.
+        weight: factor on the shell's own weight under which it is wanted there [-]; 0: without it.
+        dead_loads: (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
     """
 
     popped: PopUp
@@ -84,9 +86,8 @@ class Structure:
     def stiffness(self, mesh: GridMesh) -> Floats:
         """(e, 4) EA [N], EI1, EI2 and GJ [N m2] of the edges of a mesh.
 
-        Parameters
-        ----------
-        mesh : of the same rods, with or without profiles.
+        Args:
+            mesh: of the same rods, with or without profiles.
         """
         sections = RodSections.of(mesh, [self.rod] * len(mesh.grid.rods))
         return np.column_stack([sections.stretch, sections.edges])
@@ -133,22 +134,38 @@ class Structure:
 
     @cached_property
     def span_edges(self) -> Ints:
-        """(e,) number of the span between joints that each edge belongs to."""
-        mesh = self.mesh
-        joint = np.zeros(mesh.node_count, dtype=bool)
-        joint[mesh.joint_pairs.ravel()] = True
-        rods, edges = mesh.edge_rods, mesh.edges
-        begins = np.append(True, (rods[1:] != rods[:-1]) | joint[edges[1:, 0]])
-        return np.cumsum(begins) - 1
+        """(e,) as `spans`."""
+        return spans(self.mesh)
+
+
+def rebuilt(like: PopUp, mesh: GridMesh, boundary: Boundary, rod: Rod, joint: Joint, near: Equilibrium) -> PopUp:
+    """A shell on another grid, with the load of an equilibrium near its own, from which it is solved.
+
+    Args:
+        like: the shell whose supports it has.
+        boundary: where its rods end.
+    """
+    shell = Shell.of(mesh, rod, clamped=like.support.holds_directions, joint=joint).with_frames_of(near.elements)
+    problem = Problem.of_shell(shell, boundary.points, pattern=near.problem.pattern)
+    found = find_equilibrium(replace(problem, load=near.problem.load), near.state, near.forces)
+    return PopUp(like.support, "draped", Footprint(mesh), boundary, shell.with_elements(found.elements), found)
+
+
+def spans(mesh: GridMesh) -> Ints:
+    """(e,) number of the span, between two joints or from a joint to an end, that each edge belongs to."""
+    joint = np.zeros(mesh.node_count, dtype=bool)
+    joint[mesh.joint_pairs.ravel()] = True
+    rods = mesh.edge_rods
+    begins = np.append(True, (rods[1:] != rods[:-1]) | joint[mesh.edges[1:, 0]])
+    return np.cumsum(begins) - 1
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
     """A design and its equilibrium.
 
-    Parameters
-    ----------
-    values : (n,) of the variables: the design.
+    Args:
+        values: (n,) of the variables: the design.
     """
 
     structure: Structure
@@ -212,14 +229,12 @@ class Point:
     def tried(self, values: Floats, change: Change) -> "tuple[Point | None, int]":
         """The equilibrium of another design, from this one's by first order.
 
-        Parameters
-        ----------
-        values : (n,) the other design.
+        Args:
+            values: (n,) the other design.
 
-        Returns
-        -------
-        The point, or None where Newton's method does not lead to a stable equilibrium next to the prediction; and the
-        number of factorisations that this took.
+        Returns:
+            The point, or None where Newton's method does not lead to a stable equilibrium next to the prediction; and
+            the number of factorisations that this took.
         """
         step, here = values - self.values, self.equilibrium
         response, held = self.response, self.structure.held
@@ -240,14 +255,12 @@ class Point:
 def under_load(unloaded: Equilibrium, load: Floats) -> tuple[Equilibrium | None, int]:
     """The equilibrium under a load that grows from that of the problem, by stable equilibria.
 
-    Parameters
-    ----------
-    unloaded : a stable equilibrium, with or without a load.
-    load : (N, 3) in the end [N].
+    Args:
+        unloaded: a stable equilibrium, with or without a load.
+        load: (N, 3) in the end [N].
 
-    Returns
-    -------
-    The equilibrium, None where the shell falls before; and the number of factorisations.
+    Returns:
+        The equilibrium, None where the shell falls before; and the number of factorisations.
     """
     first = np.zeros_like(load) if unloaded.problem.load is None else unloaded.problem.load
     here, path, made = unloaded, Continuation(0.0, 1.0, 1.0, SMALLEST_STEP), 0
@@ -256,7 +269,7 @@ def under_load(unloaded: Equilibrium, load: Floats) -> tuple[Equilibrium | None,
         problem = replace(here.problem, load=(1.0 - there) * first + there * load)
         found = find_equilibrium(problem, here.state, here.forces, most_iterations=2 * MOST_ITERATIONS)
         made += found.report.factorizations
-        if found.report.stable and farthest(here, found) <= FALLEN * problem.length:
+        if found.report.stable and farthest(here, found) <= _FALLEN * problem.length:
             path.accept()
             here = found
         else:

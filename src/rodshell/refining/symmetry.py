@@ -17,19 +17,18 @@ from scipy.spatial import cKDTree
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.layout import GridMesh
 
-SAME_FLAT, SAME_SHAPE = 1e-6, 1e-4  # of the size: rods are cut to 1e-6, and drapes converge to 1e-5
+_SAME_FLAT, SAME_SHAPE = 1e-6, 1e-4  # of the size: rods are cut to 1e-6, and drapes converge to 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Operation:
     """A symmetry of a mesh.
 
-    Parameters
-    ----------
-    nodes : (n,) the node that each node is mapped to.
-    rods : (m,) the rod that each rod is mapped to.
-    reversed : (m,) whether it is mapped end to start.
-    turn : (2, 2) rotation or reflection of the plane.
+    Args:
+        nodes: (n,) the node that each node is mapped to.
+        rods: (m,) the rod that each rod is mapped to.
+        reversed: (m,) whether it is mapped end to start.
+        turn: (2, 2) rotation or reflection of the plane.
     """
 
     nodes: Ints
@@ -53,10 +52,9 @@ class Operation:
 class Image:
     """Where an operation maps variables.
 
-    Parameters
-    ----------
-    index : (n,) the variable that each is mapped to.
-    sign : (n,) 1, or -1 where it is mapped to the negative.
+    Args:
+        index: (n,) the variable that each is mapped to.
+        sign: (n,) 1, or -1 where it is mapped to the negative.
     """
 
     index: Ints
@@ -66,9 +64,8 @@ class Image:
 def symmetries(mesh: GridMesh, shape: Floats) -> tuple[Operation, ...]:
     """The symmetries of a flat grid that a shape shares; the identity is left out.
 
-    Parameters
-    ----------
-    shape : (n, 3) its popped-up nodes [m]; (n, 6) if the draped ones must have the symmetries, too.
+    Args:
+        shape: (n, 3) its popped-up nodes [m]; (n, 6) if the draped ones must have the symmetries, too.
     """
     centre = 0.5 * (mesh.flat.min(axis=0) + mesh.flat.max(axis=0)) * [1.0, 1.0, 0.0]
     flat, found = mesh.flat - centre, list[Operation]()
@@ -78,11 +75,11 @@ def symmetries(mesh: GridMesh, shape: Floats) -> tuple[Operation, ...]:
         for turn in (np.linalg.matrix_power(quarter, turns) @ part for part in (np.eye(2), mirror)):
             there = flat.copy()
             there[:, :2] = flat[:, :2] @ turn.T
-            rods = _rods_there(mesh, there, flat, SAME_FLAT * size)
+            rods = _rods_there(mesh, there, flat, _SAME_FLAT * size)
             if rods is None or np.array_equal(turn, np.eye(2)):
                 continue
             nodes = _nodes_there(mesh, *rods)
-            if nodes is None or np.abs(there - flat[nodes]).max() > SAME_FLAT * size:
+            if nodes is None or np.abs(there - flat[nodes]).max() > _SAME_FLAT * size:
                 continue
             if all(
                 _congruent(part, part[nodes]) < SAME_SHAPE * size for part in np.split(shape, shape.shape[1] // 3, 1)
@@ -119,9 +116,8 @@ def _nodes_there(mesh: GridMesh, rods: Ints, backwards: Bools) -> Ints | None:
 def ties(count: int, images: Sequence[Image]) -> csc_array:
     """(n, q) how each of n variables follows from q common values: see `variables.Tied`.
 
-    Parameters
-    ----------
-    images : where each symmetry maps them.
+    Args:
+        images: where each symmetry maps them.
     """
     every = np.arange(count)
     if not images:

@@ -19,10 +19,9 @@ from rodshell.refining.symmetry import Image, Operation, symmetries, ties
 class Grid:
     """A flat grid and where its rods end: what is built.
 
-    Parameters
-    ----------
-    mesh : the flat grid, its rods with their profiles.
-    boundary : where the rods end, and in which directions.
+    Args:
+        mesh: the flat grid, its rods with their profiles.
+        boundary: where the rods end, and in which directions.
     """
 
     mesh: GridMesh
@@ -33,11 +32,10 @@ class Grid:
 class Box:
     """Values of n variables.
 
-    Parameters
-    ----------
-    start : (n,) first values.
-    lower, upper : (n,) bounds.
-    scale : (n,) change that counts as one: the first step is not longer.
+    Args:
+        start: (n,) first values.
+        lower, upper: (n,) bounds.
+        scale: (n,) change that counts as one: the first step is not longer.
     """
 
     start: Floats
@@ -45,35 +43,18 @@ class Box:
     upper: Floats
     scale: Floats
 
+    @staticmethod
+    def about_zero(count: int, most: float, first: float) -> "Box":
+        """So many variables from -most to most, with one scale `first`."""
+        zero = np.zeros(count)
+        return Box(zero, zero - most, zero + most, zero + first)
+
 
 class Variables(Protocol):
-    """A set of variables on one shell."""
+    """The variables of a family on one shell; on a symmetric one they are `Tied`."""
 
     @property
     def box(self) -> Box: ...
-
-    def change(self, values: Floats) -> Change:
-        """What a design does, with its derivatives.
-
-        Parameters
-        ----------
-        values : (n,) of the variables.
-        """
-        ...
-
-    def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid built to a design.
-
-        Parameters
-        ----------
-        grid : before, or with what other variables have changed.
-        values : (n,) of the variables.
-        """
-        ...
-
-
-class Untied(Variables, Protocol):
-    """The variables of a family, which know their symmetric images, and what of them is available."""
 
     @property
     def stock(self) -> Floats | None:
@@ -89,19 +70,35 @@ class Untied(Variables, Protocol):
         """Where a symmetry maps the variables."""
         ...
 
+    def change(self, values: Floats) -> Change:
+        """What a design does, with its derivatives.
+
+        Args:
+            values: (n,) of the variables.
+        """
+        ...
+
+    def applied(self, grid: Grid, values: Floats) -> Grid:
+        """The grid built to a design.
+
+        Args:
+            grid: before, or with what other variables have changed.
+            values: (n,) of the variables.
+        """
+        ...
+
 
 class Family(Protocol):
     """A kind of variables that a user chooses.
 
-    Attributes
-    ----------
-    name : as users write it.
+    Attributes:
+        name: as users write it.
     """
 
     @property
     def name(self) -> str: ...
 
-    def on(self, structure: Structure) -> Untied:
+    def on(self, structure: Structure) -> Variables:
         """The variables on a shell."""
         ...
 
@@ -110,12 +107,11 @@ class Family(Protocol):
 class Tied:
     """Variables that are equal, or opposite, to others: those of a symmetric design.
 
-    Parameters
-    ----------
-    ties : (n, q) with one entry, 1 or -1, in each row: which of the q common values each variable has.
+    Args:
+        ties: (n, q) with one entry, 1 or -1, in each row: which of the q common values each variable has.
     """
 
-    whole: Untied
+    whole: Variables
     ties: csc_array
 
     @property
@@ -143,7 +139,7 @@ class Tied:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Several sets of variables, one after the other."""
+    """The variables of several families, one after the other; `box`, `change` and `applied` as of `Variables`."""
 
     parts: Sequence[Tied]
 
@@ -160,12 +156,7 @@ class Design:
         return [part.whole.stock for part in self.parts for _ in part.box.start]
 
     def stiffer(self, values: Floats, logarithm: float) -> Floats:
-        """Values with which every stiffness is multiplied by a common factor; unchanged where they cannot do that.
-
-        Parameters
-        ----------
-        values : (n,) of the variables.
-        """
+        """(n,) values that multiply every stiffness by a common factor; unchanged where they cannot do that."""
         return np.concatenate([some + logarithm * part.whole.common for part, some in self._split(values)])
 
     def change(self, values: Floats) -> Change:

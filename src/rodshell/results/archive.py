@@ -22,9 +22,10 @@ from rodshell.errors import InputError, OutputError
 from rodshell.results.folder import ResultFolder, reading
 from rodshell.results.manifest import inside
 from rodshell.results.results import Results, Verdict, read_results
-from rodshell.results.states import SHELLS, packed, read_states
+from rodshell.results.states import DRAPED, POPPED, packed, read_states, shells_among
 from rodshell.results.summary import summary_text
 from rodshell.results.verdict import CONVERGED, verdict_of
+from rodshell.rods.supports import PINNED, finals_first
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import file_path, instance, mapping
 
@@ -39,9 +40,8 @@ PARTS = ".gltf"
 def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> dict[str, bytes]:
     """The contents of the files that a case names and that are to be kept with its result, by the path in the case.
 
-    Parameters
-    ----------
-    where : the place of a file by its path in the case; None for one that is not read.
+    Args:
+        where: the place of a file by its path in the case; None for one that is not read.
     """
     found, left = dict[str, bytes](), ALL_COPIES
     for name in _names(case_toml):
@@ -55,13 +55,7 @@ def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> d
 
 
 def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tuple[str, dict[str, bytes]]:
-    """The case as it is kept in a result folder, its paths relative to that, and the files to be written with it.
-
-    Parameters
-    ----------
-    case_toml : with paths as they were given.
-    inputs : contents of files that are copied, by these paths.
-    """
+    """The case as it is kept in a result folder, its paths relative to that, and the files to be written with it."""
     copies, new_names = dict[str, bytes](), dict[str, str]()
     for name in _names(case_toml):
         if name in inputs:
@@ -73,12 +67,7 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
 
 
 def shown_case(case_toml: str, inputs: Mapping[str, bytes]) -> str:
-    """The case on a page that goes to others: paths as they are kept, of files that are not copied the names alone.
-
-    Parameters
-    ----------
-    case_toml, inputs : as of `kept_case`.
-    """
+    """The case on a page that goes to others: paths as they are kept, of files that are not copied the names alone."""
     kept, copies = kept_case(case_toml, inputs, Path.cwd())
     return _renamed(kept, {name: Path(name).name for name in _names(kept) if name not in copies})
 
@@ -87,10 +76,8 @@ def opened_case(case_toml: str, folder: Path, file: Callable[[str], Path]) -> tu
     """The case of a result folder and the contents of its inputs; files that were not copied are named absolutely, and
     not read: a case may come from somebody who wants to have them in a report.
 
-    Parameters
-    ----------
-    case_toml : text of the case; folder : of the result.
-    file : the place of a file in it by its name.
+    Args:
+        file: the place of a file in the folder by its name.
     """
     inputs = read_inputs(case_toml, lambda name: file(name) if inside(name) and name.startswith(f"{FOLDER}/") else None)
     outside = {name: str((folder / name).absolute()) for name in _names(case_toml) if name not in inputs}
@@ -98,12 +85,8 @@ def opened_case(case_toml: str, folder: Path, file: Callable[[str], Path]) -> tu
 
 
 def input_hash(case_toml: str, inputs: Mapping[str, bytes]) -> str:
-    """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are and however called.
-
-    Parameters
-    ----------
-    case_toml, inputs : as of `kept_case`; a file that is not copied counts as empty.
-    """
+    """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are and however called; one that
+    is not copied counts as empty."""
     names = _names(case_toml)
     digest = hashlib.sha256(_renamed(case_toml, {name: str(k) for k, name in enumerate(names)}).encode())
     for name in names:
@@ -157,15 +140,14 @@ T = TypeVar("T")
 class Archive:
     """A result as it is kept on disk.
 
-    Parameters
-    ----------
-    results : the content of result.json, SI units.
-    states : the content of states.npz: "flat", "draped", "popped_pinned", "popped_clamped" (n, 3) node
-        positions [m]; "gap_draped", "gap_pinned", "gap_clamped" (n,) signed distances to the target [m];
-        "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
-        missing.
-    case_toml : the full resolved input; empty if there was none.
-    inputs : contents of the files that it names and that are kept with the result, by their path in it.
+    Args:
+        results: the content of result.json, SI units.
+        states: the content of states.npz: "flat", "draped", "popped_pinned", "popped_clamped" (n, 3) node
+            positions [m]; "gap_draped", "gap_pinned", "gap_clamped" (n,) signed distances to the target [m];
+            "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
+            missing.
+        case_toml: the full resolved input; empty if there was none.
+        inputs: contents of the files that it names and that are kept with the result, by their path in it.
     """
 
     results: Results
@@ -197,10 +179,9 @@ class Archive:
         }  # which is made again, and whose keys are functions that pickle does not find
 
     def __repr__(self) -> str:
-        shells = [name for name in SHELLS if name in self.states]
         return (
             f"<Archive {self.name}: {self.verdict.level}, {len(self.results.rods)} rods, "
-            f"{', '.join(shells) or 'no shell in space'}>"
+            f"{', '.join(shells_among(self.states)) or 'no shell in space'}>"
         )
 
     def summary(self) -> str:
@@ -220,29 +201,25 @@ class Archive:
 
     @property
     def final(self) -> str | None:
-        """The best state in space that there is: clamped, else pinned, else draped; where a solve stopped before it
-        converged only if there is no other."""
-        shells = [state for state in SHELLS if state in self.states]
-        return max(shells, key=lambda state: (not self.is_lost(state), SHELLS.index(state)), default=None)
+        """The best state in space that there is: on supports of one's own, else clamped, else pinned, else draped;
+        where a solve stopped before it converged only if there is no other."""
+        popped = [name.removeprefix(POPPED) for name in shells_among(self.states) if name != DRAPED]
+        shells = [*(POPPED + support for support in finals_first(popped)), *({DRAPED} & self.states.keys())]
+        return min(shells, key=self.is_lost, default=None)
+
+    @property
+    def deployed(self) -> str:
+        """The state that the stages of the deployment lead to."""
+        return POPPED + ((self.results.deployment.ends if self.results.deployment else None) or PINNED.name)
 
     def is_lost(self, state: str) -> bool:
-        """Whether a state is where the solve of a shell stopped before it converged.
-
-        Parameters
-        ----------
-        state : of `states`, such as "popped_pinned".
-        """
-        shells = {f"popped_{ends}": shell for ends, shell in self.results.pop_up.items()}
+        """Whether a state, such as "popped_pinned", is where the solve of a shell stopped before it converged."""
+        shells = {POPPED + ends: shell for ends, shell in self.results.pop_up.items()}
         return state in shells and shells[state].status not in (None, CONVERGED)
 
 
 def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
-    """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods.
-
-    Parameters
-    ----------
-    make : a function of an archive alone.
-    """
+    """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods."""
 
     @wraps(make)
     def kept(archive: Archive) -> T:
@@ -255,12 +232,7 @@ def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
 
 
 def archive_names(archive: Archive) -> list[str]:
-    """The names of the files that `put_archive` writes.
-
-    Parameters
-    ----------
-    archive : with or without a case.
-    """
+    """The names of the files that `put_archive` writes."""
     copies = kept_case(archive.case_toml, archive.inputs, Path())[1]
     return [*(name for name in ARCHIVE if name != "case.toml" or archive.case_toml), *copies]
 
@@ -268,13 +240,8 @@ def archive_names(archive: Archive) -> list[str]:
 def put_archive(archive: Archive, place: ResultFolder) -> None:
     """Stage result.json, case.toml, states.npz and the copied inputs in a folder.
 
-    Parameters
-    ----------
-    place : the folder in which the files are staged.
-
-    Raises
-    ------
-    OutputError : the folder cannot be written.
+    Raises:
+        OutputError: the folder cannot be written.
     """
     place.put("result.json", archive.results.text())
     if archive.case_toml:
@@ -287,10 +254,9 @@ def put_archive(archive: Archive, place: ResultFolder) -> None:
 def read(folder: str | os.PathLike[str]) -> Archive:
     """The archive of a result folder, of this version of rodshell or an earlier one, every value checked.
 
-    Raises
-    ------
-    InputError : `folder` is not a path. OutputError : there is no result, or it cannot be read; the sentence names the
-        file and the key.
+    Raises:
+        InputError: `folder` is not a path. OutputError : there is no result, or it cannot be read; the sentence names
+            the file and the key.
     """
     instance("folder", folder, str | os.PathLike, "the path of a folder")
     where = file_path("folder", folder)

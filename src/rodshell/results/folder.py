@@ -56,12 +56,11 @@ class ForeignFileError(OutputError):
 class ResultFolder:
     """A folder that is written into; nothing in it changes before `commit`.
 
-    Parameters
-    ----------
-    path : of the folder, absolute; stage : the hidden folder inside it, which is removed in the end.
-    force : whether files that rodshell did not write may be replaced where it has to write.
-    kept : after `commit`, files of an earlier result that somebody has changed since: they stay.
-    committed : whether the new result is in its place, also if the process was interrupted meanwhile.
+    Args:
+        path: of the folder, absolute; stage : the hidden folder inside it, which is removed in the end.
+        force: whether files that rodshell did not write may be replaced where it has to write.
+        kept: after `commit`, files of an earlier result that somebody has changed since: they stay.
+        committed: whether the new result is in its place, also if the process was interrupted meanwhile.
     """
 
     path: Path
@@ -76,16 +75,10 @@ class ResultFolder:
         return self.stage / NEW
 
     def put(self, name: str, content: str | bytes) -> None:
-        """Stage a file.
+        """Stage a file by its path within the folder; text is written as UTF-8.
 
-        Parameters
-        ----------
-        name : path of the file within the folder.
-        content : text, written as UTF-8, or bytes.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
+        Raises:
+            OutputError: it cannot be written.
         """
         file = self.new / name
         try:
@@ -97,9 +90,8 @@ class ResultFolder:
     def check(self, names: Iterable[str]) -> dict[str, Mark | None]:
         """What stands at `names` now, and at what they need.
 
-        Raises
-        ------
-        ForeignFileError : something that rodshell did not write, and that `force` does not allow to replace.
+        Raises:
+            ForeignFileError: something that rodshell did not write, and that `force` does not allow to replace.
         """
         marks = {name: mark(self.path, name) for name in names}
         strange = foreign(self.path, marks)
@@ -119,9 +111,8 @@ class ResultFolder:
 
         keep_others : leave files of an earlier result that are not staged, as parts of it.
 
-        Raises
-        ------
-        ForeignFileError : as of `check`; nothing was changed. OutputError : files cannot be moved.
+        Raises:
+            ForeignFileError: as of `check`; nothing was changed. OutputError : files cannot be moved.
         """
         try:
             staged = (file.relative_to(self.new).as_posix() for file in self.new.rglob("*") if file.is_file())
@@ -156,14 +147,13 @@ def open_folder(
 ) -> Iterator[ResultFolder]:
     """A folder to write into, made if need be, and as it was if nothing is committed.
 
-    Parameters
-    ----------
-    reserved : patterns (of `Path.glob`) of the names that will be written, to be asked for before a long computation.
+    Args:
+        reserved: patterns (of `Path.glob`) of the names that will be written, to be asked for before a long
+            computation.
 
-    Raises
-    ------
-    InputError : `folder` is empty, or no path. OutputError : it cannot be written. ForeignFileError : as of
-        `ResultFolder.check`, of `reserved`.
+    Raises:
+        InputError: `folder` is empty, or no path. OutputError : it cannot be written. ForeignFileError : as of
+            `ResultFolder.check`, of `reserved`.
     """
     if isinstance(folder, ResultFolder):
         yield folder
@@ -204,10 +194,6 @@ def reading(folder: str | os.PathLike[str]) -> Iterator[Callable[[str], Path]]:
     """Where each file of a result is, by name: in its folder, or still in the stage of a commit that was killed.
 
     What `reading` gives raises an OutputError for a name where something stands that is not a file, or leads outside.
-
-    Parameters
-    ----------
-    folder : with a result, or one that a killed process was writing.
     """
     path = Path(folder).expanduser()
     with _locked(path, shared=True):
@@ -292,12 +278,8 @@ def _is_mine(path: Path) -> bool:
 
 
 def _recover(path: Path, but: Path | None = None) -> None:
-    """Complete a commit that was killed, and remove the stages of processes that are gone.
-
-    Raises
-    ------
-    OutputError : the record of a commit is damaged, or another user's.
-    """
+    """Complete a commit that was killed, and remove the stages of processes that are gone; an OutputError says that the
+    record of a commit is damaged, or another user's."""
     for stage in _stages(path):
         if stage == but:
             continue
@@ -323,13 +305,8 @@ def _recover(path: Path, but: Path | None = None) -> None:
 
 @dataclass(frozen=True)
 class _Commit:
-    """What is to be done so that a new result stands in its folder, as commit.json of its stage says it.
-
-    Parameters
-    ----------
-    files : names of files that go from the stage into the folder; removes : of files that go from the folder.
-    replaces : the files and links that stood at these names, or where a folder has to be, and may go.
-    """
+    """What is to be done so that a new result stands in its folder, as commit.json of its stage says it: which files go
+    into the folder and which out of it, and what stood there, or where a folder has to be, and may go."""
 
     files: tuple[str, ...]
     removes: tuple[str, ...]
@@ -337,12 +314,7 @@ class _Commit:
 
 
 def _record(stage: Path) -> _Commit:
-    """What is left to be done for a stage.
-
-    Raises
-    ------
-    OutputError : not what a writer wrote: the sentence names the stage, which is to be removed.
-    """
+    """What is left to be done for a stage; an OutputError names a stage that is not as a writer left it."""
     try:
         content = own_table(stage, RECORD)
         files, removes, replaces = (content.get(name) for name in ("files", "removes", "replaces"))
@@ -395,12 +367,8 @@ def _locked(path: Path, *, shared: bool = False) -> Iterator[None]:
 
 
 def _lock(path: Path, *, shared: bool = False, wait: bool = True) -> int | None:
-    """A descriptor that holds the folder's lock until it is closed; None on a file system without locks.
-
-    Raises
-    ------
-    BlockingIOError : another process holds it, and `wait` is False.
-    """
+    """A descriptor that holds the folder's lock until it is closed; None on a file system without locks. A
+    BlockingIOError says that another process holds it, if `wait` is False."""
     if fcntl is None or not path.is_dir():
         return None
     try:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks import Bending as BendingCheck
 from rodshell.checks import Checks
+from rodshell.checks.bending import Bending as BendingCheck
 from rodshell.checks.bending import worst
 from rodshell.fabrication.fabricate import Fabricated
 from rodshell.figures.checks import Bending, Contact, WorstBent
@@ -20,8 +20,7 @@ from rodshell.loads.strength import Limits
 from rodshell.results.results import Drawings, Results
 from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import verdict
-
-PREFERRED: tuple[Ends, Ends] = ("clamped", "pinned")  # the final shape is the first of these that is there
+from rodshell.rods.supports import finals_first
 
 
 def sharpest(checks: Checks) -> Floats | None:
@@ -31,8 +30,8 @@ def sharpest(checks: Checks) -> Floats | None:
 
 
 def final_ends(checks: Checks) -> Ends | None:
-    """The end condition of the final shape: clamped if that was checked, else pinned; None: neither was."""
-    return next((ends for ends in PREFERRED if ends in checks.bending), None)
+    """The support of the final shape; None: none was checked."""
+    return next(iter(finals_first(checks.bending)), None)
 
 
 def checked_results(
@@ -49,15 +48,12 @@ def checked_results(
 ) -> Results:
     """The results of a form with all that was checked and made: more of each rod, and tables of the checks.
 
-    Parameters
-    ----------
-    results : of the form, before it was checked.
-    mesh : of the flat grid, its rods in the order of the results.
-    strength : of the rods' material [Pa]; None: not known.
-    limits : design strengths of the rods, by which utilisation is counted where they are known.
-    net : (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
-    shear_strength : of the rods' material [Pa]; None: not known.
-    strength_of : the preset material that the strengths are of, where they were not given.
+    Args:
+        mesh: of the flat grid, its rods in the order of the results.
+        strength, shear_strength: of the rods' material [Pa]; None: not known.
+        limits: design strengths of the rods, by which utilisation is counted where they are known.
+        net: (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
+        strength_of: the preset material that the strengths are of, where they were not given.
     """
     material = results.rod.material if results.rod else None
     anisotropic = material is not None and material.shear is not None  # as timber is
@@ -87,14 +83,8 @@ def checked_results(
 
 
 def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod_chosen: Iterable[str] = ()) -> Results:
-    """The results with what their drawings say, and with their verdict.
-
-    Parameters
-    ----------
-    drawings : paper, project and the like, see `Drawings`.
-    name : of the result, if not its target's.
-    rod_chosen : which of the rod's "material" and "section" were chosen to fit.
-    """
+    """The results with what their drawings say, and with their verdict; `rod_chosen` is which of the rod's "material"
+    and "section" were chosen to fit."""
     found = results.changed(drawings=Drawings(**drawings), name=name or results.name)
     chosen = dict.fromkeys(rod_chosen, True)
     if chosen and found.rod:
@@ -106,10 +96,8 @@ def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod
 def checked_states(checks: Checks, stretch_stiffness: float) -> dict[str, NDArray[Any]]:
     """States of the checks: curvature, stress and normal force at each entry of `rod_nodes`, and the deployment.
 
-    Parameters
-    ----------
-    checks : of all shells; states that were not checked are left out.
-    stretch_stiffness : EA of the rods [N].
+    Args:
+        stretch_stiffness: EA of the rods [N].
     """
     states: dict[str, NDArray[Any]] = {}
     for ends, bent in checks.bending.items():
@@ -210,12 +198,7 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
 
 
 def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Results:
-    """The results of a form with those under loads.
-
-    Parameters
-    ----------
-    mesh : of the flat grid, its rods in the order of the results.
-    """
+    """The results of a form with those under loads."""
     found = results.changed(
         loads={
             name: {

@@ -5,6 +5,7 @@ This is the only file of the folder that knows the forms: in one piece, in patch
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
+from importlib.metadata import version
 from math import degrees
 from platform import python_version
 from typing import TYPE_CHECKING, Any, get_args
@@ -14,51 +15,25 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.checks import Checks
+from rodshell.figures import form as figures
 from rodshell.figures.findings import said
-from rodshell.figures.form import (
-    Agreement,
-    Drape,
-    Dropped,
-    GapBefore,
-    Gate,
-    Joint,
-    Layout,
-    Meeting,
-    Net,
-    NetDeviation,
-    Patch,
-    PopUp,
-    Refinement,
-    Rest,
-    Rod,
-    RodJoint,
-    RodType,
-    Seam,
-    SeamForces,
-    Solve,
-    Stiffness,
-    StrongBending,
-    Target,
-)
 from rodshell.figures.records import Ends, plain
-from rodshell.formfinding import Footprint, PatchForm, Trimmed
+from rodshell.formfinding import Footprint, Stages, Trimmed
 from rodshell.formfinding.bound_drape import shape_of_net
 from rodshell.formfinding.finite_sections import is_flat
-from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.seams import End
+from rodshell.formfinding.seams import End, Seams
 from rodshell.formfinding.trim import ends_past_net
 from rodshell.joints import joint_parameters
 from rodshell.kernels import description
-from rodshell.layout import FlatGrid, Profile
+from rodshell.layout import Profile
 from rodshell.nets import ChebyshevNet
 from rodshell.results.results import Results
-from rodshell.rods.joints import Joint as JointModel
 from rodshell.rods.materials import PRESETS
-from rodshell.rods.section import Rod as RodModel
+from rodshell.rods.section import Rod
 from rodshell.rods.varied import sizes
-from rodshell.targets import Target as TargetSurface
+from rodshell.targets import Target
 from rodshell.targets.surface_mesh import surface_mesh
-from rodshell.version import __version__, version_of
+from rodshell.version import __version__
 
 if TYPE_CHECKING:
     from rodshell.refining.acceptance import Refined
@@ -66,63 +41,45 @@ if TYPE_CHECKING:
 States = dict[str, NDArray[Any]]
 
 
-def results_of(stages: PatchForm | PatchedForm) -> Results:
-    """The results of a form, before it is checked; those of patches are of one shell, with `patches` and `seams`.
-
-    Parameters
-    ----------
-    stages : of a form in one piece, in patches, or from a table of rods.
-    """
+def results_of(stages: Stages) -> Results:
+    """The results of a form, before it is checked; those of patches are of one shell, with `patches` and `seams`."""
     known = {
         "rod": rod_type(stages.rod),
-        "joint": _joint(stages.joint),
+        "joint": figures.Joint.model_validate(plain(joint_parameters(stages.joint))),
         **_grid(stages.footprint, stages.boundary.points, stages.dropped, stages.rod),
         "pop_up": _pop_ups(stages),
     }
-    if isinstance(stages, PatchForm) and stages.from_table:
+    if stages.from_table:
         return Results(**_head("rods", stages.status, stages.warnings), **known)
     known |= {
-        "layout": Layout.model_validate(stages.layout.parameters()),
+        "layout": figures.Layout.model_validate(stages.layout.parameters()),
         "end_tangents": stages.boundary.tangents.tolist(),
         "agreement": _agreements(stages),
     }
-    if isinstance(stages, PatchedForm):
-        nets = [laid.net for laid in stages.patch_nets.values()]
+    known |= {
+        "target": _target(stages.target, flat=is_flat(stages.on_target, stages.rod)),
+        "drape": _drape_of_all([_drape(part.trimmed) for part in stages.parts]),
+    }
+    if nets := [part.draped.net for part in stages.parts if part.draped.net is not None]:
         tightest = min(nets, key=lambda net: net.min_angle)
-        known |= {
-            "target": _target(stages.target, flat=is_flat(stages.draped, stages.rod)),
-            "patches": tuple(_patch(stages, name) for name in stages.patches),
-            "seams": tuple(_seam(stages, k) for k in range(len(stages.seams))),
-            "net": _net(tightest).changed(error_estimate=max(net.error_estimate for net in nets)),
-            "drape": _drape_of_all([_drape(found.trimmed) for found in stages.patches.values()]),
-        }
+        known["net"] = _net(tightest).changed(error_estimate=max(net.error_estimate for net in nets))
+    if stages.seams is None:
+        grid = stages.footprint.mesh.grid
+        known["crossings_without_joint"] = len(grid.meetings()) - len(grid.crossings)
     else:
-        known |= {
-            "target": _target(stages.target, flat=is_flat(stages.trimmed.positions, stages.rod)),
-            "crossings_without_joint": _without_joint(stages.footprint.mesh.grid),
-            "drape": _drape(stages.trimmed),
-        }
-        if stages.draped.net is not None:
-            known["net"] = _net(stages.draped.net)
+        known["patches"] = tuple(_patch(stages, stages.seams, k) for k in range(len(stages.patches)))
+        known["seams"] = tuple(_seam(stages.seams, k) for k in range(len(stages.seams.lines)))
     return Results(**_head(stages.target.name, stages.status, stages.warnings), **known)
 
 
-def states_of(stages: PatchForm | PatchedForm) -> States:
-    """The states of a form, before it is checked.
-
-    Parameters
-    ----------
-    stages : as of `results_of`.
-    """
+def states_of(stages: Stages) -> States:
+    """The states of a form, before it is checked."""
     mesh = stages.footprint.mesh
     states: States = {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
-    if isinstance(stages, PatchedForm):
-        draped: Floats | None = stages.draped
-        gaps = [found.target.gap(found.trimmed.positions).distance for found in stages.patches.values()]
-        states["gap_draped"] = np.concatenate(gaps)
-    elif (draped := stages.boundary.draped) is not None and not stages.from_table:
-        states["gap_draped"] = stages.target.gap(draped).distance - mesh.heights
-    if "gap_draped" in states and draped is not None:
+    if (draped := stages.boundary.draped) is not None and not stages.from_table:
+        on_target = [(part.target, part.boundary.draped) for part in stages.parts]
+        gaps = [target.gap(there).distance for target, there in on_target if there is not None]
+        states["gap_draped"] = np.concatenate(gaps) - mesh.heights
         points, faces = surface_mesh(stages.target, draped)  # of the target under the shell, for pictures
         states |= {
             "draped": draped,
@@ -136,47 +93,37 @@ def states_of(stages: PatchForm | PatchedForm) -> States:
     return states
 
 
-def with_seam_forces(results: Results, form: PatchedForm, checks: Checks) -> Results:
-    """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces.
-
-    Parameters
-    ----------
-    checks : with the reactions of all patches, rod by rod.
-    """
-    row = {rod.name: k for k, rod in enumerate(form.footprint.rods)}
-    seams = []
+def with_seam_forces(results: Results, seams: Seams, checks: Checks) -> Results:
+    """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces."""
+    row = {rod.id: k for k, rod in enumerate(results.rods)}
+    forced = list[figures.Seam]()
     for k, seam in enumerate(results.seams):
-        ends = [[_end_index(row, end) for end in meeting.ends] for meeting in form.meetings if meeting.seam == k]
+        ends = [[_end_index(row, end) for end in meeting.ends] for meeting in seams.meetings if meeting.seam == k]
         index = np.array(ends, dtype=np.intp).reshape(-1, 2)
         forces = {support: _seam_forces(held.forces[index].sum(axis=1)) for support, held in checks.reactions.items()}
-        seams.append(seam.changed(forces=forces))
-    return results.changed(seams=tuple(seams))
+        forced.append(seam.changed(forces=forces))
+    return results.changed(seams=tuple(forced))
 
 
 def with_refinement(results: Results, found: "Refined") -> Results:
-    """The same results, with how their form was refined; a refusal is a warning.
-
-    Parameters
-    ----------
-    results : of the form after it.
-    """
-    gates: tuple[Gate, ...] = get_args(Gate)
+    """The same results, with how their form was refined; a refusal is a warning."""
+    gates: tuple[figures.Gate, ...] = get_args(figures.Gate)
     refused = [] if found.changed else [said("not_refined", found.ends, why=found.refused)]
     if found.stopped:
         refused.append(said("not_refined: late", found.ends, when=found.stopped))
     return results.changed(
         warnings=(*results.warnings, *refused),
-        refinement=Refinement.taken_from(
+        refinement=figures.Refinement.taken_from(
             found,
-            before=GapBefore.taken_from(found.gap_before),
-            after=GapBefore.taken_from(found.gap_after),
+            before=figures.GapBefore.taken_from(found.gap_before),
+            after=figures.GapBefore.taken_from(found.gap_after),
             gates={gate: found.gates[gate] for gate in gates},
             refused=found.refused or None,
         ),
     )
 
 
-def rod_type(rod: RodModel) -> RodType:
+def rod_type(rod: Rod) -> figures.RodType:
     """Section, material and stiffnesses."""
     first, second = rod.bend_stiffnesses
     name = rod.material.name if rod.material is not None else None
@@ -184,14 +131,14 @@ def rod_type(rod: RodModel) -> RodType:
     if name is not None:
         known["preset"] = {"name": name, **asdict(PRESETS[name])}
     known |= {"EI": first} if first == second else {"EI1": first, "EI2": second}
-    return RodType.model_validate(
+    return figures.RodType.model_validate(
         known | {"EA": rod.stretch_stiffness, "GJ": rod.twist_stiffness, "mass_per_length": rod.mass_per_length}
     )
 
 
 def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
     """What every result begins with."""
-    versions = {"numpy": np.__version__, "scipy": version_of("scipy")}  # whose import most forms do not need
+    versions = {"numpy": np.__version__, "scipy": version("scipy")}  # whose import most forms do not need
     return {
         **{key: Results.model_fields[key].default for key in ("format", "version", "units")},
         "version_rodshell": __version__,
@@ -202,40 +149,36 @@ def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
     }
 
 
-def _target(target: TargetSurface, *, flat: bool) -> Target:
+def _target(target: Target, *, flat: bool) -> figures.Target:
     """The target's parameters, its size, and whether it is too flat for its rods to bend."""
     known = {**plain(target.parameters()), "reference_size": target.size}
     known |= {"deviation": target.deviation._asdict()} if target.deviation else {}
-    return Target.model_validate(known | ({"flat": True} if flat else {}))
+    return figures.Target.model_validate(known | ({"flat": True} if flat else {}))
 
 
-def _joint(joint: JointModel) -> Joint:
-    return Joint.model_validate(plain(joint_parameters(joint)))
+def _net(net: ChebyshevNet) -> figures.Net:
+    return figures.Net.model_validate(shape_of_net(net))
 
 
-def _net(net: ChebyshevNet) -> Net:
-    return Net.model_validate(shape_of_net(net))
-
-
-def _drape(trimmed: Trimmed) -> Drape:
+def _drape(trimmed: Trimmed) -> figures.Drape:
     """Figures of a drape; of one that did not converge nothing was trimmed."""
     draped, off = trimmed.draped, trimmed.draped.figures.net_deviation
     if off is None and draped.converged:
         off = ends_past_net(trimmed)
     more: dict[str, Any] = {}
     if draped.rest is not None:
-        more["fall"] = Rest.taken_from(draped.rest)
+        more["fall"] = figures.Rest.taken_from(draped.rest)
     if draped.eccentricity:
         more["eccentricity"] = draped.eccentricity
     if draped.figures.strong_bending is not None:
-        more["strong_bending"] = StrongBending.taken_from(draped.figures.strong_bending)
+        more["strong_bending"] = figures.StrongBending.taken_from(draped.figures.strong_bending)
     if off is not None:
-        more["net_deviation"] = NetDeviation(max=float(np.abs(off).max()), median=float(np.median(np.abs(off))))
-    return Drape.taken_from(
+        more["net_deviation"] = figures.NetDeviation(max=float(np.abs(off).max()), median=float(np.median(np.abs(off))))
+    return figures.Drape.taken_from(
         draped.report,
         method=draped.method.name,
         status=draped.report.status.value,
-        levels=tuple(Solve.taken_from(level, status=level.status.value) for level in draped.levels),
+        levels=tuple(figures.Solve.taken_from(level, status=level.status.value) for level in draped.levels),
         seconds=sum(level.seconds for level in draped.levels),
         max_gap=draped.figures.max_gap,
         min_angle_deg=degrees(draped.figures.min_angle),
@@ -245,10 +188,12 @@ def _drape(trimmed: Trimmed) -> Drape:
     )
 
 
-def _drape_of_all(parts: list[Drape]) -> Drape:
+def _drape_of_all(parts: list[figures.Drape]) -> figures.Drape:
     """Figures of the drapes of all patches: sums, and the worst of each kind."""
+    if len(parts) == 1:
+        return parts[0]
     tightest = min(parts, key=lambda part: part.min_angle_deg or 0.0)
-    figures: dict[str, Any] = {
+    worst: dict[str, Any] = {
         "levels": tuple(level for part in parts for level in part.levels),
         "status": next((part.status for part in parts if part.status != "converged"), "converged"),
     }
@@ -256,31 +201,26 @@ def _drape_of_all(parts: list[Drape]) -> Drape:
     for name in (*totals, "force_residual", "max_strain", "max_gap"):
         values = [getattr(part, name) for part in parts]
         whole = sum if name in totals else max
-        figures[name] = None if None in values else whole(values)
+        worst[name] = None if None in values else whole(values)
     if strong := [part.strong_bending for part in parts if part.strong_bending is not None]:
-        figures["strong_bending"] = max(strong, key=lambda found: (found.beyond or 0.0, found.moment or 0.0))
+        worst["strong_bending"] = max(strong, key=lambda found: (found.beyond or 0.0, found.moment or 0.0))
     off = [part.net_deviation for part in parts if part.net_deviation is not None]
-    figures["net_deviation"] = NetDeviation(
+    worst["net_deviation"] = figures.NetDeviation(
         max=max(found.max or 0.0 for found in off), median=max(found.median or 0.0 for found in off)
     )
-    return tightest.changed(**figures)
+    return tightest.changed(**worst)
 
 
-def _without_joint(grid: FlatGrid) -> int:
-    """At how many crossings the rods have no joint."""
-    return len(FlatGrid.of(grid.rods).crossings) - len(grid.crossings)
-
-
-def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, str]], kind: RodModel) -> dict[str, Any]:
+def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, str]], kind: Rod) -> dict[str, Any]:
     """Rods with their joints, and rod ends."""
-    joints: list[list[RodJoint]] = [[] for _ in footprint.rods]
+    joints: list[list[figures.RodJoint]] = [[] for _ in footprint.rods]
     crossings = footprint.mesh.grid.crossings
     for pair, at in zip(crossings.rods.tolist(), crossings.at.tolist(), strict=True):
         for (k, other), distance in zip((pair, pair[::-1]), at, strict=True):
             name, start = footprint.rods[other].name, footprint.rods[k].start
-            joints[k].append(RodJoint(other=name, at=distance - start))
+            joints[k].append(figures.RodJoint(other=name, at=distance - start))
     rods = [
-        Rod.taken_from(rod, id=rod.name, joints=tuple(sorted(on_rod, key=lambda joint: joint.at)))
+        figures.Rod.taken_from(rod, id=rod.name, joints=tuple(sorted(on_rod, key=lambda joint: joint.at)))
         for rod, on_rod in zip(footprint.rods, joints, strict=True)
     ]
     for k, rod in enumerate(footprint.rods):
@@ -288,16 +228,16 @@ def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, s
             rods[k] = rods[k].changed(stiffness=_stiffness(rod.profile, rod.length, kind))
     return {
         "rods": tuple(rods),
-        "dropped": tuple(Dropped(id=name, reason=reason) for name, reason in dropped),
+        "dropped": tuple(figures.Dropped(id=name, reason=reason) for name, reason in dropped),
         "footprint": footprint.points.tolist(),
         "boundary": boundary.tolist(),
     }
 
 
-def _stiffness(profile: Profile, length: float, kind: RodModel) -> Stiffness:
+def _stiffness(profile: Profile, length: float, kind: Rod) -> figures.Stiffness:
     """Of a rod of this length [m] and kind."""
     cut = sizes(kind, profile.varies, np.array(profile.factors))
-    return Stiffness(
+    return figures.Stiffness(
         at=tuple(length * share for share in profile.stations),
         factors=profile.factors,
         varies=profile.varies,
@@ -305,10 +245,10 @@ def _stiffness(profile: Profile, length: float, kind: RodModel) -> Stiffness:
     )
 
 
-def _pop_ups(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
+def _pop_ups(stages: Stages) -> dict[Ends, figures.PopUp]:
     """Figures of the pop-up with each kind of ends."""
     return {
-        ends: PopUp.taken_from(
+        ends: figures.PopUp.taken_from(
             shell.report,
             status=shell.report.status.value,
             start=shell.start,
@@ -318,13 +258,15 @@ def _pop_ups(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
     }
 
 
-def _agreements(stages: PatchForm | PatchedForm) -> dict[Ends, Agreement]:
-    return {ends: Agreement.taken_from(gap) for ends, gap in stages.agreement.items()}
+def _agreements(stages: Stages) -> dict[Ends, figures.Agreement]:
+    return {ends: figures.Agreement.taken_from(gap) for ends, gap in stages.agreement.items()}
 
 
-def _patch(form: PatchedForm, name: str) -> Patch:
-    laid, found = form.patch_nets[name], form.patches[name]
-    return Patch(
+def _patch(stages: Stages, seams: Seams, k: int) -> figures.Patch:
+    """The k-th patch."""
+    name, found = list(stages.patches.items())[k]
+    laid, moved = seams.nets[name], stages.footprint.mesh.grids[k].flat[0] - found.footprint.mesh.flat[0]
+    return figures.Patch(
         id=name,
         status=found.status,
         rods=len(found.footprint.rods),
@@ -332,8 +274,8 @@ def _patch(form: PatchedForm, name: str) -> Patch:
         anchor=laid.anchor,
         rotate=laid.layout.rotate,
         spacing=laid.layout.spacing,
-        flat_shift=form.flat.shifts[name].tolist(),
-        ends_moved=form.moved[name],
+        flat_shift=moved[:2].tolist(),
+        ends_moved=seams.moved[name],
         net=_net(laid.net),
         agreement=_agreements(found),
         drape=_drape(found.trimmed),
@@ -341,19 +283,19 @@ def _patch(form: PatchedForm, name: str) -> Patch:
     )
 
 
-def _seam(form: PatchedForm, index: int) -> Seam:
+def _seam(seams: Seams, index: int) -> figures.Seam:
     meetings = [
-        Meeting(point=plain(meeting.point), ends=(str(meeting.ends[0]), str(meeting.ends[1])))
-        for meeting in form.meetings
+        figures.Meeting(point=plain(meeting.point), ends=(str(meeting.ends[0]), str(meeting.ends[1])))
+        for meeting in seams.meetings
         if meeting.seam == index
     ]
-    return Seam(points=form.cut_along[index].points.tolist(), meetings=tuple(meetings))
+    return figures.Seam(points=seams.lines[index].points.tolist(), meetings=tuple(meetings))
 
 
-def _seam_forces(forces: Floats) -> SeamForces:
+def _seam_forces(forces: Floats) -> figures.SeamForces:
     """Of the forces (k, 3) [N] at a seam's meetings."""
     largest = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
-    return SeamForces(each=forces.tolist(), largest=largest, sum=forces.sum(axis=0).tolist())
+    return figures.SeamForces(each=forces.tolist(), largest=largest, sum=forces.sum(axis=0).tolist())
 
 
 def _end_index(row: Mapping[str, int], end: End) -> int:

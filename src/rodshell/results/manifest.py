@@ -25,12 +25,7 @@ of a name whose folder is in fact a link, a file or another mount."""
 
 
 def mark(folder: Path, name: str) -> Mark | None:
-    """What stands at a name in a folder, links not followed; None where nothing does.
-
-    Parameters
-    ----------
-    folder : of the result; name : of a file in it, with slashes.
-    """
+    """What stands at a name in a folder, a path with slashes, links not followed; None where nothing does."""
     path, behind = folder / name, _behind(folder, name)
     if behind is not None:
         return {"behind": behind}
@@ -74,13 +69,11 @@ def own_table(folder: Path, name: str) -> dict[str, Any]:
 def read_table(path: Path, most: float) -> dict[str, Any]:
     """The keys of a JSON file.
 
-    Parameters
-    ----------
-    most : bytes that it may have, see `read_bytes`.
+    Args:
+        most: bytes that it may have, see `read_bytes`.
 
-    Raises
-    ------
-    OutputError : it cannot be read, is too large, or holds no table of keys.
+    Raises:
+        OutputError: it cannot be read, is too large, or holds no table of keys.
     """
     try:
         content = json.loads(read_text(path, most, instead="it is damaged"))
@@ -94,12 +87,7 @@ def read_table(path: Path, most: float) -> dict[str, Any]:
 
 
 def manifest_text(files: Mapping[str, Mark]) -> str:
-    """The content of manifest.json, a line for each file.
-
-    Parameters
-    ----------
-    files : marks of the files, by name.
-    """
+    """The content of manifest.json, a line for each file."""
     lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(files[name])}" for name in sorted(files))
     head = f' "format": {json.dumps(FORMAT)},\n "version": {VERSION},\n "files": {{\n'
     return "{\n" + head + lines + "\n }\n}\n"
@@ -111,12 +99,7 @@ def above(name: str) -> list[str]:
 
 
 def foreign(folder: Path, marks: Mapping[str, Mark | None]) -> list[str]:
-    """Of names and what stands there, those that rodshell did not write, or that conflict with such a name.
-
-    Parameters
-    ----------
-    folder : of the result; marks : what stands at each name, see `mark`.
-    """
+    """Of names and their marks, those that rodshell did not write, or that conflict with such a name."""
     listed = read_manifest(folder)
     found = list[str]()
     for name, here in marks.items():

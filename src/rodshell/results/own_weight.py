@@ -11,7 +11,6 @@ from math import inf, sqrt
 from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.form import RodType
-from rodshell.figures.form import Section as RodSection
 from rodshell.figures.records import Ends
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import half_sides, sizes_sold
@@ -27,78 +26,94 @@ RESERVE = 1.5  # times its own weight that the perfect shell carries: imperfecti
 
 
 def reserve(results: Results) -> float:
-    """How many times its own weight a good shell carries: creep divides stiffness by 1 + k_def [EN 1995-1-1, 2.3.2.2].
-
-    Parameters
-    ----------
-    results : with design strengths, where k_def is known.
-    """
+    """How many times its own weight a good shell carries: creep divides stiffness by 1 + k_def [EN 1995-1-1,
+    2.3.2.2]."""
     return RESERVE * (1.0 + ((results.strength.creep if results.strength else None) or 0.0))
 
 
 def falling(results: Results) -> set[Ends]:
-    """The end conditions with which the shell, braced if it is to be, falls under its own weight.
-
-    Parameters
-    ----------
-    results : with the checks of the self-weight.
-    """
+    """The end conditions with which the shell, braced if it is to be, falls under its own weight."""
     ends = list(results.self_weight)
     found = _carried(results, ends)
     return {end for end in _below(found, 1.0) if found[end].limit not in NOT_KNOWN}
 
 
+def none_stands(results: Results, usable: Sequence[Ends], lost: Sequence[Ends]) -> list[Said]:
+    """That no end condition is shown to stand, where the shell falls with some and nothing is known of the others.
+
+    Args:
+        usable: with which there is a shell without another fault.
+        lost: with which the pop-up did not converge.
+    """
+    fallen, found = falling(results), _carried(results, usable)
+    falls, why = [end for end in usable if end in fallen], dict.fromkeys(lost, "the pop-up did not converge")
+    for end in usable:
+        weighed = found.get(end) or SelfWeight()
+        if end in fallen:
+            continue
+        if weighed.limit == "not followed" and (weighed.load_factor or 0.0) < 1:
+            why[end] = f"it could be followed only up to {part_of_weight(weighed.load_factor or 0.0)} of it"
+        elif weighed.limit in NOT_KNOWN[1:]:
+            why[end] = "this was not checked"
+        else:
+            return []
+    if not falls or not why:
+        return []
+    unknown = " and ".join(f"with {end} ends this is not known, as {reason}" for end, reason in why.items())
+    return [said("none_stands", falls=" and ".join(falls), bracing=_bracing(results), unknown=unknown)]
+
+
+def _bracing(results: Results) -> str:
+    return " with its bracing" * is_braced(results)
+
+
 def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], bool]:
     """What is said of shells that do not carry their own weight with the reserve that is asked for, or are not known
-    to; and whether one of them stands.
-
-    Parameters
-    ----------
-    results : with the checks of the self-weight.
-    """
-    found, findings = _carried(results, ends), list[Said]()
-    parts = _below(found, 1.0)
+    to; and whether one of them stands."""
+    found, bracing, asked = _carried(results, ends), _bracing(results), reserve(results)
+    findings, parts = list[Said](), _below(found, 1.0)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
-    bracing = " with its bracing" * is_braced(results)
-    if bracing and (bare := light(results, ends)):
+    bare = _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
+    if bracing and bare:
         unknown_above = any(results.self_weight[end].limit == "not followed" for end in bare)
         carries = "is known to carry only" if unknown_above else "carries only"
-        weight = _parts(bare, "its own weight")
-        least, alone = min(bare.values()), _alone(bare)
-        findings.append(said("needs_bracing", _one(bare), least, 1, alone=alone, carries=carries, weight=weight))
+        findings.append(_of_parts("needs_bracing", bare, carries=carries, weight=_parts(bare, "its own weight")))
     standing = [end for end, weighed in found.items() if end not in parts and weighed.limit not in (None, "no mass")]
     falling = {end: part for end, part in parts.items() if end not in lost}
     unknown = {end: part for end, part in parts.items() if end in lost}
     if falling:
         others = "".join(f"; with {end} ends it carries {_times(found[end])} its own weight" for end in standing)
         advice, offers = _other_rods(results, falling)
-        findings.append(said(
-            "falls", _one(falling), min(falling.values()), 1, offers=offers, alone=_alone(falling), bracing=bracing,
-            parts=_parts(falling), others=others, advice=advice,
-        ))  # fmt: skip
-    short = {end: part for end, part in _below(found, reserve(results)).items() if end in standing and end not in lost}
+        findings.append(_of_parts("falls", falling, offers=offers, bracing=bracing, others=others, advice=advice))
+    short = {end: part for end, part in _below(found, asked).items() if end in standing and end not in lost}
     if short:
         weights = " and ".join(f"{_times(found[end])} its own weight with {end} ends" for end in short)
         others = "".join(f"; with {end} ends it carries {_times(found[end])}" for end in standing if end not in short)
         advice, offers = _other_rods(results, short)
-        findings.append(said(
-            "reserve", _one(short), min(short.values()), reserve(results), offers=offers, bracing=bracing,
-            weights=weights, asked=_asked(results), others=others, advice=advice,
+        findings.append(_of_parts(
+            "reserve", short, asked, offers=offers, bracing=bracing, weights=weights, asked=_asked(results),
+            others=others, advice=advice,
         ))  # fmt: skip
     if unknown:
-        findings.append(said(
-            "not_followed: weight", _one(unknown), min(unknown.values()), 1, alone=_alone(unknown), bracing=bracing,
-            parts=_parts(unknown),
-        ))  # fmt: skip
+        findings.append(_of_parts("not_followed: weight", unknown, bracing=bracing))
     for end in standing:
         if end in lost:
             factor, times = found[end].load_factor, _times(found[end])
-            findings.append(said("not_followed: reserve", end, factor, reserve(results), bracing=bracing, times=times))
+            findings.append(said("not_followed: reserve", end, factor, asked, bracing=bracing, times=times))
     if any(weighed.limit == "no mass" for weighed in found.values()):
         findings.append(said("no_mass"))
     if any(end not in found or found[end].limit is None for end in ends):
         findings.append(said("not_checked: weight", bracing=bracing))
     return findings, bool(standing or (bracing and not falling))
+
+
+def _of_parts(
+    sentence: str, factors: Mapping[Ends, float], limit: float = 1.0, *, offers: tuple[str, ...] = (), **words: str
+) -> Said:
+    """A finding on shells by the factors on their weight that they carry; of a single shell it names the ends."""
+    ends = next(iter(factors)) if len(factors) == 1 else None
+    words |= {"alone": f"with {ends} ends " if ends else "", "parts": _parts(factors)}
+    return said(sentence, ends, min(factors.values()), limit, offers=offers, **words)
 
 
 def _carried(results: Results, ends: Sequence[Ends]) -> dict[Ends, SelfWeight]:
@@ -131,23 +146,8 @@ def _asked(results: Results) -> str:
 
 
 def is_braced(results: Results) -> bool:
-    """Whether the shell has bracing under its loads; its own weight alone is checked without.
-
-    Parameters
-    ----------
-    results : with the checks under loads.
-    """
+    """Whether the shell has bracing under its loads; its own weight alone is checked without."""
     return any(shell.bracing for supported in results.loads.values() for shell in supported.values())
-
-
-def _one(factors: Mapping[Ends, float]) -> Ends | None:
-    """The end condition, where a finding is about one."""
-    return next(iter(factors)) if len(factors) == 1 else None
-
-
-def _alone(factors: Mapping[Ends, float]) -> str:
-    """The end condition of a sentence that is about one."""
-    return "".join(f"with {ends} ends " for ends in factors) if len(factors) == 1 else ""
 
 
 def _parts(factors: Mapping[Ends, float], of: str = "it") -> str:
@@ -162,44 +162,34 @@ def _times(weighed: SelfWeight) -> str:
     return f"{least}{shown_factor(weighed.load_factor)} times"
 
 
-def light(results: Results, ends: list[Ends]) -> dict[Ends, float]:
-    """By end condition, the factors on its own weight that a shell carries, or is known to, where they are below 1.
-
-    Parameters
-    ----------
-    results : with the checks of the self-weight.
-    """
-    return _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
-
-
 def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, tuple[str, ...]]:
     """Which rods of the same material would carry the shell with the reserve, a size that is sold or in proportion, and
-    the command that forms it of them.
-
-    Parameters
-    ----------
-    factors : on the weight, too low, that is carried with these ends.
-    """
+    the command that forms it of them; `factors` on the weight, too low, are those that are carried now."""
     rod, kind = results.rod, (results.joint.kind if results.joint else None) or "ball"
     factors = {ends: factor for ends, factor in factors.items() if factor > 0}
+    chosen = rod is not None and "section" in (rod.chosen or {})
+    why = "; its section was chosen without regard to its weight" * chosen
     if not factors or rod is None or kind not in WITHOUT_STIFFNESS or is_braced(results):
-        return "", ()
+        return why, ()
+    sold = () if results.refinement else sizes_sold(rod)  # a refined rod's section varies along it
     enough = ENOUGH * reserve(results)
     for ends, factor in sorted(factors.items(), key=lambda pair: pair[1]):
-        for section in () if results.refinement else sizes_sold(rod):  # a refined rod's section varies along it
+        for section in sold:
             gain, sharper = _gain(rod, section), _sharper(rod, section)
             if factor * gain >= enough and not _too_much(results, ends, sharper):
                 words = (
-                    f"; made of {size_text(section)}, it would carry about {rounded_down(factor * gain)} times its own "
-                    f"weight or more with {ends} ends{_share(results, ends, sharper)}"
+                    f"{why}; made of {size_text(section)}, it would carry about {rounded_down(factor * gain)} times "
+                    f"its own weight or more with {ends} ends{_share(results, ends, sharper)}"
                 )
                 offers = _again(results, section)
                 return words + "".join(f" ({offer})" for offer in offers), offers
+    if chosen and sold:
+        why += ", and no size that is sold is likely to carry it and to withstand its bends"
     ends, factor = max(factors.items(), key=lambda pair: pair[1])
     thicker = sqrt(enough / factor)
     made = (
-        f"; made of rods about {rounded(thicker, 2)} times as thick, it would carry {rounded(reserve(results))} times "
-        f"its own weight with {ends} ends, by an estimate"
+        f"{why}; made of rods about {rounded(thicker, 2)} times as thick, it would carry {rounded(reserve(results))} "
+        f"times its own weight with {ends} ends, by an estimate"
     )
     if too_much := _too_much(results, ends, thicker):
         words = "support it, or take another material; rodshell check finds what bracing adds"
@@ -231,9 +221,8 @@ def _gain(rod: RodType, section: Section) -> float:
 
 def _sharper(rod: RodType, section: Section) -> float:
     """How many times as much the same bends strain this section, at most."""
-    other = half_sides(RodSection.model_validate(written(section)))
-    now = half_sides(rod.section) if rod.section else ()
-    return max((new / old for new, old in zip(other, now, strict=False)), default=inf)
+    sides = zip(section.half_widths, half_sides(rod), strict=False)
+    return max((new / old for new, old in sides), default=inf)
 
 
 def _too_much(results: Results, ends: Ends, sharper: float) -> str:

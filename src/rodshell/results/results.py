@@ -13,33 +13,9 @@ import numpy as np
 from pydantic import FailFast, Field, ValidationError
 
 from rodshell.errors import InputError, OutputError
-from rodshell.figures.checks import (
-    Bending,
-    Contact,
-    Deployment,
-    EndsInTheAir,
-    JointLoad,
-    OtherShapes,
-    Reactions,
-    SelfWeight,
-)
+from rodshell.figures import checks, form
 from rodshell.figures.fabrication import Fabrication
 from rodshell.figures.findings import Finding, Level
-from rodshell.figures.form import (
-    Agreement,
-    Drape,
-    Dropped,
-    Joint,
-    Layout,
-    Net,
-    Patch,
-    PopUp,
-    Refinement,
-    Rod,
-    RodType,
-    Seam,
-    Target,
-)
 from rodshell.figures.loads import DesignStrength, LoadCases
 from rodshell.figures.records import (
     FARTHEST,
@@ -136,33 +112,34 @@ class Results(Record, metaclass=_Refusing):
     name: Text | None = key("name of the result")
     status: Text = Field(default="unknown", description='"converged", or which stage stopped')
     warnings: Rows[Text] = rows("sentences")
-    target: Target | None = key("the target; absent for a table of rods")
-    layout: Layout | None = key("the flat grid that was asked for")
-    rod: RodType | None = key("section, material and stiffnesses of every rod")
-    joint: Joint | None = key("what the rods do to each other where they cross")
-    patches: Rows[Patch] = rows("patches of a shell that is cut along seams")
-    seams: Rows[Seam] = rows("seams between patches")
-    net: Net | None = key("the inextensible net")
-    rods: Rows[Rod] = rows("the rods, cut to their supports")
+    target: form.Target | None = key("the target; absent for a table of rods")
+    layout: form.Layout | None = key("the flat grid that was asked for")
+    rod: form.RodType | None = key("section, material and stiffnesses of every rod")
+    joint: form.Joint | None = key("what the rods do to each other where they cross")
+    patches: Rows[form.Patch] = rows("patches of a shell that is cut along seams")
+    seams: Rows[form.Seam] = rows("seams between patches")
+    net: form.Net | None = key("the inextensible net")
+    rods: Rows[form.Rod] = rows("the rods, cut to their supports")
     crossings_without_joint: Whole | None = key("where rods pass each other too near to an end for a joint, a count")
-    dropped: Rows[Dropped] = rows("rods of the layout that are not part of the grid")
+    dropped: Rows[form.Dropped] = rows("rods of the layout that are not part of the grid")
+    flat_state: form.FlatState | None = key("the rods in the plane, where that is not a straight lattice")
     footprint: Rows[Flat] = rows("flat place of each rod's start and end in turn", "m")
     boundary: Rows[Point] = rows("place in space of each rod's start and end in turn", "m")
     end_tangents: Rows[Point] = rows("direction in which each of these rod ends points out of the shell")
-    agreement: ByEnds[Agreement] = by_ends("gap to the target")
-    drape: Drape | None = key("the rods laid on the target")
-    pop_up: ByEnds[PopUp] = by_ends("the shell popped up from flat")
-    refinement: Refinement | None = key("how the form was refined; absent where that was not asked for")
-    bending: Bending | None = key("bending and stress")
-    reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
-    joint_loads: ByEnds[Rows[JointLoad]] = by_ends("what acts at the joints")
-    ends_in_the_air: EndsInTheAir | None = key("rod ends that may not stand on the ground")
-    self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
+    agreement: ByEnds[form.Agreement] = by_ends("gap to the target")
+    drape: form.Drape | None = key("the rods laid on the target")
+    pop_up: ByEnds[form.PopUp] = by_ends("the shell popped up from flat")
+    refinement: form.Refinement | None = key("how the form was refined; absent where that was not asked for")
+    bending: checks.Bending | None = key("bending and stress")
+    reactions: ByEnds[checks.Reactions] = by_ends("forces and moments at the supports")
+    joint_loads: ByEnds[Rows[checks.JointLoad]] = by_ends("what acts at the joints")
+    ends_in_the_air: checks.EndsInTheAir | None = key("rod ends that may not stand on the ground")
+    self_weight: ByEnds[checks.SelfWeight] = by_ends("how much of its own weight the shell carries")
     strength: DesignStrength | None = key("design strengths, by which the rods are judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
-    deployment: Deployment | None = key("the shell from flat to popped up")
-    contact: Contact | None = key("contact of rods with each other")
-    other_shapes: ByEnds[OtherShapes] = by_ends("other stable shapes on the same supports")
+    deployment: checks.Deployment | None = key("the shell from flat to popped up")
+    contact: checks.Contact | None = key("contact of rods with each other")
+    other_shapes: ByEnds[checks.OtherShapes] = by_ends("other stable shapes on the same supports")
     fabrication: Fabrication | None = key("how the rods are cut and braced")
     drawings: Drawings | None = key("what the drawings have in common")
     verdict: Verdict | None = key("what the result is worth")
@@ -171,13 +148,11 @@ class Results(Record, metaclass=_Refusing):
     def of(cls, content: Mapping[str, Any], *, source: str = "the result") -> Self:
         """Results from the plain content of a result.json of any version, every value checked.
 
-        Parameters
-        ----------
-        content : dictionaries, lists, numbers and texts; NumPy's arrays and numbers are converted.
+        Args:
+            content: dictionaries, lists, numbers and texts; NumPy's arrays and numbers are converted.
 
-        Raises
-        ------
-        InputError : not a mapping. OutputError : the content is not valid; the sentence names the key.
+        Raises:
+            InputError: not a mapping. OutputError : the content is not valid; the sentence names the key.
         """
         instance("content", content, Mapping, "a mapping, as result.json holds one")
         try:
@@ -204,9 +179,8 @@ class Results(Record, metaclass=_Refusing):
 def read_results(path: Path) -> Results:
     """The content of a result.json, every value checked.
 
-    Raises
-    ------
-    OutputError : there is no such file, or this version cannot read it; the sentence names the key.
+    Raises:
+        OutputError: there is no such file, or this version cannot read it; the sentence names the key.
     """
     if not path.exists():
         raise OutputError(f"{path.parent} holds no rodshell result: it has no {path.name}")
@@ -214,20 +188,15 @@ def read_results(path: Path) -> Results:
     return Results.from_text(json.dumps(upgraded(content, source=str(path))), source=str(path))
 
 
-def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
-    """The content of a result.json with the keys of the present version.
+def upgraded(given: Mapping[str, Any], *, source: str) -> dict[str, Any]:
+    """The content of a result.json of any version with the keys of the present one.
 
     Until November 2026 the format was called gridshell-result. Version 2 renamed drape.own_ends to drape.net_deviation.
 
-    Parameters
-    ----------
-    content : of a result.json of any version.
-
-    Raises
-    ------
-    OutputError : another format, or a newer version.
+    Raises:
+        OutputError: another format, or a newer version.
     """
-    content = dict(content)
+    content = dict(given)
     if content.get("format", FORMAT) not in (FORMAT, "gridshell-result"):
         raise OutputError(f'{source} is not a rodshell result: its "format" is not "{FORMAT}"')
     version = content.get("version", VERSION)
@@ -240,34 +209,22 @@ def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
     if "version_gridshell" in content:
         content["version_rodshell"] = content.pop("version_gridshell")
     if version < 2:
-        content["drape"] = _renamed(content.get("drape"), "own_ends", "net_deviation")
-        patches = content.get("patches")
-        if isinstance(patches, list):
-            content["patches"] = [
-                {**patch, "drape": _renamed(patch.get("drape"), "own_ends", "net_deviation")}
-                if isinstance(patch, dict)
-                else patch
-                for patch in patches
-            ]
-        if content["drape"] is None:
-            del content["drape"]
+        content = _with_net_deviation(content)
+        if isinstance(patches := content.get("patches"), list):
+            content["patches"] = [_with_net_deviation(patch) for patch in patches]
     return content
 
 
-def _renamed(table: Any, old: str, new: str) -> Any:
-    """A table with another name of a key."""
-    if not isinstance(table, dict) or old not in table:
-        return table
-    return {new if name == old else name: value for name, value in table.items()}
+def _with_net_deviation(part: Any) -> Any:
+    """A form or a patch whose drape has that name in place of the one that it had before version 2."""
+    drape = part.get("drape") if isinstance(part, dict) else None
+    if not isinstance(drape, dict):
+        return part
+    return part | {"drape": {"net_deviation" if name == "own_ends" else name: drape[name] for name in drape}}
 
 
 def contradictions(results: Results) -> Iterator[str]:
-    """What the records say against each other: rods that do not exist, and counts that do not agree.
-
-    Parameters
-    ----------
-    results : whose values are each valid.
-    """
+    """What the records say against each other: rods that do not exist, and counts that do not agree."""
     ids = [rod.id for rod in results.rods]
     known = set(ids)
     if len(known) < len(ids):
@@ -340,9 +297,8 @@ def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
             for what, where in (("governs", loaded.governs), ("euler_at", loaded.euler_at)):
                 if where is not None:
                     yield f"loads.{name}.{support}.{what}.rod", where.rod
-    for shape in ("pinned", "clamped", "deployment"):
-        nearest = results.contact.of(shape) if results.contact else None
-        yield from ((f"contact.{shape}.rods", name) for name in (nearest.rods if nearest else None) or ())
+    for shape, nearest in results.contact.shapes().items() if results.contact else ():
+        yield from ((f"contact.{shape}.rods", name) for name in nearest.rods or ())
 
 
 def json_schema() -> dict[str, Any]:
@@ -353,7 +309,8 @@ def json_schema() -> dict[str, Any]:
 def _first_fault(error: ValidationError) -> str:
     """The first fault in a sentence that names its key as it stands in the file, "rods[3].joints[0].at"."""
     fault = error.errors(include_url=False)[0]
-    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"]).lstrip(".")
+    parts = (part for part in fault["loc"] if part not in ("(table)", "(other)"))  # which kind a `TableOr` was read as
+    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
     where = printable(where)[:200] or "the file"
     if fault["type"] == "missing":
         return f"{where} is missing"

@@ -1,7 +1,6 @@
 """The sizes in which a rod's material is sold, and whether a chosen section is among them."""
 
 from rodshell.figures.form import RodType
-from rodshell.figures.form import Section as RodSection
 from rodshell.rods.section import TRADE_SIZES, Section, size_text
 
 
@@ -13,14 +12,16 @@ def sizes_sold(rod: RodType) -> tuple[Section, ...]:
 
 def thinner_than_sold(rod: RodType) -> str:
     """That a chosen section is thinner than every size in which its material is sold, or ""."""
-    sold, sides = sizes_sold(rod), half_sides(rod.section) if rod.section else ()
+    sold, sides = sizes_sold(rod), half_sides(rod)
     if "section" not in (rod.chosen or {}) or not sold or not sides or 2 * max(sides) >= sold[0].depth:
         return ""
     return f"thinner than any size that is sold, the first of which is {size_text(sold[0])}"
 
 
-def half_sides(section: RodSection) -> tuple[float, ...]:
+def half_sides(rod: RodType) -> tuple[float, ...]:
     """Distances of the outermost fibres along both axes [m]; none of a given section."""
+    if (section := rod.section) is None:
+        return ()
     if section.radius:
         return section.radius, section.radius
     if section.width and section.height:

@@ -3,10 +3,11 @@
 What the file says of itself, the sizes of its arrays, is checked before memory is spent.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from io import BytesIO
 from math import prod
 from pathlib import Path
+from re import fullmatch
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
@@ -17,7 +18,9 @@ from numpy.typing import NDArray
 from rodshell.errors import InputError, OutputError
 from rodshell.figures.records import FARTHEST, LARGEST, far_apart
 from rodshell.results.results import Results
+from rodshell.rods.supports import SUPPORTS
 from rodshell.untrusted import limit, raised, read_bytes
+from rodshell.validation import NAME
 
 States = Mapping[str, NDArray[Any]]
 
@@ -26,11 +29,22 @@ DIRECTORY = 1 << 20  # bytes of the list of arrays in it, enough for 10,000
 HEADER = 1000  # characters of an array's header; NumPy writes 128
 COMPRESSION = 1  # half the time of NumPy's 6, for files that are 6 % longer
 
-SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order in which they are computed
-GAPS = {"draped": "gap_draped", "popped_pinned": "gap_pinned", "popped_clamped": "gap_clamped"}
+DRAPED, POPPED = "draped", "popped_"  # the states in space: the second with the name of a support
+GAP = "gap_"  # of a state in space: with the name of its support, or draped
 BENT = ("curvature", "stress")  # known at each entry of `rod_nodes`
 INDICES = ("rod_nodes", "rod_start", "target_faces")
 DAMAGED = "cannot be read: it is damaged or not written by rodshell; run case.toml again"
+
+
+def is_shell(name: str) -> bool:
+    """Whether a state is one in space."""
+    return name == DRAPED or fullmatch(POPPED + NAME, name) is not None
+
+
+def shells_among(names: Iterable[str]) -> list[str]:
+    """The states in space in the order in which they are computed: draped, then popped up by support."""
+    known = [DRAPED, *(POPPED + support for support in SUPPORTS)]
+    return sorted(filter(is_shell, names), key=lambda name: known.index(name) if name in known else len(known))
 
 
 def packed(states: States) -> bytes:
@@ -44,15 +58,10 @@ def packed(states: States) -> bytes:
 
 
 def read_states(path: Path, results: Results) -> dict[str, NDArray[Any]]:
-    """The arrays of a states.npz.
+    """The arrays of a states.npz, which belong to the results of the same folder.
 
-    Parameters
-    ----------
-    results : of the same folder, by which the number of rods and stages is known.
-
-    Raises
-    ------
-    OutputError : it is missing, not to be opened, broken, or too large, or an array is not as it should be.
+    Raises:
+        OutputError: it is missing, not to be opened, broken, or too large, or an array is not as it should be.
     """
     if not path.exists():
         raise OutputError(f"{path} is missing: run case.toml again")
@@ -107,13 +116,7 @@ def _unpacked(path: Path, content: bytes) -> Iterator[tuple[str, NDArray[Any]]]:
 
 
 def state_faults(states: States, results: Results) -> Iterator[str]:
-    """What is wrong with states: shapes that do not fit each other or the results, indices and numbers out of range.
-
-    Parameters
-    ----------
-    states : arrays by name, see `Archive`.
-    results : by which the number of rods and stages is known.
-    """
+    """What is wrong with states: shapes that do not fit each other or the results, indices and numbers out of range."""
     if not results.rods:
         yield "there are no rods in result.json"
         return
@@ -126,7 +129,8 @@ def state_faults(states: States, results: Results) -> Iterator[str]:
         if name in states and needed not in states:
             yield f"{name} is there, but {needed} is missing"
             return
-    count = next((len(states[name]) for name in ("flat", *SHELLS) if name in states and states[name].ndim), 0)
+    shapes = [name for name in ("flat", *shells_among(states)) if name in states]
+    count = next((len(states[name]) for name in shapes if states[name].ndim), 0)
     for name, shape in _shapes(states, count, results):
         if states[name].shape != shape:
             yield f"{name} has the shape {states[name].shape}, not {shape}"
@@ -150,10 +154,8 @@ def _shapes(states: States, count: int, results: Results) -> Iterator[tuple[str,
     """The shapes that the arrays must have, of `count` nodes."""
     entries = states["rod_nodes"].size if "rod_nodes" in states else 0
     stages = len(results.deployment.stages) if results.deployment else 0
-    wanted: dict[str, tuple[int, ...]] = dict.fromkeys(("flat", *SHELLS), (count, 3))
-    wanted |= dict.fromkeys(GAPS.values(), (count,))
+    wanted: dict[str, tuple[int, ...]] = dict.fromkeys(("flat", *shells_among(states)), (count, 3))
     wanted |= {"rod_nodes": (entries,), "rod_start": (len(results.rods),)}
-    wanted |= {f"{what}_{ends}": (entries,) for what in (*BENT, "force") for ends in ("pinned", "clamped")}
     wanted |= {"history": (stages, count, 3), "history_share": (stages,)}
     wanted |= {f"history_{what}": (stages, entries) for what in BENT}
     for name, values in states.items():
@@ -161,20 +163,24 @@ def _shapes(states: States, count: int, results: Results) -> Iterator[tuple[str,
             yield name, wanted[name]
         elif name in ("target_points", "target_faces"):
             yield name, (len(values) if values.ndim else 0, 3)
+        elif name.startswith(GAP):
+            yield name, (count,)
+        elif name.partition("_")[0] in (*BENT, "force"):
+            yield name, (entries,)
         elif name.startswith("loaded_"):
             yield name, (entries,) if name.startswith("loaded_stress_") else (count, 3)
 
 
 def _out_of_range(name: str, values: NDArray[Any]) -> str:
     """What numbers of an array cannot be, or nothing."""
-    if name in GAPS.values():
+    if name.startswith(GAP):
         values = values[~np.isnan(values)]  # no point of the target is near
     if not values.size:
-        return "" if name not in ("flat", *SHELLS) else "no node"
+        return "" if name != "flat" and not is_shell(name) else "no node"
     if not np.isfinite(values).all():
         return "a number that is not finite"
-    if name in ("flat", *SHELLS, "history", "target_points") or name.startswith("loaded_"):
+    if name in ("flat", "history", "target_points") or is_shell(name) or name.startswith("loaded_"):
         return far_apart(values)
     low, high = float(values.min()), float(values.max())
-    most = FARTHEST if name in GAPS.values() else 1.0 if name == "history_share" else LARGEST
+    most = FARTHEST if name.startswith(GAP) else 1.0 if name == "history_share" else LARGEST
     return f"{low:.4g} to {high:.4g}: it must lie from {-most:g} to {most:g}" if max(-low, high) > most else ""

@@ -1,37 +1,25 @@
 """How much of their strength the rods of a result use, and by which strength that is counted."""
 
-from rodshell.figures.checks import WorstBent
-from rodshell.figures.records import Ends
+from rodshell.figures.checks import OTHER_SHAPES, WorstBent
 from rodshell.results.results import Results
 
-ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
 THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
 
 
 def bent_of(results: Results, shape: str) -> WorstBent:
-    """The worst bending of a shape; one without figures where nothing is known.
-
-    Parameters
-    ----------
-    results : with or without checks of bending.
-    shape : "pinned", "clamped", or one of the deployment.
-    """
+    """The worst bending of a shape, that on a support by its name or one of the deployment; one without figures where
+    nothing is known."""
     return (results.bending.shapes() if results.bending else {}).get(shape) or WorstBent()
 
 
 def strength_name(results: Results, shape: str) -> str:
-    """By what the utilisation of a shape is counted: design strengths, if they are known.
-
-    Parameters
-    ----------
-    shape : "pinned", "clamped", or one of the deployment.
-    """
+    """By what the utilisation of a shape is counted: design strengths, if they are known."""
     preset = results.bending.strength_of if results.bending else None
     if preset is None:
         return "the given strength"
     if not by_design_strength(results):
         return f"{preset}'s strength, which is characteristic and short-term"
-    return f"{preset}'s {'permanent design strength' if shape in ENDS else 'design strength for erection'}"
+    return f"{preset}'s {'design strength for erection' if shape in OTHER_SHAPES else 'permanent design strength'}"
 
 
 def by_design_strength(results: Results) -> bool:
@@ -40,14 +28,8 @@ def by_design_strength(results: Results) -> bool:
 
 
 def holds_while_erected(results: Results, used: float) -> bool:
-    """Whether a preset's rods that use more than their design strength for erection stay below what breaks them.
-
-    Parameters
-    ----------
-    used : of the design strength for erection [-].
-    """
-    characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None
-    strength, of_preset = (
-        (results.bending.erection_strength, results.bending.strength_of) if results.bending else (0, "")
-    )
-    return bool(of_preset and strength and characteristic and used * strength <= characteristic)
+    """Whether a preset's rods that use so much of their design strength for erection stay below what breaks them."""
+    bending, preset = results.bending, results.rod.preset if results.rod else None
+    if bending is None or not bending.strength_of or not bending.erection_strength or preset is None:
+        return False
+    return used * bending.erection_strength <= (preset.bending_strength or 0.0)

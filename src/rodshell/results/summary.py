@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees
 
-from rodshell.figures.checks import Bending, SelfWeight
+from rodshell.figures.checks import OTHER_SHAPES, Bending, SelfWeight
 from rodshell.figures.form import Bent, RodType
 from rodshell.figures.loads import DesignStrength
 from rodshell.figures.records import printable
@@ -26,6 +26,7 @@ from rodshell.results.wording import (
     stress,
     whole_percent,
 )
+from rodshell.rods.supports import CLAMPED, PINNED, clamped_among
 from rodshell.units import places_text
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
@@ -62,12 +63,7 @@ def summary_text(results: Results) -> str:
 
 
 def chosen(parts: Iterable[str]) -> str:
-    """That the program chose a rod's material, section or both.
-
-    Parameters
-    ----------
-    parts : "material", "section" or both.
-    """
+    """That the program chose a rod's "material", "section" or both."""
     parts = list(parts)
     return f"{' and '.join(parts)} {'were' if len(parts) > 1 else 'was'} not given: chosen to fit"
 
@@ -121,7 +117,7 @@ def _reached(bending: Bending | None) -> str:
     """How a section was chosen, and the share of the strength that the final shapes use."""
     if bending is None or bending.strength is None:
         return ", as slender as the paper's rods, since no strength is known"
-    final = [bent.utilisation for bent in (bending.pinned, bending.clamped) if bent]
+    final = [bent.utilisation for shape, bent in bending.shapes().items() if shape not in OTHER_SHAPES]
     known = [used for used in final if used is not None]
     reached = f"reached {percent(max(known))} in the final shape" if known else "what is reached is not known"
     return f", sized for the permanent strength; {reached}"
@@ -178,7 +174,11 @@ def _net_and_drape(results: Results, length: Length) -> Iterator[str]:
     if net := results.net:
         angle = "not known" if net.min_angle_deg is None else f"{net.min_angle_deg:.1f} deg"
         yield f"  footprint error {length(net.error_estimate)} before extrapolation; smallest angle {angle}"
-    if drape := results.drape:
+    drape, layout = results.drape, results.layout
+    if drape and layout and layout.families:
+        along = "given" if layout.kind == "curves" else f"{layout.families} families of {layout.kind}"
+        yield f"  drape     along {along} curves; gap {length(drape.max_gap)}"
+    elif drape:
         work = sum(level.factorizations or 0 for level in drape.levels)
         gap = "gap" if drape.method == "bound" else "deepest node inside by"
         edges = f", edges of {length(results.layout.edge)}" if drape.fall and results.layout else ""
@@ -301,13 +301,14 @@ def _deployment(results: Results) -> Iterator[str]:
             False: "ends in another shape",
             None: "not known whether it is reached",
         }
-        yield f"  from flat {deployment.ends or 'pinned':<8}{words[deployment.reached_from_flat]}"
+        yield f"  from flat {deployment.ends or PINNED.name:<8}{words[deployment.reached_from_flat]}"
         if deployment.clamped and deployment.clamped.reached_from_flat is not None:
             turned = {
                 True: "reached: the ends are turned into their clamps after the deployment",
                 False: "turning the ends into their clamps ends in another shape",
             }
-            yield f"  from flat clamped {turned[deployment.clamped.reached_from_flat]}"
+            held = clamped_among(results.pop_up) or CLAMPED.name
+            yield f"  from flat {held:<8}{turned[deployment.clamped.reached_from_flat]}"
     for ends, searched in results.other_shapes.items():
         others = [shape for shape in searched.found if not shape.mirror]
         found = ["its mirror image"] if len(others) < len(searched.found) else []

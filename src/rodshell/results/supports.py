@@ -14,12 +14,7 @@ ABOVE = 0.02  # of the size: higher ends are not on the level of the lowest
 
 
 def in_the_air(results: Results) -> EndsInTheAir | None:
-    """The rod ends that lie clearly higher than the lowest; None where it is not known where the ends are.
-
-    Parameters
-    ----------
-    results : with or without forces at the supports.
-    """
+    """The rod ends that lie clearly higher than the lowest; None where it is not known where the ends are."""
     heights = [point[2] for point in results.boundary]
     known = [z for z in heights if z is not None]
     if not known:

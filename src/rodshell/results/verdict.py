@@ -5,25 +5,18 @@ Summary, report, JSON and exit code show what stands here and judge nothing them
 not checked, and then the result is not good.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
-from rodshell.figures.checks import Clearance, Deployment, WorstBent
+from rodshell.figures.checks import OTHER_SHAPES, Clearance, Deployment, WorstBent
 from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
 from rodshell.figures.form import Agreement, PopUp
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends
 from rodshell.figures.sentences import ANOTHER_WAY, SENTENCES
-from rodshell.results.own_weight import falling, is_braced, reserve, weight_findings
+from rodshell.results.own_weight import falling, is_braced, none_stands, reserve, weight_findings
 from rodshell.results.results import Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
-from rodshell.results.strength_used import (
-    ENDS,
-    THIN,
-    bent_of,
-    by_design_strength,
-    holds_while_erected,
-    strength_name,
-)
+from rodshell.results.strength_used import THIN, bent_of, by_design_strength, holds_while_erected, strength_name
 from rodshell.results.supports import air_findings, width
 from rodshell.results.wording import (
     FORM_AGAIN,
@@ -37,6 +30,7 @@ from rodshell.results.wording import (
     whole_percent,
 )
 from rodshell.rods.design_strength import RESERVED
+from rodshell.rods.supports import PINNED, clamped_among, finals_first
 
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
@@ -54,21 +48,18 @@ def verdict_of(results: Results) -> Verdict:
 
 
 def verdict(results: Results) -> Verdict:
-    """The verdict on the figures of a result.
+    """The verdict on the figures of a result; one that is missing counts as not checked.
 
     An end condition can be used if its shell converged, is stable and carries its own weight, its rods do not touch,
     hold, and are thin enough for their bends. Without one that can be used, or far off the target, the result is
     unbuildable; unknown if one that might be was not computed: a computation that does not converge says nothing about
-    the shell. The deployment that is computed is one of several ways to erect the shell: what breaks on it has to be
-    checked, but where rods of the flat grid touch, no way begins.
+    the shell, nor of its own weight that could not be followed, if the shell falls with the other ends. The deployment
+    that is computed is one of several ways to erect the shell: what breaks on it has to be checked, but where rods of
+    the flat grid touch, no way begins.
 
     The gravest reason comes first: that there is no shell, or none that is stable unloaded; that none is known to stand
     under its own weight; that shells break, touch or fall under loads; the gap to the target; what else is not known;
     then the warnings.
-
-    Parameters
-    ----------
-    results : with checks; a figure that is missing counts as not checked.
     """
     shells = results.pop_up
     faults = {ends: [*_shell_faults(results, ends)] for ends in shells}
@@ -95,14 +86,16 @@ def verdict(results: Results) -> Verdict:
         *gravest, *weight, *sinks, *_loads(results, usable or there), *air_findings(results),
         *_open_points(results, usable), *(word if isinstance(word, Said) else Said(word) for word in results.warnings),
     ]  # fmt: skip
-    standing = set(usable) - falling(results)
+    standing, in_doubt = set(usable) - falling(results), none_stands(results, usable, lost)
     if lost and not standing and not deployment:
-        return _verdict("unknown", [*failed, *to_check])
+        return _verdict("unknown", [*failed, *in_doubt, *to_check])
     if not standing or deployment or off > FAR_OFF:
         return _verdict("unbuildable", to_check)
+    if in_doubt:
+        return _verdict("unknown", [*in_doubt, *to_check])
     if to_check:
-        return _verdict("check", [*to_check, *_perfect(results)])
-    return _verdict("good", [*_merits(results, usable), *_perfect(results)])
+        return _verdict("check", [*to_check, *_flat(results), *_perfect(results)])
+    return _verdict("good", [*_merits(results, usable), *_flat(results), *_perfect(results)])
 
 
 def unknown_below(results: Results) -> float:
@@ -245,8 +238,8 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[Said]:
     bent = bent_of(results, shape)
     used, strain = bent.utilisation, bent.max_bending_strain
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
-    if used is not None and used > 1 and not (shape not in ENDS and holds_while_erected(results, used)):
-        if shape in ENDS and results.rod and "section" in (results.rod.chosen or {}):
+    if used is not None and used > 1 and not (shape in OTHER_SHAPES and holds_while_erected(results, used)):
+        if shape not in OTHER_SHAPES and results.rod and "section" in (results.rod.chosen or {}):
             where += ": the section that was chosen is too thick; give a thinner one (rod.section)"
         yield said(
             "strength" if by_design_strength(results) else "strength: given", _ends(shape), used, 1, place=bent.rod,
@@ -285,13 +278,13 @@ def _erection(results: Results) -> Iterator[Said]:
 
 
 def _ends(shape: str) -> Ends | None:
-    """The end condition of a shape; None for the flat grid and the deployment."""
-    return shape if shape in ENDS else None
+    """The support of a shape; None for the flat grid and the deployment."""
+    return None if shape in OTHER_SHAPES else shape
 
 
 def _shape(shape: str, found: WorstBent | Clearance) -> str:
     """The shape that a sentence is about."""
-    if shape in ENDS:
+    if shape not in OTHER_SHAPES:
         return f"with {shape} ends"
     return "during deployment" if found.share is None else f"at {whole_percent(found.share)} of the deployment"
 
@@ -311,7 +304,7 @@ def _off(results: Results, ends: Ends, gap: Agreement) -> Said:
     kind = (results.joint.kind if results.joint else None) or "ball"
     against_shear = kind not in ("ball", "pin")
     bound = drape is not None and drape.method == "bound"
-    dips = ends == "clamped" and bound and not buckles and not against_shear
+    dips = clamped_among([ends]) and bound and not buckles and not against_shear
     advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
     return said(
         "off_target", ends, gap.max_relative, OFF,
@@ -389,24 +382,27 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
     name = results.bending.strength_of
     used = max((bent_of(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
     if name and used > RESERVED and not by_design_strength(results):
-        whose = strength_name(results, ENDS[0])
+        whose = strength_name(results, usable[0])
         yield said("strength_not_reduced", None, used, RESERVED, share=percent(used), whose=whose)
 
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[Said]:
     """Whether the deployment was checked; what was found there is among a result's warnings."""
-    deployment = results.deployment
+    deployment, flat = results.deployment, results.flat_state
+    if flat is not None and not flat.lies_flat:
+        return  # it is assembled in place
     if not deployment:
-        remedy = "" if late else ": this needs pinned ends (pop_up.ends) and checks.stages above 0"
-        failed = _status(results.pop_up.get("pinned")) != CONVERGED
-        why = ", since the pinned shell was not found" if failed else remedy
+        remedy = "" if late else f": this needs {PINNED} ends (pop_up.ends) and checks.stages above 0"
+        upright = clamped_among(results.pop_up, False)
+        failed = upright and _status(results.pop_up[upright]) != CONVERGED
+        why = f", since the {upright} shell was not found" if failed else remedy
         yield said("not_checked: deployment", why=why)
     elif (
-        "clamped" in usable
+        (clamped := clamped_among(usable))
         and deployment.reached_from_flat
         and (deployment.clamped is None or deployment.clamped.reached_from_flat is None)
     ):
-        yield said("not_checked: clamped", "clamped")
+        yield said("not_checked: clamped", clamped, pinned=deployment.ends or PINNED)
 
 
 def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -420,6 +416,14 @@ def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
         if ends in usable and near:
             distance, energy = min(near, key=lambda pair: pair[0])
             yield said("other_shape", ends, distance, NEAR, distance=percent(distance), energy=rounded(energy))
+
+
+def _flat(results: Results) -> Iterator[Said]:
+    """Whether rods along curves of the target can be laid out flat, which decides how the shell is erected."""
+    if flat := results.flat_state:
+        strain, limit = flat.in_plane_strain, flat.limit or 0.0
+        sentence = "lies_flat" if flat.lies_flat else "in_place" if (strain or 0.0) > limit else "in_place: unstable"
+        yield said(sentence, None, strain, limit, bent=percent(strain or 0.0), withstood=percent(limit))
 
 
 def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -461,36 +465,24 @@ def _mm(results: Results, metres: float | None) -> str:
 
 
 def _gaps(results: Results) -> Iterator[str]:
-    """How near the converged shells come to the target, and which support is better."""
-    faults = {ends: [*_shell_faults(results, ends)] for ends in results.pop_up}
-    known = {
-        ends: gap.max
-        for ends in ENDS
-        if (gap := results.agreement.get(ends)) is not None
-        and gap.max is not None
-        and (shell := results.pop_up.get(ends)) is not None
-        and shell.status == CONVERGED
-    }
-    for ends, largest in known.items():
-        size = results.agreement[ends].max_relative
-        share = "" if size is None else f" ({percent(size)} of its size)"
-        yield f"With {ends} ends the largest gap to the target is {_mm(results, largest)}{share}."
-    if len(known) == len(ENDS) and not any(faults.values()):
-        yield from _advice(known, results.agreement["pinned"].max_relative)
-    elif faults and not results.target:
+    """How near the converged shells come to the target, and which of two supports that can be used is worth it."""
+    known = dict[Ends, float]()
+    for ends in finals_first(results.agreement):
+        gap, shell = results.agreement[ends], results.pop_up.get(ends)
+        if gap.max is not None and shell is not None and shell.status == CONVERGED:
+            known[ends] = gap.max
+            share = "" if gap.max_relative is None else f" ({percent(gap.max_relative)} of its size)"
+            yield f"With {ends} ends the largest gap to the target is {_mm(results, gap.max)}{share}."
+    clamped, pinned = clamped_among(known), clamped_among(known, False)
+    if clamped and pinned and not any([*_shell_faults(results, ends)] for ends in results.pop_up):
+        relative = results.agreement[pinned].max_relative
+        held = f"Supports that hold the rods' directions ({clamped})"
+        if known[clamped] < MUCH_LESS * known[pinned] and (relative is None or relative > NEGLIGIBLE):
+            yield f"{held} leave {percent(known[clamped] / known[pinned])} of the gap that {pinned} ones leave."
+        elif relative is None or relative <= OFF:
+            yield f"{held} bring the unloaded shell little nearer to the target."
+    elif results.pop_up and not results.target:
         yield "This result has no target, so no gap can be stated."
-
-
-def _advice(gaps: Mapping[Ends, float], relative: float | None) -> Iterator[str]:
-    """Which of two supports that can both be used is worth its effort.
-
-    relative : the pinned gap over the target's size.
-    """
-    if gaps["clamped"] < MUCH_LESS * gaps["pinned"] and (relative is None or relative > NEGLIGIBLE):
-        share = percent(gaps["clamped"] / gaps["pinned"])
-        yield f"Supports that hold the rods' directions (clamped) leave {share} of the gap that pinned ones leave."
-    elif relative is None or relative <= OFF:
-        yield "Supports that hold the rods' directions (clamped) bring the unloaded shell little nearer to the target."
 
 
 def _strength(results: Results) -> Iterator[str]:

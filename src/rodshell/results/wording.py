@@ -44,22 +44,13 @@ def rounding_of(results: Results) -> Rounding:
     """The rule for a result: the power of ten not above half of the tolerance, so that rounding takes a quarter of it.
 
     Where no tolerance is given, the power of ten not above a ten-thousandth of the longest rod.
-
-    Parameters
-    ----------
-    results : of which the tolerance of the drawings and the lengths of the rods are used.
     """
     tolerance = results.drawings.tolerance if results.drawings else None
     return rounding_to(tolerance, max((rod.length or 0.0 for rod in results.rods), default=0.0))
 
 
 def rounding_to(tolerance: float | None, longest: float) -> Rounding:
-    """The rule of `rounding_of`.
-
-    Parameters
-    ----------
-    tolerance : of the drawings, or None; longest : length of the longest rod [m].
-    """
+    """The rule of `rounding_of`, by the tolerance of the drawings and the length of the longest rod [m]."""
     asked = 1e3 * OF_ROD * longest if tolerance is None else 0.5 * 1e3 * tolerance
     power = 10.0 ** floor(log10(max(asked, FINEST)) + 1e-9)
     return Rounding(min(max(power, FINEST), COARSEST))
@@ -118,12 +109,7 @@ def shown_factor(limit: float | None) -> str:
 
 
 def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXACT) -> str:
-    """A length [m] in mm with about `digits` significant digits, no finer than its rounding.
-
-    Parameters
-    ----------
-    rounding : the finest that is shown.
-    """
+    """A length [m] in mm with about `digits` significant digits, no finer than its rounding."""
     if metres is None or not isfinite(metres):
         return UNKNOWN
     value = 1e3 * metres
@@ -134,12 +120,7 @@ def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXAC
 
 
 def nice_step(span: float, count: int) -> float:
-    """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less.
-
-    Parameters
-    ----------
-    span : length of the interval; count : of parts.
-    """
+    """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less."""
     if span <= 0:
         return 1.0
     power = 10.0 ** floor(log10(span / count))
@@ -147,12 +128,7 @@ def nice_step(span: float, count: int) -> float:
 
 
 def nice_ticks(low: float, high: float, count: int) -> list[float]:
-    """Round numbers from `low` to `high`, `count` + 1 at most.
-
-    Parameters
-    ----------
-    low, high : ends of the interval; count : of steps at most.
-    """
+    """Round numbers from `low` to `high`, `count` + 1 at most."""
     step = nice_step(high - low, count)
     first, last = ceil(low / step - 1e-9), floor(high / step + 1e-9)
     return [k * step for k in range(first, last + 1)]
@@ -186,33 +162,15 @@ def whole_percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
-def newtons(force: float) -> str:
-    return f"{rounded(force)} N"
+def _in(unit: str, factor: float = 1.0) -> Callable[[float], str]:
+    """How a number of SI is shown in a unit, of which it is `factor` times as many."""
+    return lambda value: f"{rounded(factor * value)}{unit}"
 
 
-def newton_metres(moment: float) -> str:
-    return f"{rounded(moment)} N m"
-
-
-def stress(pascals: float) -> str:
-    """A stress [Pa] in a unit of its size."""
-    return stress_text(pascals)
-
-
-def curvature(value: float) -> str:
-    return f"{rounded(value)} 1/m"
-
-
-def twist_rate(value: float) -> str:
-    return f"{rounded(value * 180 / pi)}\N{DEGREE SIGN}/m"
-
-
-def seconds(time: float) -> str:
-    return f"{time:.2f} s"
-
-
-def degrees(angle: float) -> str:
-    return f"{angle:.1f}\N{DEGREE SIGN}"
+newtons, newton_metres, curvature = _in(" N"), _in(" N m"), _in(" 1/m")
+twist_rate = _in("\N{DEGREE SIGN}/m", 180 / pi)
+stress = stress_text
+seconds, degrees = "{:.2f} s".format, "{:.1f}\N{DEGREE SIGN}".format
 
 
 def small(value: float | None) -> str:
@@ -221,13 +179,7 @@ def small(value: float | None) -> str:
 
 
 def place(point: Sequence[float | None], rounding: Rounding = EXACT) -> str:
-    """A point (3,) [m] in mm.
-
-    Parameters
-    ----------
-    point : (3,) coordinates [m]; None: not known.
-    rounding : how finely they are shown.
-    """
+    """A point (3,) [m] in mm; a coordinate of None is not known."""
     known = [rounding.mm(x).replace("-", MINUS) for x in point if x is not None]
     return f"{', '.join(known)} mm" if len(known) == 3 else UNKNOWN
 
@@ -242,13 +194,7 @@ def plain(value: object) -> str:
 
 
 def case_rows(table: Record | None, rounding: Rounding = EXACT) -> list[tuple[str, str]]:
-    """The entries of a table of the case, in the units of a drawing, files by their names.
-
-    Parameters
-    ----------
-    table : of the case; None has no entries.
-    rounding : how finely lengths are shown at most.
-    """
+    """The entries of a table of the case, in the units of a drawing, files by their names."""
     return [
         (NAMES.get(key, key.replace("_", " ")), _case_value(key, value, CASE_UNITS, rounding))
         for key, value in (table.plain() if table else {}).items()

@@ -28,16 +28,17 @@ source. An edge that turns by half a revolution from its source has no frame: th
 The branch of m_ref holds while m_ref changes by less than pi, which a node that is nearly folded may exceed.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
 from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.validation import brief
 
 
@@ -45,17 +46,16 @@ from rodshell.validation import brief
 class BendTwist:
     """Bends and twists between consecutive edges of rods or linkers [HQK Eq 1b, 1c]. Build it with `starting_at`.
 
-    Parameters
-    ----------
-    blocks : (b, 5) node, twist angle of edge e, node, twist angle of edge f, node; e and f go from node to
-        node in this order. Elements that share an edge agree on its direction and its reference frame.
-    bend_stiffness : (b, 2) EI1 and EI2 over the Voronoi length of the rest state [N m]; EI1 resists bends
-        towards m1 (and so about m2), EI2 bends towards m2.
-    twist_stiffness : (b,) GJ over the same length [N m].
-    natural_curvature : (b, 2) curvatures (k1, k2) at rest [-].
-    natural_twist : (b,) twist at rest [rad].
-    source_tangents, source_directors : (b, 2, 3) t and d1 of e and f in their source frames.
-    source_twist : (b,) reference twist m_ref of the source frames [rad].
+    Args:
+        blocks: (b, 5) node, twist angle of edge e, node, twist angle of edge f, node; e and f go from node to
+            node in this order. Elements that share an edge agree on its direction and its reference frame.
+        bend_stiffness: (b, 2) EI1 and EI2 over the Voronoi length of the rest state [N m]; EI1 resists bends
+            towards m1 (and so about m2), EI2 bends towards m2.
+        twist_stiffness: (b,) GJ over the same length [N m].
+        natural_curvature: (b, 2) curvatures (k1, k2) at rest [-].
+        natural_twist: (b,) twist at rest [rad].
+        source_tangents, source_directors: (b, 2, 3) t and d1 of e and f in their source frames.
+        source_twist: (b,) reference twist m_ref of the source frames [rad].
     """
 
     blocks: Ints
@@ -67,14 +67,15 @@ class BendTwist:
     source_directors: Floats
     source_twist: Floats
 
-    angle_columns = 1, 3
+    angle_columns: ClassVar[tuple[int, ...]] = (1, 3)
+    moduli: ClassVar[tuple[int, ...]] = (0, 1, 2)
     __repr__ = brief
 
     @classmethod
     def starting_at(
         cls,
         blocks: Ints,
-        state: Floats,
+        state: State,
         directors: ArrayLike,
         *,
         bend_stiffness: ArrayLike,
@@ -84,13 +85,12 @@ class BendTwist:
     ) -> Self:
         """Elements whose source frames are those of `state`.
 
-        Parameters
-        ----------
-        blocks : (b, 5), see the class.
-        state : (N, 3) node positions [m] and twist angles [rad].
-        directors : (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for
-            all, such as z on a flat grid. Only their part perpendicular to the edge is used.
-        bend_stiffness, twist_stiffness, natural_curvature, natural_twist : see the class; broadcast over the elements.
+        Args:
+            blocks: (b, 5), see the class.
+            directors: (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for
+                all, such as z on a flat grid. Only their part perpendicular to the edge is used.
+            bend_stiffness, twist_stiffness, natural_curvature, natural_twist: see the class; broadcast over the
+                elements.
         """
         count = len(blocks)
         tangents = _tangents(state, blocks)
@@ -107,15 +107,25 @@ class BendTwist:
             _reference_twist(tangents, first_directors),
         )
 
-    def relaxed(self, state: Floats) -> Self:
-        """The same elements with `state` (N, 3) as their stress-free state, as linkers have the flat grid.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def relaxed(self, state: State) -> Self:
+        """The same elements with `state` (N, 3) as their stress-free state, as linkers have the flat grid."""
         strains = self.strains(state)
         return replace(self, natural_curvature=strains[:, :2].copy(), natural_twist=strains[:, 2].copy())
+
+    def between(self, held: Self, t: float) -> Self:
+        """See `BendElements.between`."""
+        if t >= 1 or held is self:
+            return self
+        return replace(
+            self,
+            natural_curvature=(1 - t) * held.natural_curvature + t * self.natural_curvature,
+            natural_twist=(1 - t) * held.natural_twist + t * self.natural_twist,
+        )
+
+    def with_stiffness(self, stiffness: Floats) -> Self:
+        """See `BendElements.with_stiffness`; without bending they stay so."""
+        bend = stiffness[:, :2].copy() if self.bend_stiffness.any() else 0.0 * self.bend_stiffness
+        return replace(self, bend_stiffness=bend, twist_stiffness=stiffness[:, 2].copy())
 
     @property
     def parts(self) -> tuple[Self, ...]:
@@ -127,13 +137,8 @@ class BendTwist:
             replace(self, bend_stiffness=no_bend),
         )
 
-    def strains(self, state: Floats) -> Floats:
-        """(b, 3) curvatures k1, k2 (integrated, [-]) and twist tau [rad] at `state` (N, 3).
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def strains(self, state: State) -> Floats:
+        """(b, 3) curvatures k1, k2 (integrated, [-]) and twist tau [rad] at `state` (N, 3)."""
         moved = self.refreshed(state)
         theta, m1 = state[self.blocks[:, 1:4:2], 0], moved.material_directors(state)
         te, tf = moved.source_tangents[:, 0], moved.source_tangents[:, 1]
@@ -142,18 +147,13 @@ class BendTwist:
         k1, k2 = ((dot(tf, m[:, 0]) - dot(te, m[:, 1])) / both for m in (m1, m2))
         return np.column_stack([k1, k2, theta[:, 1] - theta[:, 0] + moved.source_twist])
 
-    def material_directors(self, state: Floats) -> Floats:
-        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def material_directors(self, state: State) -> Floats:
+        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`."""
         theta = state[self.blocks[:, 1:4:2], 0, None]
         d1 = self.source_directors
         return np.asarray(np.cos(theta) * d1 + np.sin(theta) * cross(self.source_tangents, d1))
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _bend_twist(
@@ -171,7 +171,7 @@ class BendTwist:
             )
         )
 
-    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+    def stress_stiffness(self, state: State, motion: Floats, hessians: Floats) -> None:
         """Of the change of the moments: see `Stressed.stress_stiffness`.
 
         The energy is quadratic in the strains, so that natural strains less by their change add just these moments.
@@ -187,7 +187,7 @@ class BendTwist:
         less.evaluate(state, scrap, hessians)
         hessians -= before
 
-    def refreshed(self, state: Floats) -> Self:
+    def refreshed(self, state: State) -> Self:
         """The same elements with their source frames at `state` (N, 3): strains and angles do not change."""
         source = self.source_tangents, self.source_directors, self.source_twist
         tangents, directors, twist = (np.empty_like(part) for part in source)
@@ -199,13 +199,17 @@ class BendTwist:
 PROBE = 1e-5  # of the shortest edge, or rad: motion over which the change of strains is taken; good to 1e-9
 
 
-def strain_rates(elements: BendTwist, state: Floats, motion: Floats) -> Floats:
+def frames_among(sets: Sequence[Elements]) -> BendTwist | None:
+    """The first of these energies that carries frames of rods."""
+    return next((elements for elements in sets if isinstance(elements, BendTwist)), None)
+
+
+def strain_rates(elements: BendTwist, state: State, motion: Floats) -> Floats:
     """(b, 3) derivative of the strains along a motion, by central differences.
 
-    Parameters
-    ----------
-    elements : their source frames being at, or near, the state.
-    state, motion : (N, 3) [m, rad].
+    Args:
+        elements: their source frames being at, or near, the state.
+        state, motion: (N, 3) [m, rad].
     """
     apart, moved = state[elements.blocks[:, 2:5:2]] - state[elements.blocks[:, 0:3:2]], np.abs(motion[elements.blocks])
     moved[:, ::2] /= np.linalg.norm(apart, axis=2).min(initial=np.inf)
@@ -217,7 +221,7 @@ def strain_rates(elements: BendTwist, state: Floats, motion: Floats) -> Floats:
     return np.asarray((ahead - behind) / (2 * step))
 
 
-def _tangents(state: Floats, blocks: Ints) -> Floats:
+def _tangents(state: State, blocks: Ints) -> Floats:
     """(b, 2, 3) unit tangents of the edges e and f."""
     return unit(state[blocks[:, 2:5:2]] - state[blocks[:, 0:3:2]])
 
@@ -237,7 +241,7 @@ def _shares_edge(stencils, b):  # type: ignore[no-untyped-def]
     return here[1] == before[3] and here[0] == before[2] and here[2] == before[4]
 
 
-@njit(error_model="numpy", fastmath={"contract"})
+@njit("f2 i2 f3 f3 f1 f3 f3 f1", fastmath={"contract"})
 def _transported(x, stencils, sources, source_directors, source_twist, tangents, directors, twist):  # type: ignore[no-untyped-def]
     """Frames and reference twists transported from the sources to the state x; fills the last three arguments."""
     for b in range(stencils.shape[0]):
@@ -280,7 +284,7 @@ def _transported(x, stencils, sources, source_directors, source_twist, tangents,
         twist[b] = angle + 2.0 * np.pi * np.floor((source_twist[b] - angle) / (2.0 * np.pi) + 0.5)
 
 
-@njit(error_model="numpy", nogil=True, fastmath={"contract"})
+@njit("f2 i2 f2 f1 f2 f1 f3 f3 f1 f2 f3", nogil=True, fastmath={"contract"})
 def _bend_twist(  # type: ignore[no-untyped-def]
     x, stencils, bend, twist, natural, natural_twist, tangents, directors, source_twist, gradient, hessians
 ):
@@ -456,13 +460,12 @@ def _bend_twist(  # type: ignore[no-untyped-def]
 def spread(hee, hef, hff, he3, he7, hf3, hf7, h33, h37, h77, h):  # type: ignore[no-untyped-def]
     """Fill the element Hessian h (15, 15), by x_0, theta_e, x_1, theta_f, x_2, from that by e, theta_e, f, theta_f.
 
-    Parameters
-    ----------
-    hee, hef, hff : (3, 3) second derivatives by the edge vectors e and e, e and f, f and f.
-    he3, he7 : (3,) by e and theta_e, and by e and theta_f.
-    hf3, hf7 : (3,) by f and theta_e, and by f and theta_f.
-    h33, h37, h77 : by theta_e twice, by both angles, and by theta_f twice.
-    h : (15, 15), filled; rows and columns of the unused components of the angles get zeros.
+    Args:
+        hee, hef, hff: (3, 3) second derivatives by the edge vectors e and e, e and f, f and f.
+        he3, he7: (3,) by e and theta_e, and by e and theta_f.
+        hf3, hf7: (3,) by f and theta_e, and by f and theta_f.
+        h33, h37, h77: by theta_e twice, by both angles, and by theta_f twice.
+        h: (15, 15), filled; rows and columns of the unused components of the angles get zeros.
     """
     for i in range(15):
         for j in (4, 5, 10, 11):

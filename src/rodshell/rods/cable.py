@@ -7,24 +7,22 @@ becomes taut, the force does not.
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.arrays import Bools, Floats, Ints, State
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)
-class CableStretch:
+class CableStretch(WithoutFrames):
     """Tension-only members.
 
-    Parameters
-    ----------
-    blocks : (m, 2) nodes of each cable.
-    rest_lengths : (m,) at which it becomes taut [m].
-    stiffness : (m,) EA [N].
+    Args:
+        blocks: (m, 2) nodes of each cable.
+        rest_lengths: (m,) at which it becomes taut [m].
+        stiffness: (m,) EA [N].
     """
 
     blocks: Ints
@@ -33,7 +31,7 @@ class CableStretch:
 
     __repr__ = brief
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         apart, length, strain = self._strains(state)
         taut = np.flatnonzero(strain > 0)
@@ -51,7 +49,7 @@ class CableStretch:
             hessians[taut, :3, 3:] = hessians[taut, 3:, :3] = -local
         return 0.5 * float(np.sum(force * strain[taut] * self.rest_lengths[taut]))
 
-    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+    def stress_stiffness(self, state: State, motion: Floats, hessians: Floats) -> None:
         """Of the change of the tensions: see `Stressed.stress_stiffness`; slack cables stay slack, taut ones taut."""
         apart, length, strain = self._strains(state)
         axis = apart / length[:, None]
@@ -61,19 +59,15 @@ class CableStretch:
         hessians[:, :3, :3] = hessians[:, 3:, 3:] = local
         hessians[:, :3, 3:] = hessians[:, 3:, :3] = -local
 
-    def refreshed(self, state: Floats) -> Self:
-        """The same: there are no source frames."""
-        return self
-
-    def forces(self, state: Floats) -> Floats:
+    def forces(self, state: State) -> Floats:
         """(m,) tension [N] at `state` (N, 3); 0 where slack."""
         return np.asarray(self.stiffness * np.maximum(self._strains(state)[2], 0.0))
 
-    def taut(self, state: Floats) -> Bools:
+    def taut(self, state: State) -> Bools:
         """(m,) whether each cable carries a force at `state` (N, 3)."""
         return np.asarray(self._strains(state)[2] > 0)
 
-    def _strains(self, state: Floats) -> tuple[Floats, Floats, Floats]:
+    def _strains(self, state: State) -> tuple[Floats, Floats, Floats]:
         """From node to node (m, 3), its length (m,) [m], and the strains (m,), those of slack cables negative."""
         apart = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
         length = np.linalg.norm(apart, axis=1)

@@ -12,8 +12,8 @@ from rodshell.rods.materials import Material, PresetName
 
 Duration = Literal["permanent", "long", "medium", "short", "instantaneous"]
 DURATIONS: tuple[Duration, ...] = ("permanent", "long", "medium", "short", "instantaneous")
-ServiceClass = Literal[1, 2, 3]
-COVERED: ServiceClass = 2  # where none is given
+_ServiceClass = Literal[1, 2, 3]
+_COVERED: _ServiceClass = 2  # where none is given
 RESERVED = (
     0.5  # share of a characteristic, short-term strength that rods may use permanently where no factors are known
 )
@@ -23,12 +23,12 @@ RESERVED = (
 class DesignFactors:
     """What a code makes of characteristic strengths.
 
-    Parameters
-    ----------
-    factors : for each service class, by duration in the order of `DURATIONS`; a single row: it does not matter.
-    axial : axial strength over bending strength, of tension and compression the lower.
-    cracked : share of the section that carries shear forces in spite of cracks.
-    creep : for each service class, how much larger a deflection under permanent loads becomes, k_def; empty: unknown.
+    Args:
+        factors: for each service class, by duration in the order of `DURATIONS`; a single row: it does not matter.
+        axial: axial strength over bending strength, of tension and compression the lower.
+        cracked: share of the section that carries shear forces in spite of cracks.
+        creep: for each service class, how much larger a deflection under permanent loads becomes, k_def; empty:
+            unknown.
     """
 
     factors: tuple[tuple[float, ...], ...]
@@ -41,9 +41,8 @@ class DesignFactors:
     def by_duration(self, service_class: int) -> dict[Duration, float]:
         """Design strength over characteristic strength.
 
-        Parameters
-        ----------
-        service_class : 1 (inside), 2 (covered) or 3 (in the weather).
+        Args:
+            service_class: 1 (inside), 2 (covered) or 3 (in the weather).
         """
         row = self.factors[service_class - 1 if len(self.factors) > 1 else 0]
         return {name: factor / self.partial for name, factor in zip(DURATIONS, row, strict=True)}
@@ -83,12 +82,11 @@ DESIGN: dict[PresetName, DesignFactors] = {
 def permanent_strength(material: Material, service_class: int | None = None) -> float | None:
     """What a preset withstands permanently [Pa]; without cited factors `RESERVED` of its strength; None: not known.
 
-    Parameters
-    ----------
-    material : a preset; of other materials nothing is known.
+    Args:
+        material: a preset; of other materials nothing is known.
     """
     if material.name is None or material.bending_strength is None:
         return None
     factors = DESIGN.get(material.name)
-    share = RESERVED if factors is None else factors.by_duration(service_class or COVERED)["permanent"]
+    share = RESERVED if factors is None else factors.by_duration(service_class or _COVERED)["permanent"]
     return share * material.bending_strength

@@ -15,81 +15,84 @@ triangles, each by
 """
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
-from rodshell.rods.bend_twist import BendTwist, spread, strain_rates
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.bend_twist import BendTwist, spread
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import brief
 
 AT_ONCE = 64  # bends, whose numbers all stay in the processor's first cache
 
 
 @dataclass(frozen=True, eq=False)
-class IsotropicBend:
+class IsotropicBend(WithoutFrames):
     """Bends between consecutive edges of rods without twist angles [HQK Eq 1b].
 
-    Parameters
-    ----------
-    blocks : (b, 3) nodes: previous, middle, next.
-    stiffness : (b,) EI over the Voronoi length of the rest state [N m].
+    Args:
+        blocks: (b, 3) nodes: previous, middle, next.
+        stiffness: (b,) EI over the Voronoi length of the rest state [N m].
     """
 
     blocks: Ints
     stiffness: Floats
 
+    angle_columns: ClassVar[tuple[int, ...]] = ()
+    moduli: ClassVar[tuple[int, ...]] = (0,)
     __repr__ = brief
+
+    @property
+    def bend_stiffness(self) -> Floats:
+        """(b, 1) EI over the Voronoi length [N m]."""
+        return self.stiffness[:, None]
 
     @property
     def parts(self) -> tuple[Self, ...]:
         """The energies of each stiffness alone: it has one."""
         return (self,)
 
-    def curvatures(self, state: Floats) -> Floats:
-        """(b,) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-].
+    def with_stiffness(self, stiffness: Floats) -> Self:
+        """See `BendElements.with_stiffness`."""
+        return replace(self, stiffness=stiffness[:, 0].copy())
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        """
+    def relaxed(self, state: State) -> Self:
+        """The same: they are naturally straight."""
+        return self
+
+    def between(self, held: Self, t: float) -> Self:
+        """The same, as of `relaxed`."""
+        return self
+
+    def strains(self, state: State) -> Floats:
+        """(b, 3) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-]; without frames the other two are zero."""
         x = state[self.blocks]
         before, after = unit(x[:, 1] - x[:, 0]), unit(x[:, 2] - x[:, 1])
         # unit vectors at an angle phi differ by 2 sin(phi/2) and add up to 2 cos(phi/2)
-        return np.asarray(2 * np.linalg.norm(after - before, axis=1) / np.linalg.norm(after + before, axis=1))
+        curvature = 2 * np.linalg.norm(after - before, axis=1) / np.linalg.norm(after + before, axis=1)
+        return np.column_stack([curvature, 0 * curvature, 0 * curvature])
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(_isotropic_bend(state, self.blocks, self.stiffness, gradient, hessians))
-
-    def refreshed(self, state: Floats) -> Self:
-        """The same: there are no source frames."""
-        return self
 
 
 @dataclass(frozen=True, eq=False)
 class IsotropicBendTwist(BendTwist):
-    """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature."""
+    """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature.
 
+    In buckling, bending keeps its stiffness: it knows no frames, and no strains that could stay while moments change.
+    """
+
+    moduli: ClassVar[tuple[int, ...]] = (0, 2)
     __repr__ = brief
 
-    def relaxed(self, state: Floats) -> Self:
+    def relaxed(self, state: State) -> Self:
         """The same elements with the twist of `state` as their natural twist: these rods are naturally straight."""
         return replace(self, natural_twist=self.strains(state)[:, 2].copy())
-
-    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
-        """Of the change of the torsional moments: see `Stressed.stress_stiffness`.
-
-        Bending knows no frames, and no strains that could stay while its moments change: it keeps its stiffness.
-        """
-        twist = strain_rates(self, state, motion)[:, 2]
-        scrap, before = np.zeros_like(state), np.zeros_like(hessians)
-        self.evaluate(state, scrap, before)
-        replace(self, natural_twist=self.natural_twist - twist).evaluate(state, scrap, hessians)
-        hessians -= before
 
     @property
     def parts(self) -> tuple[Self, ...]:
@@ -97,7 +100,7 @@ class IsotropicBendTwist(BendTwist):
         bend, twist = self.bend_stiffness, self.twist_stiffness
         return replace(self, twist_stiffness=0.0 * twist), replace(self, bend_stiffness=0.0 * bend)
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _isotropic_bend_twist(
@@ -114,7 +117,7 @@ class IsotropicBendTwist(BendTwist):
         )
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("f2 i2 f1 f2 f3", nogil=True)
 def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, x_1, x_2) [m]; energies [J]. e = x_1 - x_0, f = x_2 - x_1; s, t their unit vectors.
 
@@ -189,7 +192,7 @@ def _bend_hessians(s, t, ge, gf, c, first, second, per_e, per_f, start, size, he
                 hessian[i + 6, j], hessian[i + 6, j + 3], hessian[i + 6, j + 6] = -fe, fe - ff, ff
 
 
-@njit(error_model="numpy", nogil=True, fastmath={"contract"})
+@njit("f2 i2 f2 f1 f1 f3 f1 f2 f3", nogil=True, fastmath={"contract"})
 def _isotropic_bend_twist(x, stencils, bend, twist, natural_twist, sources, source_twist, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, theta_e, x_1, theta_f, x_2) [m, rad]; energies [J].
 

@@ -6,14 +6,14 @@ these, to about 1e-8: Newton's method takes an iteration more now and then, and 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.validation import array, function_of
 
 TINY = 1e-200  # complex step: no difference is taken, so nothing is lost
@@ -21,19 +21,17 @@ STEP = 1e-6  # of the extent of the nodes: step of the differences
 
 
 @dataclass(frozen=True, eq=False)
-class LocalEnergy:
+class LocalEnergy(WithoutFrames):
     """A sum of energies of a few nodes each, see `rodshell.settle`.
 
-    Parameters
-    ----------
-    blocks : (m, k) the nodes of each of its m parts.
-    formula : of the positions (m, k, 3) of these nodes [m], the energy (m,) of each part [J]: written with NumPy, and
-        for complex numbers too (`np.sqrt((v * v).sum(-1))` in place of `np.linalg.norm(v, axis=-1)`; no `abs`, which
-        forgets the step). A force that is constant is an energy as well, less the work that it does.
+    Args:
+        blocks: (m, k) the nodes of each of its m parts.
+        formula: of the positions (m, k, 3) of these nodes [m], the energy (m,) of each part [J]: written with NumPy,
+            and for complex numbers too (`np.sqrt((v * v).sum(-1))` in place of `np.linalg.norm(v, axis=-1)`; no `abs`,
+            which forgets the step). A force that is constant is an energy as well, less the work that it does.
 
-    Raises
-    ------
-    InputError : the formula is not a function of positions; the nodes are not a table of whole numbers.
+    Raises:
+        InputError: the formula is not a function of positions; the nodes are not a table of whole numbers.
     """
 
     blocks: Ints
@@ -47,7 +45,7 @@ class LocalEnergy:
         wanted = "a function of the positions (m, k, 3) of nodes"
         function_of("the formula of an energy", self.formula, wanted, np.zeros((*blocks.shape, 3)))
 
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         at = state[self.blocks]
         np.add.at(gradient, self.blocks, self._gradient(at))
         if hessians.size:
@@ -60,9 +58,6 @@ class LocalEnergy:
                 hessians[:, :, 3 * k + x] = change.reshape(len(at), -1) / (2 * step)
             hessians[:] = 0.5 * (hessians + hessians.swapaxes(1, 2))
         return float(self._energies(at).sum())
-
-    def refreshed(self, state: Floats) -> Self:
-        return self
 
     def _gradient(self, at: Floats) -> Floats:
         gradient = np.empty_like(at)

@@ -21,12 +21,11 @@ PresetName = Literal["larch", "spruce", "oak", "bamboo", "gfrp", "plywood", "pet
 class Preset:
     """A named material.
 
-    Parameters
-    ----------
-    youngs_modulus, shear, density : mean values [Pa, Pa, kg/m3]; shear None: incompressible, Poisson's ratio 0.5.
-    bending_strength, shear_strength : characteristic and short-term [Pa]; None: the source has none.
-    grade : to which the figures apply.
-    strength_note : what the strengths mean, and for what they must be reduced.
+    Args:
+        youngs_modulus, shear, density: mean values [Pa, Pa, kg/m3]; shear None: incompressible, Poisson's ratio 0.5.
+        bending_strength, shear_strength: characteristic and short-term [Pa]; None: the source has none.
+        grade: to which the figures apply.
+        strength_note: what the strengths mean, and for what they must be reduced.
     """
 
     youngs_modulus: float
@@ -39,7 +38,7 @@ class Preset:
     source: str
 
 
-MOISTURE = "characteristic, short-term"
+_MOISTURE = "characteristic, short-term"
 
 PRESETS: dict[PresetName, Preset] = {
     "larch": Preset(
@@ -47,7 +46,7 @@ PRESETS: dict[PresetName, Preset] = {
         600.0,  # EN 350: European larch 470 to 650, mean 600 at 12 % moisture; the class itself says 460 at least
         30e6, 4.0e6,  # EN 338:2016, C30
         "strength class C30",
-        MOISTURE,
+        _MOISTURE,
         "EN 338:2016 (C30, to which EN 1912 assigns larch of a high visual grade); density of the species by EN 350",
     ),
     "spruce": Preset(
@@ -55,7 +54,7 @@ PRESETS: dict[PresetName, Preset] = {
         460.0,  # EN 350: Norway spruce 440 to 470
         24e6, 4.0e6,  # EN 338:2016, C24
         "strength class C24",
-        MOISTURE,
+        _MOISTURE,
         "EN 338:2016 (class C24); density of the species by EN 350",
     ),
     "oak": Preset(
@@ -63,7 +62,7 @@ PRESETS: dict[PresetName, Preset] = {
         710.0,  # EN 350: European oak 670 to 760
         30e6, 3.9e6,  # EN 338:2016, D30
         "strength class D30",
-        MOISTURE,
+        _MOISTURE,
         "EN 338:2016 (class D30); density of the species by EN 350",
     ),
     "bamboo": Preset(
@@ -72,7 +71,7 @@ PRESETS: dict[PresetName, Preset] = {
         700.0,  # air-dry
         46e6, 4e6,  # 5th percentiles of tests
         "Guadua angustifolia, round culms",
-        MOISTURE,
+        _MOISTURE,
         "Trujillo, Bamboo structures in Colombia, The Structural Engineer 2007 (5th percentiles and mean modulus of "
         "tests like those of ISO 22157); shear modulus and density typical of the species' literature",
     ),
@@ -82,7 +81,7 @@ PRESETS: dict[PresetName, Preset] = {
         1850.0,  # E-glass and polyester, 55 to 65 % of glass by mass: 1750 to 1950
         240e6, 25e6,  # EN 13706-3, E23: axial flexural strength, interlaminar shear strength, at least
         "pultruded profile, class E23",
-        MOISTURE,
+        _MOISTURE,
         "EN 13706-3:2002, E23, minimum properties; shear modulus and density typical of pultruders' design manuals",
     ),
     "plywood": Preset(
@@ -91,7 +90,7 @@ PRESETS: dict[PresetName, Preset] = {
         680.0,  # mean
         40.2e6, 2.67e6,  # characteristic; planar (rolling) shear, the lower of the two
         "birch throughout, 18 mm, strips along the face grain",
-        MOISTURE,
+        _MOISTURE,
         "Handbook of Finnish Plywood, birch of 1.4 mm veneers (EN 636, EN 789)",
     ),
     "petg": Preset(
@@ -127,15 +126,13 @@ PRESETS: dict[PresetName, Preset] = {
 class Material:
     """Linear elastic material.
 
-    Parameters
-    ----------
-    poisson_ratio : [-], above -1 and up to 0.5, which is incompressible.
-    shear : shear modulus [Pa] in place of Poisson's ratio, as for timber, which is not isotropic.
-    name : of the preset, which has the strengths; set by `Material.preset`.
+    Args:
+        poisson_ratio: [-], above -1 and up to 0.5, which is incompressible.
+        shear: shear modulus [Pa] in place of Poisson's ratio, as for timber, which is not isotropic.
+        name: of the preset, which has the strengths; set by `Material.preset`.
 
-    Raises
-    ------
-    InputError : a value is out of range; Poisson's ratio and a shear modulus are both given; no such preset.
+    Raises:
+        InputError: a value is out of range; Poisson's ratio and a shear modulus are both given; no such preset.
     """
 
     youngs_modulus: Annotated[
@@ -157,12 +154,12 @@ class Material:
         if "shear" in given and "poisson_ratio" in given:
             raise InputError(f"{path}.shear stands in place of poisson_ratio: leave one of them out")
         if isinstance(name := given.get("preset"), str) and name in get_args(PresetName):
-            given = preset_values(name, given)
+            given = _preset_values(name, given)
         return {"density": 1000.0, **given}
 
     def __post_init__(self) -> None:
         if self.name is not None:
-            preset_named(self.name)
+            _preset_named(self.name)
         names = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio", "shear": "shear modulus"}
         checked(self, names)
         if not -1 < self.poisson_ratio <= 0.5:
@@ -174,19 +171,17 @@ class Material:
     def preset(cls, name: PresetName, **changed: float) -> Self:
         """A named material.
 
-        Parameters
-        ----------
-        name : of the preset, such as "larch".
-        changed : values that replace the preset's: youngs_modulus, density, shear or poisson_ratio.
+        Args:
+            name: of the preset, such as "larch".
+            changed: values that replace the preset's: youngs_modulus, density, shear or poisson_ratio.
 
-        Raises
-        ------
-        InputError : there is no such preset; a value cannot be used.
+        Raises:
+            InputError: there is no such preset; a value cannot be used.
         """
         for key in changed:
             if key not in _REPLACEABLE:
                 raise InputError(f"a preset has no {key} to replace: its values are {', '.join(_REPLACEABLE)}")
-        return cls(**preset_values(name, changed), name=name)
+        return cls(**_preset_values(name, changed), name=name)
 
     @property
     def shear_modulus(self) -> float:
@@ -212,30 +207,16 @@ class Material:
         return {key: value for key, value in keys.items() if key != "poisson_ratio" or self.shear is None}
 
 
-def preset_named(name: str) -> Preset:
-    """The preset of this `name`.
-
-    Raises
-    ------
-    InputError : there is no such preset.
-    """
+def _preset_named(name: str) -> Preset:
+    """The preset of this `name`; an InputError where there is none."""
     if not isinstance(name, str) or name not in get_args(PresetName):
         raise InputError(f"there is no material {shown(name)}: use {', '.join(get_args(PresetName))}")
     return PRESETS[name]  # type: ignore[index]
 
 
-def preset_values(name: str, changed: dict[str, Any]) -> dict[str, Any]:
-    """Keyword arguments of `Material` for the preset `name` with some values `changed`.
-
-    Parameters
-    ----------
-    changed : values that replace the preset's, by their names.
-
-    Raises
-    ------
-    InputError : there is no such preset.
-    """
-    known = preset_named(name)
+def _preset_values(name: str, changed: dict[str, Any]) -> dict[str, Any]:
+    """Keyword arguments of `Material` for the preset `name` with some values `changed`."""
+    known = _preset_named(name)
     values: dict[str, Any] = {key: getattr(known, key) for key in ("youngs_modulus", "shear", "density")}
     if "poisson_ratio" in changed or known.shear is None:
         del values["shear"]

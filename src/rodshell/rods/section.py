@@ -29,18 +29,59 @@ from rodshell.validation import brief, instance
 MM = 1e-3
 
 
-class _Round:
-    """A section whose second moment of area is the same about every diameter."""
+class _Shape:
+    """What follows from a section's outline: an ellipse, or else a box."""
+
+    boxed: ClassVar = False
+    shear_peak: ClassVar[float | None] = 4.0 / 3.0  # largest shear stress of a shear force over its mean; None: unknown
+
+    @property
+    def half_widths(self) -> tuple[float, float] | None:
+        """Half the outline's width along m1 and along m2 [m]; None: unknown."""
+        raise NotImplementedError
+
+    @property
+    def round(self) -> bool:
+        """Whether the outline is a circle."""
+        half = self.half_widths
+        return half is not None and not self.boxed and half[0] == half[1]
+
+    @property
+    def depth(self) -> float:
+        """The larger width [m]; 0: unknown."""
+        return 2 * max(self.half_widths or (0.0,))
+
+    def hole(self, diameter: float) -> tuple[float, float]:
+        """Area [m2] and second moment against bends towards m1 [m4] that a hole along m1 takes away."""
+        depth = 2 * (self.half_widths or (0.0,))[0]
+        return diameter * depth, diameter * depth**3 / 12
+
+
+class _Round(_Shape):
+    """A circle, solid or with a hole, whose second moment of area is the same about every diameter."""
+
+    round = True
+    radius: float
 
     @property
     def outer_radius(self) -> float:
         """[m]"""
-        raise NotImplementedError
+        return self.radius
+
+    @property
+    def inner_radius(self) -> float:
+        """[m]"""
+        return 0.0
+
+    @property
+    def area(self) -> float:
+        """[m2]"""
+        return pi * (self.radius**2 - self.inner_radius**2)
 
     @property
     def second_moment(self) -> float:
         """Second moment of area about any diameter [m4]."""
-        raise NotImplementedError
+        return pi * (self.radius**4 - self.inner_radius**4) / 4
 
     @property
     def second_moments(self) -> tuple[float, float]:
@@ -53,9 +94,8 @@ class _Round:
         return 2 * self.second_moment
 
     @property
-    def depth(self) -> float:
-        """The diameter [m]."""
-        return 2 * self.outer_radius
+    def half_widths(self) -> tuple[float, float]:
+        return self.outer_radius, self.outer_radius
 
 
 @dataclass(frozen=True)
@@ -68,27 +108,13 @@ class Circle(_Round):
     def __post_init__(self) -> None:
         checked(self, "section {}")
 
-    @property
-    def outer_radius(self) -> float:
-        """[m]"""
-        return self.radius
-
-    @property
-    def area(self) -> float:
-        """[m2]"""
-        return pi * self.radius**2
-
-    @property
-    def second_moment(self) -> float:
-        """Second moment of area about any diameter [m4]."""
-        return pi * self.radius**4 / 4
-
 
 @dataclass(frozen=True)
 class Tube(_Round):
     """Circular tube, whose wall is not thicker than its radius."""
 
     kind: ClassVar = "tube"
+    shear_peak: ClassVar = 2.0
     radius: Annotated[Length, "outer radius"]
     thickness: Annotated[Length, "thickness of the tube's wall"]
 
@@ -98,28 +124,17 @@ class Tube(_Round):
             raise InputError(f"tube thickness {self.thickness} m is larger than its radius {self.radius} m")
 
     @property
-    def outer_radius(self) -> float:
-        """[m]"""
-        return self.radius
-
-    @property
     def inner_radius(self) -> float:
         """[m]"""
         return self.radius - self.thickness
 
-    @property
-    def area(self) -> float:
-        """[m2]"""
-        return pi * (self.radius**2 - self.inner_radius**2)
-
-    @property
-    def second_moment(self) -> float:
-        """Second moment of area about any diameter [m4]."""
-        return pi * (self.radius**4 - self.inner_radius**4) / 4
+    def hole(self, diameter: float) -> tuple[float, float]:
+        """As of every section, through both walls."""
+        return 2 * diameter * self.thickness, 2 * diameter * (self.radius**3 - self.inner_radius**3) / 3
 
 
 @dataclass(frozen=True)
-class Ellipse:
+class Ellipse(_Shape):
     """Solid ellipse with half-axes along m1 and m2."""
 
     kind: ClassVar = "ellipse"
@@ -145,16 +160,17 @@ class Ellipse:
         return pi * (self.a * self.b) ** 3 / (self.a**2 + self.b**2)
 
     @property
-    def depth(self) -> float:
-        """The longer axis [m]."""
-        return 2 * max(self.a, self.b)
+    def half_widths(self) -> tuple[float, float]:
+        return self.a, self.b
 
 
 @dataclass(frozen=True)
-class RectangularSection:
+class RectangularSection(_Shape):
     """Solid rectangle with sides along m1 and m2. (`rodshell.Rectangle` is a target's domain.)"""
 
     kind: ClassVar = "rectangle"
+    boxed: ClassVar = True
+    shear_peak: ClassVar = 1.5
     width: Annotated[Length, "side along the grid's normal: of a flat lath its thickness"]
     height: Annotated[Length, "side within the grid: of a flat lath its breadth"]
 
@@ -180,13 +196,12 @@ class RectangularSection:
         return wide * thin**3 * (1 / 3 - 64 / pi**5 * thin / wide * series)
 
     @property
-    def depth(self) -> float:
-        """The longer side [m]."""
-        return max(self.width, self.height)
+    def half_widths(self) -> tuple[float, float]:
+        return 0.5 * self.width, 0.5 * self.height
 
 
 @dataclass(frozen=True)
-class GivenSection:
+class GivenSection(_Shape):
     """Stiffnesses and masses as they are, of a composite or a measured rod; such a rod takes no material.
 
     EI1 and EI2 are against bends towards m1 and m2. The rotary inertia is needed only for dynamics with twist. With the
@@ -195,6 +210,8 @@ class GivenSection:
     """
 
     kind: ClassVar = "given"
+    boxed: ClassVar = True
+    shear_peak: ClassVar = None
     EA: Annotated[Force, "axial stiffness"]
     EI1: Annotated[BendingStiffness, "bending stiffness out of the grid"]
     EI2: Annotated[BendingStiffness, "bending stiffness within the grid"]
@@ -214,6 +231,11 @@ class GivenSection:
     def __post_init__(self) -> None:
         checked(self)
 
+    @property
+    def half_widths(self) -> tuple[float, float] | None:
+        """Of the box that its fibre distances span."""
+        return self.fibre_distances
+
 
 Sized = Ellipse | RectangularSection
 Section = Circle | Tube | Sized
@@ -224,14 +246,12 @@ SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 class Rod:
     """One kind of rod; its section and material give the stiffnesses of HQK Eq 1.
 
-    Parameters
-    ----------
-    section : its cross-section. A `GivenSection` has the stiffnesses itself.
-    material : what it is made of; None only with a `GivenSection`.
+    Args:
+        section: its cross-section. A `GivenSection` has the stiffnesses itself.
+        material: what it is made of; None only with a `GivenSection`.
 
-    Raises
-    ------
-    InputError : section or material are something else, or exclude each other.
+    Raises:
+        InputError: section or material are something else, or exclude each other.
     """
 
     section: Annotated[Section | GivenSection, "section and material"]
@@ -276,9 +296,8 @@ class Rod:
     def bend_stiffness(self) -> float:
         """EI [N m2] of a rod with the same bending stiffness in all directions.
 
-        Raises
-        ------
-        InputError : it has two.
+        Raises:
+            InputError: it has two.
         """
         first, second = self.bend_stiffnesses
         if first != second:
@@ -319,12 +338,7 @@ class Rod:
 
 
 def scaled(section: Section, factor: float) -> Section:
-    """The same shape of section with all its lengths times `factor` [-].
-
-    Parameters
-    ----------
-    factor : of all its lengths [-].
-    """
+    """The same shape of section with all its lengths times `factor` [-]."""
     return type(section)(**{key: factor * value for key, value in vars(section).items()})
 
 

@@ -20,20 +20,19 @@ from rodshell.errors import InputError
 from rodshell.rods.section import Ellipse, GivenSection, RectangularSection, Rod
 
 TERMS = np.arange(1, 16, 2)  # of the series of a rectangle's torsion constant, which fall as n^-5: 1e-6 of the sum
-_OUT_OF_GRID, _WITHIN_GRID = ("width", "a"), ("height", "b")
+_OUT_OF_GRID = ("width", "a")
 
 
 @dataclass(frozen=True, eq=False)
 class Varied:
     """Factors (n,) on the values of the unchanged rod.
 
-    Parameters
-    ----------
-    bend1, bend2, twist : on EI1, EI2 and GJ.
-    stretch : on EA and on the mass per length.
-    fibre1, fibre2 : on the distances of the outermost fibres along m1 and m2.
-    depth1, depth2 : on the extents of the outline along m1 and m2: of laths on each other those of all.
-    shear : on the largest shear stress of torsion over the twist per length.
+    Args:
+        bend1, bend2, twist: on EI1, EI2 and GJ.
+        stretch: on EA and on the mass per length.
+        fibre1, fibre2: on the distances of the outermost fibres along m1 and m2.
+        depth1, depth2: on the extents of the outline along m1 and m2: of laths on each other those of all.
+        shear: on the largest shear stress of torsion over the twist per length.
     """
 
     bend1: Floats
@@ -51,17 +50,15 @@ class Varied:
 def varied(rod: Rod, varies: str, factors: Floats) -> Varied:
     """Everything that changes with the factor on EI1.
 
-    Parameters
-    ----------
-    rod : the unchanged section and material.
-    varies : what is changed, see the module.
-    factors : (n,) on EI1 [-].
+    Args:
+        rod: the unchanged section and material.
+        varies: what is changed, see the module.
+        factors: (n,) on EI1 [-].
 
-    Raises
-    ------
-    InputError : the section has no such length.
+    Raises:
+        InputError: the section has no such length.
     """
-    require_varies(rod, varies)
+    _require_varies(rod, varies)
     same = np.ones_like(factors)
     if varies == "laths":
         return Varied(factors, factors, factors, factors, factors, same, same, factors, same, same)
@@ -87,17 +84,8 @@ def varied(rod: Rod, varies: str, factors: Floats) -> Varied:
     return Varied(bend1, bend2, twist, area, rotary, first, second, first, second, lever / unchanged)
 
 
-def require_varies(rod: Rod, varies: str) -> None:
-    """Refuse a length that a rod's section does not have.
-
-    Parameters
-    ----------
-    varies : what is changed, see the module.
-
-    Raises
-    ------
-    InputError : the section has no such length.
-    """
+def _require_varies(rod: Rod, varies: str) -> None:
+    """Refuse a length that a rod's section does not have."""
     known = _lengths(rod)
     if varies not in known:
         raise InputError(
@@ -108,13 +96,7 @@ def require_varies(rod: Rod, varies: str) -> None:
 def sizes(rod: Rod, varies: str, factors: Floats) -> Floats | None:
     """(n,) the length of the section that is changed, as it is cut: of a round rod its diameter [m].
 
-    None for a given section, which has no lengths, and for laths.
-
-    Parameters
-    ----------
-    rod : the unchanged section and material.
-    varies : what is changed, see the module.
-    factors : (n,) on EI1 [-].
+    None for a given section, which has no lengths, and for laths. Parameters as of `varied`.
     """
     section = rod.section
     if isinstance(section, GivenSection) or varies == "laths":

@@ -4,18 +4,17 @@ from dataclasses import dataclass
 from math import copysign
 
 LONGER, SHORTER = 1.6, 0.4
-ARRIVED = 1e-9  # of the parameter: a step that ends so near ends there
+_ARRIVED = 1e-9  # of the parameter: a step that ends so near ends there
 
 
 @dataclass
 class Continuation:
     """A parameter on its way, up or down, from where it is to its end.
 
-    Parameters
-    ----------
-    t, stop : the parameter, and where it goes.
-    step : the next step, or the longest one that is allowed.
-    shortest : of the steps.
+    Args:
+        t, stop: the parameter, and where it goes.
+        step: the next step, or the longest one that is allowed.
+        shortest: of the steps.
     """
 
     t: float
@@ -31,7 +30,7 @@ class Continuation:
     def there(self) -> float:
         """The end of the next step."""
         left = self.stop - self.t
-        return self.stop if abs(left) - self.step < ARRIVED else self.t + copysign(self.step, left)
+        return self.stop if abs(left) - self.step < _ARRIVED else self.t + copysign(self.step, left)
 
     @property
     def length(self) -> float:

@@ -55,15 +55,13 @@ def _place(matrix, row, column):  # type: ignore[no-untyped-def]
 
 @njit(error_model="numpy", inline="always")
 def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
-    """Eliminate the pivots of a front: D L^T in `rows` (width, stride), which holds the front's upper triangle before;
-    L^T in `panel` (width, stride), D in `pivots` (width,). False where a pivot vanishes or is not finite.
+    """Eliminate the pivots of a front; False where one vanishes or is not finite.
 
-    Parameters
-    ----------
-    rows : (width, stride) the front's upper triangle, overwritten with D L^T.
-    panel : (width, stride), filled with L^T.
-    pivots : (width,), filled with D.
-    work : `workspace`.
+    Args:
+        rows: (width, stride) the front's upper triangle, overwritten with D L^T.
+        panel: (width, stride), filled with L^T.
+        pivots: (width,), filled with D.
+        work: `workspace`.
     """
     width = len(rows)
     for begin in range(0, width, BLOCK):
@@ -134,12 +132,11 @@ def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-unty
 def subtract_product(panel, rows, first, kept, target, work):  # type: ignore[no-untyped-def]
     """target = kept target - panel[:, first:]^T rows[:, first:], except below the diagonal.
 
-    Parameters
-    ----------
-    panel, rows : (width, stride).
-    kept : `KEPT` or `OVERWRITTEN`.
-    target : (n, m), part of a matrix, for as many columns from `first` on.
-    work : `workspace`.
+    Args:
+        panel, rows: (width, stride).
+        kept: `KEPT` or `OVERWRITTEN`.
+        target: (n, m), part of a matrix, for as many columns from `first` on.
+        work: `workspace`.
     """
     n, m = target.shape
     for start in range(0, len(panel), DEPTH):
@@ -194,12 +191,11 @@ def add_rows(target, update, runs, end):  # type: ignore[no-untyped-def]
     """Add to the rows of a front up to `end`, the last of which are `target`, what a child's update matrix has for
     them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to.
 
-    Parameters
-    ----------
-    target : the rows of the front from some row `begin` to `end`, its columns from `begin` on.
-    update : the child's update matrix, of which the upper triangle is read.
-    runs : (k, 2) rows of the update matrix that stay contiguous: the first, and its row in the front.
-    end : the row of the front after the last that is added to.
+    Args:
+        target: the rows of the front from some row `begin` to `end`, its columns from `begin` on.
+        update: the child's update matrix, of which the upper triangle is read.
+        runs: (k, 2) rows of the update matrix that stay contiguous: the first, and its row in the front.
+        end: the row of the front after the last that is added to.
     """
     count, begin = len(runs), end - len(target)
     for low in range(count):
@@ -213,93 +209,53 @@ def add_rows(target, update, runs, end):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy", inline="always")
-def forward(panel, values, aside):  # type: ignore[no-untyped-def]
-    """Solve L y = b for the pivots of a front, b being the first of `values` (stride,), and subtract from the others
-    what that takes. `aside` (width,) is scratch.
+def forward(panel, values, count, aside):  # type: ignore[no-untyped-def]
+    """Solve L y = b for the pivots of a front and up to `ROWS` right-hand sides, and subtract from the other unknowns
+    what that takes. The bits do not depend on how many there are.
 
-    Parameters
-    ----------
-    panel : (width, stride) L^T.
-    values : (stride,) b, overwritten with y; from those behind the pivots, the product with L is subtracted.
-    aside : (width,) scratch.
+    Args:
+        panel: (width, stride) L^T.
+        values: (count, stride) each row first b, overwritten with y; from what is behind the pivots, the product with
+            L is subtracted.
+        count: of right-hand sides; a constant 1 saves a tenth of the time.
+        aside: (count width,) scratch.
     """
-    width, stride = panel.shape
-    for k in range(width):
-        value, row = values[k], panel[k]
-        for i in range(k + 1, width):
-            values[i] -= row[i] * value
-    for k in range(width):
-        aside[k] = values[k]
-    begin = width // LANES * LANES
-    for j in range(begin, stride, _WIDE):
-        _subtract(
-            1, min(REGISTERS, (stride - j) // LANES), values.ctypes.data + j * BYTES, stride, aside.ctypes.data, 1,
-            _place(panel, 0, j), stride, width, 1,
-        )  # fmt: skip
-    for k in range(begin, width):
-        values[k] = aside[k]
-
-
-@njit(error_model="numpy", inline="always")
-def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
-    """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x; the padding
-    of the panel itself is 0. `aside` (2 width,) is scratch.
-
-    Parameters
-    ----------
-    panel : (width, stride) L^T, its padding 0.
-    pivots : (width,) D.
-    values : (stride,) y, overwritten with x; behind the pivots, the x that is already known; in the padding 0.
-    aside : (2 width,) scratch.
-    """
-    width, stride = panel.shape
-    begin = width // LANES * LANES
-    for k in range(width):
-        aside[k] = values[k] / pivots[k]
-    for k in range(begin, width):
-        values[k] = 0.0
-    x, count = values.ctypes.data + begin * BYTES, stride - begin
-    whole = width // ROWS * ROWS
-    for k in range(0, whole, ROWS):
-        _multiply_4(aside.ctypes.data + (width + k) * BYTES, _place(panel, k, begin), stride, x, count)
-    for k in range(whole, width):
-        _multiply_1(aside.ctypes.data + (width + k) * BYTES, _place(panel, k, begin), stride, x, count)
-    for k in range(width - 1, -1, -1):
-        value, row = aside[k] - aside[width + k], panel[k]
-        for i in range(k + 1, width):
-            value -= row[i] * values[i]
-        values[k] = value
-
-
-@njit(error_model="numpy", inline="always")
-def forward_rows(panel, values, aside):  # type: ignore[no-untyped-def]
-    """`forward` for each row of `values` (ROWS, stride), with the same bits. `aside` (ROWS width,) is scratch."""
     width, stride = panel.shape
     for k in range(width):
         row = panel[k]
-        for r in range(ROWS):
+        for r in range(count):
             value, right = values[r, k], values[r]
             for i in range(k + 1, width):
                 right[i] -= row[i] * value
-            aside[ROWS * k + r] = value
+            aside[count * k + r] = value
     begin = width // LANES * LANES
     for j in range(begin, stride, _WIDE):
         _subtract(
-            ROWS, min(REGISTERS, (stride - j) // LANES), _place(values, 0, j), stride, aside.ctypes.data, ROWS,
+            count, min(REGISTERS, (stride - j) // LANES), _place(values, 0, j), stride, aside.ctypes.data, count,
             _place(panel, 0, j), stride, width, 1,
         )  # fmt: skip
     for k in range(begin, width):
-        for r in range(ROWS):
-            values[r, k] = aside[ROWS * k + r]
+        for r in range(count):
+            values[r, k] = aside[count * k + r]
 
 
 @njit(error_model="numpy", inline="always")
-def backward_rows(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
-    """`backward` for each row of `values` (ROWS, stride), with the same bits. `aside` (2 width,) is scratch."""
+def backward(panel, pivots, values, count, aside):  # type: ignore[no-untyped-def]
+    """Solve D L^T x = y for the pivots of a front and up to `ROWS` right-hand sides. The bits do not depend on how many
+    there are.
+
+    Args:
+        panel: (width, stride) L^T, its padding 0.
+        pivots: (width,) D.
+        values: (count, stride) each row first y, overwritten with x; behind the pivots, the x that is already known; in
+            the padding 0.
+        count: see `forward`.
+        aside: (2 width,) scratch.
+    """
     width, stride = panel.shape
     begin, whole = width // LANES * LANES, width // ROWS * ROWS
     known = aside.ctypes.data + width * BYTES
-    for r in range(ROWS):
+    for r in range(count):
         right, x = values[r], _place(values, r, begin)
         for k in range(width):
             aside[k] = right[k] / pivots[k]
@@ -309,9 +265,12 @@ def backward_rows(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
             _multiply_4(known + k * BYTES, _place(panel, k, begin), stride, x, stride - begin)
         for k in range(whole, width):
             _multiply_1(known + k * BYTES, _place(panel, k, begin), stride, x, stride - begin)
-        for k in range(width):
-            right[k] = aside[k] - aside[width + k]
-    for k in range(width - 1, -1, -1):
+        for k in range(width - 1, -1, -1):
+            value, row = aside[k] - aside[width + k], panel[k]
+            for i in range(k + 1, width if count < ROWS else k + 1):
+                value -= row[i] * right[i]
+            right[k] = value
+    for k in range(width - 1 if count == ROWS else -1, -1, -1):
         row, a, b, c, d = panel[k], values[0, k], values[1, k], values[2, k], values[3, k]
         for i in range(k + 1, width):  # side by side: each sum alone would wait for its last addition
             factor = row[i]

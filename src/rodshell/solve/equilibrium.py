@@ -61,12 +61,11 @@ _SENTENCES = {
 class SolveReport:
     """Figures of one solve.
 
-    Parameters
-    ----------
-    force_residual : largest component of the gradient in the free directions [N].
-    max_strain : largest axial strain, or constraint strain where rods are inextensible [-].
-    negative_modes : of the exact Hessian in the free directions at the final state; 0 says stable.
-    reason : when and where it was out of time, or "".
+    Args:
+        force_residual: largest component of the gradient in the free directions [N].
+        max_strain: largest axial strain, or constraint strain where rods are inextensible [-].
+        negative_modes: of the exact Hessian in the free directions at the final state; 0 says stable.
+        reason: when and where it was out of time, or "".
     """
 
     status: Status
@@ -93,12 +92,7 @@ class SolveReport:
         return self.converged and self.negative_modes == 0
 
     def after(self, *earlier: "SolveReport") -> "SolveReport":
-        """This report with the work of earlier solves added.
-
-        Parameters
-        ----------
-        earlier : reports of the solves that led to this one.
-        """
+        """This report with the work of earlier solves added."""
         return replace(
             self,
             iterations=self.iterations + sum(report.iterations for report in earlier),
@@ -110,7 +104,7 @@ class SolveReport:
 Progress = Callable[[int, float], None]
 
 STRAIN_TOLERANCE = 2e-6
-REPEATED, ALIKE = 12, 1e-3  # steps; and how near to each other
+REPEATED, _ALIKE = 12, 1e-3  # steps; and how near to each other
 MOST_ITERATIONS = 60
 LONGEST_SLIDE = 120  # iterations off a saddle
 NUDGE = 0.01  # motion along the mode of an unstable equilibrium where the search for the lowest energy begins
@@ -122,15 +116,14 @@ PROBE = 1e-3  # motion of the differences of gradients
 class Equilibrium:
     """How a solve ended: a state with its axial forces.
 
-    Parameters
-    ----------
-    problem : what was solved, the source frames of its elements being at the state (its twist angles belong to them),
-        with the pattern that serves the next solve of this structure.
-    state : (n, 3) [m, at twist angles rad].
-    forces : (e,) axial forces [N].
-    gradient : (n, 3) of energy and load, without constraint forces [N].
-    mode : (n, 3) where the state is not stable, the direction of the most negative curvature, its largest motion being
-        1 (`Problem.unit`); else None.
+    Args:
+        problem: what was solved, the source frames of its elements being at the state (its twist angles belong to
+            them), with the pattern that serves the next solve of this structure.
+        state: (n, 3) [m, at twist angles rad].
+        forces: (e,) axial forces [N].
+        gradient: (n, 3) of energy and load, without constraint forces [N].
+        mode: (n, 3) where the state is not stable, the direction of the most negative curvature, its largest motion
+            being 1 (`Problem.unit`); else None.
     """
 
     problem: Problem
@@ -154,11 +147,10 @@ class Equilibrium:
     def tangent(self) -> Tangent:
         """The tangent stiffness at this state, which is factorised when it is first asked for.
 
-        Raises
-        ------
-        SingularError : some motion has no stiffness.
+        Raises:
+            SingularError: some motion has no stiffness.
         """
-        return TangentAssembly(self.problem, self.state).tangent(self.elements, self.state, self.forces)
+        return TangentAssembly(self.problem, self.state).tangent(self.problem, self.state, self.forces)
 
 
 def find_equilibrium(
@@ -176,18 +168,17 @@ def find_equilibrium(
 
     Never raises for a solve that does not converge: the report's status says so, and the last state comes with it.
 
-    Parameters
-    ----------
-    problem : the source frames of its elements being at, or near, the state.
-    state : (n, 3) first guess [m, at twist angles rad].
-    forces : (e,) first guess of the axial forces [N].
-    descend : shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
-    limit_steps : for a start from afar: take only a part of steps that were too long. Not on a path, whose own steps
-        are shortened instead.
-    most_modes : where the start has more negative modes, it is given up at once (BUCKLED); None: never.
-    most_iterations : chord steps in a row count as one.
-    progress : called with the number and the length of each step, as the solver measures it; an OutOfTimeError
-        that it raises ends the solve with that status.
+    Args:
+        problem: the source frames of its elements being at, or near, the state.
+        state: (n, 3) first guess [m, at twist angles rad].
+        forces: (e,) first guess of the axial forces [N].
+        descend: shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
+        limit_steps: for a start from afar: take only a part of steps that were too long. Not on a path, whose own steps
+            are shortened instead.
+        most_modes: where the start has more negative modes, it is given up at once (BUCKLED); None: never.
+        most_iterations: chord steps in a row count as one.
+        progress: called with the number and the length of each step, as the solver measures it; an OutOfTimeError
+            that it raises ends the solve with that status.
     """
     begin = time.perf_counter()
     newton = NewtonStep(problem, state, descend=descend, limit_steps=limit_steps, most_modes=most_modes)
@@ -222,7 +213,7 @@ def find_equilibrium(
         here = here.refreshed()
     matrix, state, forces = newton.matrix, here.state, here.forces
     mode = newton.lowest_mode() if status is Status.CONVERGED and matrix.negative_modes else None
-    gradient = newton.assembly.gradient(here.elements, state, forces)
+    gradient = here.problem.gradient(state, forces)
     residual = problem.constraint.freedom(state).reduce(gradient)
     report = SolveReport(
         status=status,
@@ -235,14 +226,14 @@ def find_equilibrium(
         negative_modes=matrix.negative_modes,
         reason=reason if status is Status.OUT_OF_TIME else "",
     )
-    solved = replace(problem, elements=here.refreshed().elements, pattern=newton.assembly.pattern)
+    solved = replace(here.refreshed().problem, pattern=newton.assembly.pattern)
     return Equilibrium(solved, state, forces, gradient, report, mode)
 
 
 def _repeats(steps: list[float]) -> bool:
     """Whether the last `REPEATED` steps are as long as those two before: back and forth between two states."""
     last = np.array(steps[-REPEATED - 2 :])
-    return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
+    return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= _ALIKE * last[2:]))
 
 
 def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
@@ -251,13 +242,11 @@ def beside(saddle: Equilibrium, mode: Floats) -> tuple[Floats, Floats]:
     The valley is x = x0 + q v + q^2 w / 2 + ..., K w = -E'''[v, v] across v [Koiter 1945]: of thin rods the mode alone
     would stretch the edges, which hides how deep it is.
 
-    Parameters
-    ----------
-    mode : (n, 3) v, its largest motion 1.
+    Args:
+        mode: (n, 3) v, its largest motion 1.
 
-    Returns
-    -------
-    State (n, 3) and axial forces (e,) there; `NUDGE` along the mode where the valley is not seen.
+    Returns:
+        State (n, 3) and axial forces (e,) there; `NUDGE` along the mode where the valley is not seen.
     """
     problem, state, stretch = saddle.problem, saddle.state, saddle.problem.stretch
     shares, nudged = mode / problem.unit(len(state)) ** 2, (state + NUDGE * mode, saddle.forces)
@@ -303,17 +292,15 @@ def find_stable(
 ) -> Equilibrium:
     """As `find_equilibrium`; where that ends on a saddle, slide off along its mode, to either side in turn.
 
-    Parameters
-    ----------
-    problem, state, forces, limit_steps, most_modes, most_iterations, progress : see `find_equilibrium`.
-    slide : whether to leave a saddle.
-    neutral : where the energy falls along a single mode by less than this [J], nothing resists that mode, and it makes
-        no saddle.
+    Args:
+        problem, state, forces, limit_steps, most_modes, most_iterations, progress: see `find_equilibrium`.
+        slide: whether to leave a saddle.
+        neutral: where the energy falls along a single mode by less than this [J], nothing resists that mode, and it
+            makes no saddle.
 
-    Returns
-    -------
-    The stable equilibrium; the saddle, with its negative modes counted, where neither side leads to one. The report
-    counts the work of all solves.
+    Returns:
+        The stable equilibrium; the saddle, with its negative modes counted, where neither side leads to one. The report
+        counts the work of all solves.
     """
     first = _without_neutral(
         find_equilibrium(

@@ -25,21 +25,18 @@ def imperfect(equilibrium: Equilibrium, modes: Floats, amplitude: float) -> Equi
     The path of the imperfect structure is `load_path` from here. Both signs of the amplitude count: a structure may be
     sensitive to one alone.
 
-    Parameters
-    ----------
-    equilibrium : a stable one, under the permanent load.
-    modes : (n, 3) a mode, or (k, n, 3) several, which are added with equal largest displacements [m, rad].
-    amplitude : displacement of the node that moves farthest [m]; negative: to the other side.
+    Args:
+        equilibrium: a stable one, under the permanent load.
+        modes: (n, 3) a mode, or (k, n, 3) several, which are added with equal largest displacements [m, rad].
+        amplitude: displacement of the node that moves farthest [m]; negative: to the other side.
 
-    Returns
-    -------
-    With the misfit forces among its load; the displacement along the shape is the amplitude, and the nodes are where
-    that leaves the structure in equilibrium: inextensible rods also move by its square.
+    Returns:
+        With the misfit forces among its load; the displacement along the shape is the amplitude, and the nodes are
+        where that leaves the structure in equilibrium: inextensible rods also move by its square.
 
-    Raises
-    ------
-    InputError : the modes have another shape, or do not move.
-    ConvergenceError : there is no equilibrium so far off.
+    Raises:
+        InputError: the modes have another shape, or do not move.
+        ConvergenceError: there is no equilibrium so far off.
     """
     state, shapes = equilibrium.state, np.asarray(modes, dtype=float)
     if shapes.shape[-2:] != state.shape or shapes.ndim not in (2, 3) or not np.isfinite(shapes).all():

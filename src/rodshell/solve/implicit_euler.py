@@ -25,55 +25,42 @@ can hold slip, with the force of friction held over the rest of the step.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Protocol, Self, TypeVar
+from typing import Self
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.contact.modified_mass import ModifiedMass, Touching
 from rodshell.errors import InputError
 from rodshell.kernels import njit
-from rodshell.model import Freedom, Potential
+from rodshell.model import Freedom, Potential, Shell
+from rodshell.model.elastic_rod import ElasticRod
 from rodshell.rods.elements import NO_HESSIANS, Elements, in_parts
 from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
 from rodshell.solve.problem import NO_CURVATURE, Constraint, Damping, Force, ImplicitForce, PointLoads, Supports
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.validation import array, described, function_of, listed
+from rodshell.validation import array, described, function_of, instance, listed
 
 MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
 
-RELATIVE = 1e-9  # of the step's own motion: what is left once the last simplified step has been taken
+_RELATIVE = 1e-9  # of the step's own motion: what is left once the last simplified step has been taken
 ROUND_OFF = 1e-13  # of the state: a shorter step cannot be distinguished from zero
-CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth continuing
+_CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth continuing
 MOST_ITERATIONS = 20
-LEAST_SHARE = 1 / 64
-MOST_PASSES = 30  # of predictor and corrector, with contact
+_LEAST_SHARE = 1 / 64
+_MOST_PASSES = 30  # of predictor and corrector, with contact
 PART = 1024  # elements evaluated at a time: their Hessians (2 MB) stay in the cache, and memory stays small
-
-
-class MovingBody(Protocol):
-    """What a motion needs of a rod or a shell."""
-
-    @property
-    def elements(self) -> tuple[Elements, ...]: ...
-    @property
-    def explicit(self) -> tuple[Elements, ...]: ...
-    @property
-    def stretch(self) -> Elements: ...
-    @property
-    def mass(self) -> Floats: ...
-    def freedom(self) -> Freedom: ...
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A body, its supports and the forces on it.
 
-    Parameters
-    ----------
-    elements : every energy, stretch included; their source frames are those of the state to start from.
-    mass : (N, 3) lumped mass of each component [kg]; of a twist angle the rotary inertia [kg m2].
-    constraint : supports or a surface; or what they are at a time [s], for a motion that is prescribed.
-    explicit : energies whose forces are frozen at the start of a step (`ExplicitPenalty`); not among the elements.
+    Args:
+        elements: every energy, stretch included; their source frames are those of the state to start from.
+        mass: (N, 3) lumped mass of each component [kg]; of a twist angle the rotary inertia [kg m2].
+        constraint: supports or a surface; or what they are at a time [s], for a motion that is prescribed.
+        explicit: energies whose forces are frozen at the start of a step (`ExplicitPenalty`); not among the elements.
     """
 
     elements: tuple[Elements, ...]
@@ -103,20 +90,18 @@ class Motion:
     @classmethod
     def of(
         cls,
-        body: MovingBody,
+        body: ElasticRod | Shell,
         *,
         constraint: Freedom | Constraint | Callable[[float], Constraint] | None = None,
         forces: tuple[Force, ...] = (),
     ) -> Self:
         """The motion of a rod or a shell; without a constraint it is free.
 
-        Parameters
-        ----------
-        body : its source frames being at the state to start from.
-        constraint : as of `Motion`; one that never moves may be given as a `Freedom`.
+        Args:
+            body: its source frames being at the state to start from.
+            constraint: as of `Motion`; one that never moves may be given as a `Freedom`.
         """
-        if not all(hasattr(body, name) for name in ("elements", "explicit", "stretch", "mass", "freedom")):
-            raise InputError(f"body must be a rodshell ElasticRod or Shell, not {described(body)}")
+        instance("body", body, ElasticRod | Shell)
         given = body.freedom() if constraint is None else constraint
         supports = Supports(given) if isinstance(given, Freedom) else given
         implicit = [element for element in body.elements if all(element is not other for other in body.explicit)]
@@ -179,16 +164,14 @@ class ImplicitEuler:
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
         """One step.
 
-        Parameters
-        ----------
-        motion : its source frames being at the state.
-        state : (N, 3) at the start [m, at twist angles rad]; velocity : (N, 3) [m/s, rad/s].
-        time : of the start [s].
-        step : its length [s].
+        Args:
+            motion: its source frames being at the state.
+            state: (N, 3) at the start [m, at twist angles rad]; velocity : (N, 3) [m/s, rad/s].
+            time: of the start [s].
+            step: its length [s].
 
-        Raises
-        ------
-        InputError : an external force is not finite.
+        Raises:
+            InputError: an external force is not finite.
         """
         end = time + step
         constraint = motion.constraint_at(end)
@@ -223,86 +206,29 @@ class ImplicitEuler:
         self.buffers = {width: np.zeros((count, width, width)) for width, count in widths.items()}
 
 
-class Planes(Constraint, Protocol):
-    """The supports and the planes of nodes in contact."""
-
-    @property
-    def nodes(self) -> Ints: ...
-
-
-P = TypeVar("P", bound=Planes)
-
-
-class ContactLaw(Protocol[P]):
-    """What `contact.modified_mass.ModifiedMass` offers."""
-
-    def touching(self, supports: Constraint, state: Floats) -> P:
-        """The constraint that a step from `state` (N, 3) begins with.
-
-        Parameters
-        ----------
-        supports : what holds the structure without the contact.
-        state : (N, 3) at the start of the step [m, at twist angles rad].
-        """
-        ...
-
-    def below(self, state: Floats, touching: P) -> P | None:
-        """With the nodes that `state` (N, 3) has below the target, too; None where there are no new ones.
-
-        Parameters
-        ----------
-        state : (N, 3) at the end of the step [m, at twist angles rad].
-        touching : the constraint of the step.
-        """
-        ...
-
-    def released(self, touching: P, reactions: Floats) -> tuple[P, Floats] | None:
-        """With the nodes free to slip that stick by more than friction can hold, by the `reactions` (N, 3) [N], and
-        the friction (N, 3) on them [N]; None where there are none.
-
-        Parameters
-        ----------
-        touching : the constraint of the step.
-        reactions : (N, 3) at its end [N].
-        """
-        ...
-
-    def landed(self, velocity: Floats, touching: P) -> Floats:
-        """(N, 3) `velocity` at the end of a step, without what the contact takes of it [m/s].
-
-        Parameters
-        ----------
-        velocity : (N, 3) at the end of the step [m/s].
-        touching : the constraint of the step.
-        """
-        ...
-
-
 class ContactEuler:
     """Takes single steps, as `ImplicitEuler` does.
 
-    Attributes
-    ----------
-    last : the constraint that the last step ended with.
+    Attributes:
+        last: the constraint that the last step ended with.
 
-    Parameters
-    ----------
-    law : what holds nodes that touch.
-    matrix : makes the matrix of the Newton iterations.
+    Args:
+        law: what holds nodes that touch.
+        matrix: makes the matrix of the Newton iterations.
     """
 
-    def __init__(self, law: ContactLaw[P], matrix: MakeMatrix = narrow_or_sparse) -> None:
+    def __init__(self, law: ModifiedMass, matrix: MakeMatrix = narrow_or_sparse) -> None:
         self._law, self._euler = law, ImplicitEuler(matrix)
-        self.last: P | None = None
+        self.last: Touching | None = None
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
         """One step; parameters as of `ImplicitEuler.take`."""
         law = self._law
-        touching = law.touching(motion.constraint_at(time + step), state)
+        touching = Touching.none(motion.constraint_at(time + step), state)
         rubbing = np.zeros_like(state)
         forces = motion.forces
         iterations = factorizations = 0
-        for _ in range(MOST_PASSES):
+        for _ in range(_MOST_PASSES):
             bound = replace(motion, constraint=touching, forces=forces)
             taken = self._euler.take(bound, state, velocity, time=time, step=step)
             factorizations += taken.factorizations
@@ -322,7 +248,7 @@ class ContactEuler:
             self.last = touching
             landed = law.landed(taken.velocity, touching)
             return Step(taken.state, landed, taken.reactions + rubbing, iterations, factorizations)
-        return Refused(f"contact has not settled in {MOST_PASSES} passes", factorizations)
+        return Refused(f"contact has not settled in {_MOST_PASSES} passes", factorizations)
 
 
 @dataclass(eq=False)
@@ -342,8 +268,7 @@ class _Newton:
 
     def solve(self) -> Step | Refused:
         free = self.constraint.freedom(self.start)
-        moved = np.zeros_like(self.start)
-        _add_free(self.step, self.velocity, free.directions, free.count, moved)
+        moved = free.expand(self.step * free.reduce(self.velocity))
         going = self.constraint.remaining(self.start)
         if going is not None:
             moved += going
@@ -367,15 +292,15 @@ class _Newton:
                 if left <= (1.0 - 0.25 * share) * length or left <= floor:
                     break
                 share *= 0.5
-                if share < LEAST_SHARE:
+                if share < _LEAST_SHARE:
                     return Refused("Newton's iteration does not contract", iteration)
             moved = trial
             while share == 1.0:
                 state, moved = self._retracted(moved - simplified)
-                bound = RELATIVE * self._size(moved) + floor
+                bound = _RELATIVE * self._size(moved) + floor
                 if left <= bound or 2.0 * left * left <= bound * length:
                     return Step(state, moved / self.step, reactions, iteration, iteration)
-                if not left < CONTRACTION * length:
+                if not left < _CONTRACTION * length:
                     break
                 length = left
                 simplified, reactions = self._simplified(state, moved)
@@ -420,18 +345,7 @@ class _Newton:
         return float(_mass_norm(self.motion.mass.ravel(), motion.ravel()))
 
 
-@njit(error_model="numpy")
-def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyped-def]
-    """Add a share of the part of `field` in the free directions."""
-    for i in range(len(motion)):
-        for c in range(count[i]):
-            d = directions[i, c]
-            part = share * (d[0] * field[i, 0] + d[1] * field[i, 1] + d[2] * field[i, 2])
-            for k in range(3):
-                motion[i, k] += part * d[k]
-
-
-@njit(error_model="numpy", fastmath={"reassoc", "contract"})
+@njit("f1 f1", fastmath={"reassoc", "contract"})
 def _mass_norm(mass, motion):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(len(motion)):

@@ -25,7 +25,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, StabilityError
 from rodshell.model import Assembly, Freedom, Potential
-from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.sparse_ldl import Factors, Multifrontal, SingularError
 from rodshell.solve.tangent import FIRST_SHIFT, generic
@@ -39,10 +39,9 @@ GROWTH = 10.0  # of the shift, until nothing is below it
 class ExplicitTies:
     """Finds at one state after another which time steps are stable with explicit ties; the matrix is analysed once.
 
-    Parameters
-    ----------
-    motion : with the elements that it has at every state.
-    free : the free directions; their counts stay.
+    Args:
+        motion: with the elements that it has at every state.
+        free: the free directions; their counts stay.
     """
 
     def __init__(self, motion: Motion, free: Freedom) -> None:
@@ -52,14 +51,7 @@ class ExplicitTies:
         self._factors: Factors | None = None
 
     def look(self, motion: Motion, state: Floats, free: Freedom, stopped: Ints = NO_NODES) -> None:
-        """Assemble the matrix at a state.
-
-        Parameters
-        ----------
-        motion : its source frames being at the state.
-        state : (N, 3) [m, at twist angles rad].
-        stopped : (k,) blocks that lose all their velocity at each step.
-        """
+        """Assemble the matrix at a state; parameters as of `step_limit`."""
         implicit, explicit = (Potential(sets).hessians(state) for sets in (motion.elements, motion.explicit))
         self._data = self._assembly.assemble([*implicit, *(-hessians for hessians in explicit)], self._blocks, free)
         weight = np.full((len(state), 1), 4.0)
@@ -67,12 +59,7 @@ class ExplicitTies:
         self._mass, self._blocked = free.reduce_diagonal(weight * motion.mass), free.blocked
 
     def grows(self, step: float) -> bool:
-        """Whether some motion about the state grows.
-
-        Parameters
-        ----------
-        step : time step [s].
-        """
+        """Whether some motion about the state grows at a time step [s]."""
         data, diagonal = self._data.copy(), self._assembly.diagonal
         data[diagonal] += self._mass / step**2
         data[diagonal[self._blocked]] = 1.0
@@ -85,9 +72,8 @@ class ExplicitTies:
     def limit(self) -> float:
         """Longest step [s] at which nothing grows; infinite where nothing ever does.
 
-        Raises
-        ------
-        InputError : something explicit acts on what has no mass.
+        Raises:
+            InputError: something explicit acts on what has no mass.
         """
         high = LONGEST
         if not self.grows(high):
@@ -109,16 +95,14 @@ class ExplicitTies:
 def step_limit(motion: Motion, state: Floats, time: float = 0.0, *, stopped: Ints = NO_NODES) -> float:
     """Longest stable time step [s] at a state; infinite where nothing is explicit.
 
-    Parameters
-    ----------
-    motion : its source frames being at the state.
-    state : (N, 3) [m, at twist angles rad].
-    time : at which the constraint is taken [s].
-    stopped : (k,) blocks that lose all their velocity at each step.
+    Args:
+        motion: its source frames being at the state.
+        state: (N, 3) [m, at twist angles rad].
+        time: at which the constraint is taken [s].
+        stopped: (k,) blocks that lose all their velocity at each step.
 
-    Raises
-    ------
-    InputError : something explicit acts on what has no mass.
+    Raises:
+        InputError: something explicit acts on what has no mass.
     """
     if not motion.explicit:
         return np.inf
@@ -129,17 +113,7 @@ def step_limit(motion: Motion, state: Floats, time: float = 0.0, *, stopped: Int
 
 
 def refuse_unstable(motion: Motion, state: Floats, step: float) -> None:
-    """Refuse a time step that explicit ties make unstable.
-
-    Parameters
-    ----------
-    motion, state : as of `step_limit`.
-    step : time step [s].
-
-    Raises
-    ------
-    StabilityError : the step is beyond the limit.
-    """
+    """Refuse a time step [s] that explicit ties make unstable by a StabilityError; parameters as of `step_limit`."""
     limit = step_limit(motion, state)
     if step > limit:
         raise StabilityError(
@@ -155,11 +129,10 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
 
     Motions along a negative one grow as exp(sqrt(-s) t); others oscillate at sqrt(s) rad/s.
 
-    Parameters
-    ----------
-    motion : its source frames at `state`; all free directions must have mass.
-    free : the free directions, without blocked ones.
-    curvature : (N, 3, 3) what constraints that turn with the state add to the stiffness [N/m].
+    Args:
+        motion: its source frames at `state`; all free directions must have mass.
+        free: the free directions, without blocked ones.
+        curvature: (N, 3, 3) what constraints that turn with the state add to the stiffness [N/m].
     """
     energies = Potential((*motion.energies.sets, _Curvature(curvature)))
     root = 1.0 / np.sqrt(free.reduce_diagonal(motion.mass))
@@ -176,7 +149,7 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     return np.sort(values)
 
 
-class _Curvature:
+class _Curvature(WithoutFrames):
     """Given (N, 3, 3) blocks as an energy, so that they are summed with the others."""
 
     def __init__(self, full: Floats) -> None:
@@ -186,6 +159,3 @@ class _Curvature:
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         hessians[:] = self._full
         return 0.0
-
-    def refreshed(self, state: Floats) -> "_Curvature":
-        return self

@@ -17,7 +17,7 @@ from typing import Self
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError
 from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch
 from rodshell.solve.problem import Problem
@@ -28,12 +28,11 @@ from rodshell.solve.tangent import Tangent, TangentAssembly
 class Load:
     """What acts at the factor 1.
 
-    Parameters
-    ----------
-    forces : (N, 3) dead forces [N, on twist angles N m]; None: none.
-    potentials : energies whose negative gradients are forces that follow the structure; on its blocks.
-    strains : (e,) strains of the edges that are free of stress [-], those of a temperature; None: none.
-    motions : (N, 3) displacements of what is held [m, rad]; zero in the free directions; None: none.
+    Args:
+        forces: (N, 3) dead forces [N, on twist angles N m]; None: none.
+        potentials: energies whose negative gradients are forces that follow the structure; on its blocks.
+        strains: (e,) strains of the edges that are free of stress [-], those of a temperature; None: none.
+        motions: (N, 3) displacements of what is held [m, rad]; zero in the free directions; None: none.
     """
 
     forces: Floats | None = None
@@ -43,44 +42,27 @@ class Load:
 
     @classmethod
     def of(cls, load: "Load | Floats") -> "Load":
-        """A load, dead forces (N, 3) [N] being one.
-
-        Parameters
-        ----------
-        load : a load, or dead forces (N, 3) [N, on twist angles N m].
-        """
+        """A load, dead forces (N, 3) [N, on twist angles N m] being one."""
         return load if isinstance(load, Load) else cls(forces=load)
 
-    def elements(self, elements: Sequence[Elements], state: Floats, factor: float) -> tuple[Elements, ...]:
+    def elements(self, elements: Sequence[Elements], state: State, factor: float) -> tuple[Elements, ...]:
         """The energies of a structure and of this load, with their source frames at a state.
 
-        Parameters
-        ----------
-        elements : of the structure alone, or of both as this function returned them.
-        state : (N, 3) node positions [m] and twist angles [rad].
+        Args:
+            elements: of the structure alone, or of both as this function returned them.
         """
         structure = [element.refreshed(state) for element in elements if not isinstance(element, _Proportional)]
         before = [element.potential for element in elements if isinstance(element, _Proportional)] or self.potentials
         return (*structure, *(_Proportional(potential.refreshed(state), factor) for potential in before))
 
     def stretch(self, stretch: Stretch, factor: float) -> Stretch:
-        """The edges as they are free of stress under the factor.
-
-        Parameters
-        ----------
-        stretch : at the factor 0.
-        """
+        """The edges, given as they are at the factor 0, as they are free of stress under the factor."""
         if self.strains is None:
             return stretch
         return replace(stretch, rest_lengths=stretch.rest_lengths * (1.0 + factor * self.strains))
 
     def require(self, problem: Problem, state: Floats) -> None:
-        """Raise InputError where the load does not fit a structure, or moves what is free.
-
-        Parameters
-        ----------
-        state : (N, 3) any state of it.
-        """
+        """Raise InputError where the load does not fit a structure in any of its states, or moves what is free."""
         for name, given, shape in (
             ("forces", self.forces, state.shape),
             ("motions", self.motions, state.shape),
@@ -120,94 +102,72 @@ class _Proportional:
 
 
 class LoadedAssembly:
-    """Assembles the equations of a structure under t times a load, at one state after another.
+    """The equations of a structure under t times a load, at one state after another.
 
-    Parameters
-    ----------
-    problem : the structure; a load that it has stays as it is.
-    state : (N, 3) any state, for the pattern.
+    Args:
+        problem: the structure; a load that it has stays as it is.
+        state: (N, 3) any state, for the pattern.
+
+    Attributes:
+        problem: what acts at the factor 0.
     """
 
     def __init__(self, problem: Problem, load: Load, state: Floats) -> None:
         load.require(problem, state)
-        self.load = load
-        self.problem = replace(problem, elements=load.elements(problem.elements, state, 0.0))
+        self.load, self._structure = load, problem
+        self.problem = self.at(problem, state, 0.0)
         self._assembly = TangentAssembly(self.problem, state)
 
-    def strains(self, state: Floats, factor: float) -> Floats:
-        """(e,) elastic strains of the edges [-].
+    def at(self, problem: Problem, state: Floats, factor: float) -> Problem:
+        """What acts under a factor, with its source frames at a state.
 
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
+        Args:
+            problem: the structure alone, or as this function returned it.
         """
-        return self.load.stretch(self.problem.stretch, factor).strains(state)
+        load, dead = self.load, self._structure.load
+        if load.forces is not None:
+            dead = factor * load.forces if dead is None else dead + factor * load.forces
+        stretch = load.stretch(self._structure.stretch, factor)
+        return replace(problem, elements=load.elements(problem.elements, state, factor), stretch=stretch, load=dead)
 
-    def gradient(self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float) -> Floats:
-        """(N, 3) forces out of balance [N, N m], those on the supports among them.
+    def values(self, problem: Problem, state: Floats, forces: Floats) -> Floats:
+        """(nnz,) values of K in the order of the pattern, for what acts at the state (see `at`) with axial forces (e,)
+        [N]."""
+        return self._assembly.values(problem, state, forces)[1]
 
-        Parameters
-        ----------
-        elements : of structure and load at the factor, with their source frames at, or near, the state.
-        state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
+    def tangent(self, problem: Problem, state: Floats, forces: Floats) -> tuple[Tangent, Floats]:
+        """The tangent stiffness, and the rate dx/dt (N, 3) of the state there [m, rad]; parameters as of `values`.
+
+        Raises:
+            SingularError: a pivot of the stiffness vanishes.
         """
-        result = self._assembly.gradient(elements, state, forces)
-        return result if self.load.forces is None else result - factor * self.load.forces
-
-    def values(self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float) -> Floats:
-        """(nnz,) values of K in the order of the pattern; parameters as of `gradient`."""
-        return self._assembly.values(elements, state, forces, self.load.stretch(self.problem.stretch, factor))[1]
-
-    def tangent(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, factor: float
-    ) -> tuple[Tangent, Floats]:
-        """The tangent stiffness, and the rate dx/dt (N, 3) of the state there [m, rad]; parameters as of `gradient`.
-
-        Raises
-        ------
-        SingularError : a pivot of the stiffness vanishes.
-        """
-        load, stretch = self.load, self.load.stretch(self.problem.stretch, factor)
-        tangent = self._assembly.tangent(elements, state, forces, stretch)
+        load = self.load
+        tangent = self._assembly.tangent(problem, state, forces)
         right = np.zeros_like(state) if load.forces is None else load.forces.copy()
-        for element in elements:
+        for element in problem.elements:
             if isinstance(element, _Proportional):
                 pull = np.zeros_like(state)
                 element.potential.evaluate(state, pull)
                 right -= pull
         if load.strains is not None:
-            stretch.add_axial(state, -self._by_warming(stretch, state, factor), right)
+            problem.stretch.add_axial(state, -self._by_warming(problem, state), right)
         if load.motions is None:
             return tangent, tangent.solve(right)
         right -= self._assembly.product(load.motions)
         return tangent, tangent.solve(right) + load.motions
 
-    def stress_values(self, elements: Sequence[Elements], state: Floats, rate: Floats) -> Floats:
-        """(nnz,) values of the change of K per unit of t at t = 0, the geometry being frozen: that with the internal
-        forces, and the stiffness of the load's own potentials.
+    def stress_values(self, problem: Problem, state: Floats, rate: Floats) -> Floats:
+        """(nnz,) values of the change of K per unit of t at t = 0, by the rate (N, 3) of the state, the geometry being
+        frozen: that with the internal forces, and the stiffness of the load's own potentials."""
+        return self._assembly.stress_values(problem, state, self.change(problem, state, rate), rate)
 
-        Parameters
-        ----------
-        elements : of structure and load, with their source frames at the state.
-        state, rate : (N, 3), and its rate [m, rad].
-        """
-        change = self.change(state, rate, 0.0, 1.0)
-        return self._assembly.stress_values(elements, state, change, rate)
+    def change(self, problem: Problem, state: State, rate: Floats, per: float = 1.0) -> Floats:
+        """(e,) rate of the axial forces [N], by that of the state (N, 3) [m, rad], t changing at the rate `per`."""
+        result = problem.stretch.stiffness * problem.stretch.elongation(state, rate)
+        return result if self.load.strains is None else result + per * self._by_warming(problem, state)
 
-    def change(self, state: Floats, rate: Floats, factor: float, per: float = 1.0) -> Floats:
-        """(e,) rate of the axial forces [N].
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        rate : (N, 3) of the state [m, rad].
-        """
-        stretch = self.load.stretch(self.problem.stretch, factor)
-        result = stretch.stiffness * stretch.elongation(state, rate)
-        return result if self.load.strains is None else result + per * self._by_warming(stretch, state, factor)
-
-    def _by_warming(self, stretch: Stretch, state: Floats, factor: float) -> Floats:
+    def _by_warming(self, problem: Problem, state: Floats) -> Floats:
         """(e,) derivative of the axial forces by t, nothing moving [N]."""
         strains = np.zeros(0) if self.load.strains is None else self.load.strains
-        warmed = strains / (1.0 + factor * strains)
-        return np.asarray(-stretch.stiffness * (1.0 + stretch.strains(state)) * warmed)
+        warmed = strains * self._structure.stretch.rest_lengths / problem.stretch.rest_lengths
+        return np.asarray(-problem.stretch.stiffness * (1.0 + problem.stretch.strains(state)) * warmed)

@@ -25,33 +25,32 @@ from rodshell.solve.load import Load
 Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "lost"]
 
 CLOSE = 2e-3  # of the factor: the last stable point is as near as this to the first unstable one
-ROUNDED = 0.2  # of `close`: where round-off in EA hides more of the lowest stiffness, signs of modes mean nothing
+_ROUNDED = 0.2  # of `close`: where round-off in EA hides more of the lowest stiffness, signs of modes mean nothing
 MOST = 100.0  # times the load: a path is not followed further
 MOST_FACTORIZATIONS = 120
 FARTHEST = 0.1  # of the length that a node moves from point to point
 SHRINKAGE, GROWTH = 0.4, 3.0  # of a step that failed; at most, from one step to the next
-RETURNED = 0.5  # of a step, back from its end: a mode without stiffness there may have been unstable in between
-PASSING = 0.5  # of `close`, of the arc so far: the shortest step past a singular stiffness
-UNEXPLAINED = 4.0  # times the arc to an unstable point: if no mode loses its stiffness nearer, it may be on another
+_RETURNED = 0.5  # of a step, back from its end: a mode without stiffness there may have been unstable in between
+_PASSING = 0.5  # of `close`, of the arc so far: the shortest step past a singular stiffness
+_UNEXPLAINED = 4.0  # times the arc to an unstable point: if no mode loses its stiffness nearer, it may be on another
 APART = 0.5  # path, and is, if it lies so far off the tangent, over the arc to it: a jump of the stiffness leaves none
 UNACCOUNTED = 0.4  # of the factor that a step gains, by the trapezoidal rule: more is another path
 TURNING = 0.5  # of its mean so far: a smaller rate of the factor says that the path turns back
 ALONG = 0.02  # cosine: where the path is less along the mode that gives way, it is left sideways
 NEARBY = 1e-4  # of the length: no other path is so near, and the tangent need not foresee where this one leads
-RECEDING = 1.1  # times as far as it was foreseen: a singular stiffness that moves away as it is approached
+_RECEDING = 1.1  # times as far as it was foreseen: a singular stiffness that moves away as it is approached
 LEAST = 1e-5  # of the arc so far: shorter steps are given up; of the length: the least that counts as the arc so far
-FLAT, MOST_TURNS = 1e-6, 6  # of the factor: a turning point is as near as this; points that are spent on it
+FLAT, _MOST_TURNS = 1e-6, 6  # of the factor: a turning point is as near as this; points that are spent on it
 
 
 @dataclass(frozen=True, eq=False)
 class PathPoint:
     """A point of a path.
 
-    Parameters
-    ----------
-    arc : root mean square displacement of the nodes along the path so far [m].
-    negative_modes : of the stiffness; 0 says stable.
-    equilibrium : the structure there, under the factor; what its problem carries as load is the whole load.
+    Args:
+        arc: root mean square displacement of the nodes along the path so far [m].
+        negative_modes: of the stiffness; 0 says stable.
+        equilibrium: the structure there, under the factor; what its problem carries as load is the whole load.
     """
 
     factor: float
@@ -74,20 +73,19 @@ class PathPoint:
 class LoadPath:
     """A path of equilibria under t times a load.
 
-    Parameters
-    ----------
-    factor : the largest t up to which the path is stable, `close` to where it is lost; 0 where the unloaded structure
-        is not stable.
-    limit : what ends the stable path: "limit point", the load cannot grow; "bifurcation", the structure leaves the path
-        sideways (one that is not quite symmetric has a limit point nearby instead); "none", nothing up to the largest
-        factor asked for; "lost", the path could not be followed further, and nothing is known above `factor`: from the
-        start where EA is so large (over EI/L^2 some 1e11) that round-off in it hides how stiff the structure is;
-        "unstable unloaded".
-    points : in the order of the path; the stable ones come first.
-    mode : (n, 3) how it gives way, the largest component of a node's displacement being 1; None unless the limit is a
-        limit point or a bifurcation.
-    place : block of the node that the mode moves farthest, or None.
-    turns : the points where t has an extremum: limit points, found to `FLAT`, where the path was followed past them.
+    Args:
+        factor: the largest t up to which the path is stable, `close` to where it is lost; 0 where the unloaded
+            structure is not stable.
+        limit: what ends the stable path: "limit point", the load cannot grow; "bifurcation", the structure leaves the
+            path sideways (one that is not quite symmetric has a limit point nearby instead); "none", nothing up to the
+            largest factor asked for; "lost", the path could not be followed further, and nothing is known above
+            `factor`: from the start where EA is so large (over EI/L^2 some 1e11) that round-off in it hides how stiff
+            the structure is; "unstable unloaded".
+        points: in the order of the path; the stable ones come first.
+        mode: (n, 3) how it gives way, the largest component of a node's displacement being 1; None unless the limit is
+            a limit point or a bifurcation.
+        place: block of the node that the mode moves farthest, or None.
+        turns: the points where t has an extremum: limit points, found to `FLAT`, where the path was followed past them.
     """
 
     factor: float
@@ -110,9 +108,8 @@ class LoadPath:
     def at(self, factor: float) -> Equilibrium | None:
         """The stable equilibrium at one of the `stations` asked for, or None where that was not reached.
 
-        Parameters
-        ----------
-        factor : t, as it was given to `load_path`.
+        Args:
+            factor: t, as it was given to `load_path`.
         """
         found = [point for point in self.points if point.factor == factor and not point.negative_modes]
         return found[0].equilibrium if found else None
@@ -131,20 +128,20 @@ def load_path(
 ) -> LoadPath:
     """Follow a structure from equilibrium without the load until it loses its stability, or further.
 
-    Parameters
-    ----------
-    unloaded : the equilibrium at factor 0; its edges elastic, its supports at rest. A load that it has stays as it is.
-    load : what grows, at factor 1: dead forces (n, 3) [N], or a `Load`; not zero in the free directions.
-    most : factor up to which the path is followed; past a limit, down to minus this, too.
-    close : accuracy of the factor, relative.
-    stations : factors at which the equilibrium is wanted, on the stable path; see `LoadPath.at`.
-    past_limit : continue along the same path, through limit points and past bifurcations, until t is beyond `most`.
-    most_factorizations : the path ends when they are used up.
-    progress : called at every step with the factorisations made and the factor reached; what it raises ends the path.
+    Args:
+        unloaded: the equilibrium at factor 0; its edges elastic, its supports at rest. A load that it has stays as it
+            is.
+        load: what grows, at factor 1: dead forces (n, 3) [N], or a `Load`; not zero in the free directions.
+        most: factor up to which the path is followed; past a limit, down to minus this, too.
+        close: accuracy of the factor, relative.
+        stations: factors at which the equilibrium is wanted, on the stable path; see `LoadPath.at`.
+        past_limit: continue along the same path, through limit points and past bifurcations, until t is beyond `most`.
+        most_factorizations: the path ends when they are used up.
+        progress: called at every step with the factorisations made and the factor reached; what it raises ends the
+            path.
 
-    Raises
-    ------
-    InputError : the load does not fit the structure.
+    Raises:
+        InputError: the load does not fit the structure.
     """
     search = _Search(unloaded, Load.of(load), most, close, sorted(stations), most_factorizations, progress)
     return search.run(past_limit)
@@ -168,7 +165,7 @@ class _Search:
         if here is None or here.negative_modes:
             return LoadPath(0.0, "unstable unloaded", (), None, None, (), self.path.factorizations)
         self.stable.append(here)
-        known = self.path.round_off <= ROUNDED * self.close
+        known = self.path.round_off <= _ROUNDED * self.close
         limit, beyond = self._to_the_loss(here) if known else ("lost", None)
         mode, place, last = None, None, self.stable[-1]
         if beyond is not None:
@@ -239,7 +236,7 @@ class _Search:
     def _follows(self, here: Point, there: Point, step: float) -> bool:
         """Whether a stable point is the next on the stable path: no stiffness vanished in between, as its own change
         shows, and the factor is what its rates at both ends add up to."""
-        if -there.behind < RETURNED * step:
+        if -there.behind < _RETURNED * step:
             return False
         left = there.factor - here.factor - 0.5 * step * (here.rate + there.rate)
         return abs(left) <= UNACCOUNTED * step * max(here.rate, there.rate)
@@ -247,7 +244,7 @@ class _Search:
     def _elsewhere(self, here: Point, beyond: Point) -> bool:
         """Whether an unstable point is not on the path of the stable one before it."""
         span = beyond.arc - here.arc
-        if here.ahead <= UNEXPLAINED * span or here.strayed >= 0.1 * STRAYED:
+        if here.ahead <= _UNEXPLAINED * span or here.strayed >= 0.1 * STRAYED:
             return False
         off = beyond.state - here.state - span * here.motion
         return self.path.reach(off) > APART * self.path.reach(span * here.motion)
@@ -255,7 +252,7 @@ class _Search:
     def _next_step(self, here: Point, beyond: Point | None, share: float) -> float:
         """How far to go: for the singular stiffness ahead, from below until it is near enough to pass."""
         near = here.ahead * here.rate < 0.4 * self.close * here.factor
-        step = max(2.0 * here.ahead, PASSING * self.close * here.arc) if near else share * here.ahead
+        step = max(2.0 * here.ahead, _PASSING * self.close * here.arc) if near else share * here.ahead
         if beyond is not None:
             span = beyond.arc - here.arc
             return float(np.clip(step, 0.05 * span, 0.95 * span)) if here.ahead < span else 0.5 * span
@@ -292,7 +289,7 @@ class _Search:
         if here.rate * there.rate >= 0:
             return []
         best = None
-        for _ in range(MOST_TURNS):
+        for _ in range(_MOST_TURNS):
             span, scale = there.arc - here.arc, max(abs(here.factor), abs(there.factor))
             share, top = _turning(here, there)
             if best is not None and abs(top - best.factor) <= FLAT * scale:
@@ -315,7 +312,7 @@ def _share(now: float, foreseen: float) -> float:
     """
     if not (np.isfinite(now) and np.isfinite(foreseen)):
         return 0.5
-    if now > RECEDING * foreseen:
+    if now > _RECEDING * foreseen:
         return min(now / foreseen, GROWTH)
     return 1.0 - min(0.5, max(0.02, abs(now - foreseen) / now))
 

@@ -32,23 +32,19 @@ class SummedMatrix(Protocol):
         ...
 
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add the Hessians of a set of elements, or of a part of it.
+        """Add the Hessians (m, 3k, 3k) of a set of elements on `blocks` (m, k), or of a part of it.
 
-        Parameters
-        ----------
-        number : of the set, among those that the matrix was made for.
-        hessians : (m, 3k, 3k) of each element.
-        blocks : (m, k) of each element.
+        Args:
+            number: of the set, among those that the matrix was made for.
         """
         ...
 
     def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
         """Add to each block itself; a blocked direction gets a one.
 
-        Parameters
-        ----------
-        diagonal : (N, 3) diagonal of each block.
-        full : (N, 3, 3) a matrix for each block, or empty.
+        Args:
+            diagonal: (N, 3) diagonal of each block.
+            full: (N, 3, 3) a matrix for each block, or empty.
         """
         ...
 
@@ -57,28 +53,22 @@ class SummedMatrix(Protocol):
         ...
 
     def solve(self, field: Floats, free: Freedom) -> Floats:
-        """(N, 3) solution for the part of `field` (N, 3) in the free directions; zero across them.
-
-        Parameters
-        ----------
-        field : (N, 3) right-hand side, of which the part in the free directions is used.
-        """
+        """(N, 3) solution for the part of `field` (N, 3) in the free directions; zero across them."""
         ...
 
 
 class Banded:
     """A symmetric matrix in the free directions, as a band (see `SummedMatrix`).
 
-    Parameters
-    ----------
-    element_blocks : (m, k) blocks of each element, for each set of elements.
-    free : the free directions; their counts stay, they may turn.
-    order : (N,) blocks in the order of the band; None finds it.
-    widest : where the half bandwidth is larger, no room is made: look at it and do without.
+    Args:
+        element_blocks: (m, k) blocks of each element, for each set of elements.
+        free: the free directions; their counts stay, they may turn.
+        order: (N,) blocks in the order of the band; None finds it.
+        widest: where the half bandwidth is larger, no room is made: look at it and do without.
 
-    Attributes
-    ----------
-    values : (size + b, b + 1 or some more); row j holds A[j, j], A[j + 1, j], ..., and once it is factorised L and D.
+    Attributes:
+        values: (size + b, b + 1 or some more); row j holds A[j, j], A[j + 1, j], ..., and once it is factorised L and
+            D.
     """
 
     def __init__(
@@ -105,14 +95,7 @@ class Banded:
         self.values[:] = 0.0
 
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add element Hessians (m, 3k, 3k); the number of their set does not matter.
-
-        Parameters
-        ----------
-        number : of the set of elements; unused.
-        hessians : (m, 3k, 3k) of each element.
-        blocks : (m, k) of each element.
-        """
+        """See `SummedMatrix.add`; the number of their set does not matter."""
         self._look_at(free)
         _add(hessians, blocks, self._first, self._count, self._axes, self._plain, self.values)
 
@@ -152,10 +135,9 @@ class Banded:
 class SparseSum:
     """A matrix of any pattern, by a sparse solver.
 
-    Parameters
-    ----------
-    element_blocks : (m, k) blocks of each element, for each set of elements.
-    coordinates : (N, d) where the blocks lie [m], by which they are ordered, if that is known.
+    Args:
+        element_blocks: (m, k) blocks of each element, for each set of elements.
+        coordinates: (N, d) where the blocks lie [m], by which they are ordered, if that is known.
     """
 
     def __init__(self, element_blocks: Sequence[Ints], free: Freedom, coordinates: Floats | None = None) -> None:
@@ -171,14 +153,6 @@ class SparseSum:
         self._data[:] = 0.0
 
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add the Hessians of a set of elements.
-
-        Parameters
-        ----------
-        number : of the set, among those that the matrix was made for.
-        hessians : (m, 3k, 3k) of each element.
-        blocks : (m, k) of each element.
-        """
         self._assembly.add(number, hessians, blocks, free, self._data)
 
     def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
@@ -198,13 +172,7 @@ class SparseSum:
 def narrow_or_sparse(
     element_blocks: Sequence[Ints], free: Freedom, *, coordinates: Floats | None = None
 ) -> SummedMatrix:
-    """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell.
-
-    Parameters
-    ----------
-    element_blocks : (m, k) blocks of each element, for each set of elements.
-    coordinates : (N, d) where the blocks lie [m], by which a sparse matrix is ordered, if that is known.
-    """
+    """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell. Parameters as of these."""
     banded = Banded(element_blocks, free, widest=WIDEST)
     return banded if banded.half_bandwidth <= WIDEST else SparseSum(element_blocks, free, coordinates)
 
@@ -228,7 +196,7 @@ def _reach(blocks: Ints, first: Ints, count: Ints) -> int:
     return max(0, int((highest - lowest).max(initial=0)))
 
 
-@njit(error_model="numpy")
+@njit("f3 i2 i1 i1 f3 b1 f2")
 def _add(hessians, blocks, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
     """Add T' H T of every element; T holds the free directions of its blocks as columns, or leaves plain ones alone.
 
@@ -289,7 +257,7 @@ def _turn(h, blocks, count, directions, turned):  # type: ignore[no-untyped-def]
                     turned[3 * a + r, 3 * b + c] = value
 
 
-@njit(error_model="numpy")
+@njit("f2 f3 i1 i1 f3 b1 f2")
 def _add_blocks(diagonal, full, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
     """Add T' (diag(diagonal) + full) T of each block."""
     for i in range(len(diagonal)):
@@ -310,7 +278,7 @@ def _add_blocks(diagonal, full, first, count, directions, plain_blocks, band):  
                 band[first[i] + c, r - c] += value
 
 
-@njit(error_model="numpy")
+@njit("f2 i i1 f3")
 def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
     """Turn rows and columns of blocks of three unknowns from x, y, z to their directions; blocked ones get a one."""
     block = np.empty((3, 3))
@@ -337,7 +305,7 @@ def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
                 band[at + r, 0] = 1.0
 
 
-@njit(error_model="numpy")
+@njit("f2 i i")
 def _factor(a, size, b):  # type: ignore[no-untyped-def]
     """L D L^T in place: a[j, k] holds A[j + k, j], and then 1 / D[j] (k = 0) and L[j + k, j].
 
@@ -365,7 +333,7 @@ def _factor(a, size, b):  # type: ignore[no-untyped-def]
     return negative, -1
 
 
-@njit(error_model="numpy", fastmath={"reassoc", "contract"})
+@njit("f2 i i f2 i1 i1 f3 f1 f2", fastmath={"reassoc", "contract"})
 def _solve(a, size, b, field, first, count, directions, x, solution):  # type: ignore[no-untyped-def]
     """Solve L D L^T for the part of the field in the free directions; `x` is room for the unknowns, b zeros behind."""
     for i in range(len(field)):

@@ -14,28 +14,28 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import dot
-from rodshell.rods.elements import Elements, twist_angles
+from rodshell.rods.elements import twist_angles
 from rodshell.solve.problem import Problem
 from rodshell.solve.shifted_matrix import ShiftedMatrix
 from rodshell.solve.tangent import TangentAssembly, generic
 
 # A motion is measured by `Problem.unit`: shares of the length, or turns
 TOLERANCE = 1e-13  # motion: estimate of the error that is left
-FORCE_TOLERANCE = 1e-9  # of the largest axial force: the same for the forces, of which round-off leaves as much
-LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
-CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
+_FORCE_TOLERANCE = 1e-9  # of the largest axial force: the same for the forces, of which round-off leaves as much
+_LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
+_CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
 MULTIPLIERS = 5e-3  # of the last change is left in forces that are multipliers of a penalty: 2e-4 to 1e-3 measured
-LONGEST_STEP = 0.15  # motion
+_LONGEST_STEP = 0.15  # motion
 PART = 0.25  # of a step that was too long is taken
 LONGER = 2.0  # growth of the longest step after one that was not
 NEAR = 0.02  # motion: a step this short leads to the equilibrium at hand, be it a saddle,
 NEARER = 0.5  # and at most so much of the last ones: past a limit point nothing is near, and steps do not shrink
-STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
-ELASTIC = 1 / 3  # of their last change: the next one of elastic forces after a step of Newton's, at most
+_STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
+_ELASTIC = 1 / 3  # of their last change: the next one of elastic forces after a step of Newton's, at most
 AGAIN = 3.0  # times as much of the last change as that was of the one before: the next one after a chord step, at most
 CHORD = 5e-3  # motion: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
-SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
+_SIDEWAYS = 1e-6  # of a mode: it goes up and down by as much
 TINY = 1e-300  # no step is shorter, except zero
 
 
@@ -46,7 +46,7 @@ class Step:
 
     state: Floats
     forces: Floats
-    elements: tuple[Elements, ...]
+    problem: Problem
     negative_modes: int
     motion: Floats
     change: Floats
@@ -58,29 +58,28 @@ class Step:
 class Iterate:
     """Where an iteration is, and what its steps so far say of the next one.
 
-    Parameters
-    ----------
-    state, forces : (n, 3) [m, rad], and axial forces (e,) [N].
-    elements : with their source frames at, or near, the state.
-    strains : (e,) of the edges [-]; mismatch : how far the forces are from matching them [-].
-    step, length : the last step, and how long it is; moved, changed : the last whole step and its change of the forces,
-        both relative.
-    longest : the longest step allowed; nearest : the last step that was near.
-    shifted : the last step was one of the shifted Hessian.
-    chord : the next step is by the factors at hand; was_chord : the last one was.
-    settled : whether the error that is left is small enough.
+    Args:
+        state, forces: (n, 3) [m, rad], and axial forces (e,) [N].
+        problem: with its source frames at, or near, the state.
+        strains: (e,) of the edges [-]; mismatch : how far the forces are from matching them [-].
+        step, length: the last step, and how long it is; moved, changed : the last whole step and its change of the
+            forces, both relative.
+        longest: the longest step allowed; nearest : the last step that was near.
+        shifted: the last step was one of the shifted Hessian.
+        chord: the next step is by the factors at hand; was_chord : the last one was.
+        settled: whether the error that is left is small enough.
     """
 
     state: Floats
     forces: Floats
-    elements: tuple[Elements, ...]
+    problem: Problem
     strains: Floats
     mismatch: float = np.inf
     step: Step | None = None
     length: float = np.inf
     moved: float = np.inf
     changed: float = np.inf
-    longest: float = LONGEST_STEP
+    longest: float = _LONGEST_STEP
     nearest: float = np.inf
     shifted: bool = False
     chord: bool = False
@@ -99,7 +98,7 @@ class Iterate:
 
     def refreshed(self) -> "Iterate":
         """The same with the source frames of the elements at the state."""
-        return replace(self, elements=tuple(element.refreshed(self.state) for element in self.elements))
+        return replace(self, problem=self.problem.refreshed(self.state))
 
 
 class TooManyModesError(Exception):
@@ -109,9 +108,8 @@ class TooManyModesError(Exception):
 class NewtonStep:
     """Takes the steps of one iteration, with the matrix and the buffers that these share.
 
-    Parameters
-    ----------
-    descend, limit_steps, most_modes : as of `find_equilibrium`.
+    Args:
+        descend, limit_steps, most_modes: as of `find_equilibrium`.
     """
 
     def __init__(
@@ -129,38 +127,32 @@ class NewtonStep:
         self.assembly = TangentAssembly(problem, state)
         free = problem.constraint.freedom(state)
         self.matrix = ShiftedMatrix(self.assembly.pattern, self._unit[:, 0].repeat(free.count))
-        self._least_force = LEAST_FORCE * float(problem.stretch.stiffness.max())
+        self._least_force = _LEAST_FORCE * float(problem.stretch.stiffness.max())
         self._no_forces = np.zeros(len(problem.stretch.blocks))
         self._factored, self._free = (state, self._no_forces), free  # where the matrix is from
 
     def start(self, state: Floats, forces: Floats) -> Iterate:
-        """Where the iteration begins.
-
-        Parameters
-        ----------
-        state, forces : (n, 3) [m, rad], and axial forces (e,) [N].
-        """
+        """Where the iteration begins: in a state (n, 3) with axial forces (e,) [N]."""
         strains = self._problem.stretch.strains(state)
-        return Iterate(state=state, forces=forces, elements=self._problem.elements, strains=strains)
+        return Iterate(state=state, forces=forces, problem=self._problem, strains=strains)
 
     def take(self, here: Iterate) -> Iterate:
         """The next iterate.
 
-        Raises
-        ------
-        SingularError : a pivot vanishes, and not by a mode without stiffness.
-        TooManyModesError : the start has more negative modes than are allowed.
+        Raises:
+            SingularError: a pivot vanishes, and not by a mode without stiffness.
+            TooManyModesError: the start has more negative modes than are allowed.
         """
-        problem, stretch, state, forces = self._problem, self._problem.stretch, here.state, here.forces
+        problem, stretch, state, forces = here.problem, here.problem.stretch, here.state, here.forces
         base = forces if problem.inextensible else self._no_forces
         if here.chord:  # what the edges lack acts along those of the matrix, else strains do not settle
-            gradient = self.assembly.gradient(here.elements, state, forces)
+            gradient = problem.gradient(state, forces)
             if self.assembly.curved:  # less the constraint's forces, which act across the free directions of this state
                 gradient = problem.constraint.freedom(state).within(gradient)
             stretch.add_axial(self._factored[0], base + stretch.stiffness * here.strains - forces, gradient)
         else:
             self._factored, self._free = (state, forces), problem.constraint.freedom(state)
-            gradient = self.assembly.linearise(here.elements, state, forces, multipliers=base)
+            gradient = self.assembly.linearise(problem, state, forces, multipliers=base)
         prescribed = problem.constraint.remaining(state)
         if prescribed is not None:
             gradient += self.assembly.product(prescribed)
@@ -176,7 +168,7 @@ class NewtonStep:
             return self.take(replace(here, chord=False))
         share = min(1.0, here.longest / reach) if reach > 0 else 1.0
         change = base + stretch.stiffness * (here.strains + stretch.elongation(self._factored[0], motion)) - forces
-        step = Step(state, forces, here.elements, self.matrix.negative_modes, motion, change, reach, share)
+        step = Step(state, forces, problem, self.matrix.negative_modes, motion, change, reach, share)
         return self._judged(here, step)
 
     def lowest_mode(self) -> Floats:
@@ -225,7 +217,7 @@ class NewtonStep:
             matrix.shift_until_definite(self._softest, self._generic_motion())
         else:
             shifted = False
-        return matrix.solve(right), replace(here, longest=min(LONGER * here.longest, LONGEST_STEP), shifted=shifted)
+        return matrix.solve(right), replace(here, longest=min(LONGER * here.longest, _LONGEST_STEP), shifted=shifted)
 
     def _after(self, step: Step) -> tuple[Floats, Floats]:
         """State and forces after a step."""
@@ -238,7 +230,7 @@ class NewtonStep:
         step = replace(here.step, share=PART * here.step.share)
         (state, forces), length = self._after(step), step.share * step.reach
         return replace(
-            here, state=state, forces=forces, elements=step.elements, strains=self._problem.stretch.strains(state),
+            here, state=state, forces=forces, problem=step.problem, strains=self._problem.stretch.strains(state),
             mismatch=np.inf, step=step, length=length, longest=length,
         )  # fmt: skip
 
@@ -257,10 +249,10 @@ class NewtonStep:
             float(np.abs(forces - old).max(initial=0.0)) / size for old in (here.forces, self._factored[1])
         )
         shrunk = moved / max(here.moved, TINY), changed / max(here.changed, TINY)
-        rates = shrunk if here.chord else (max(CURVED * moved, changed), MULTIPLIERS if multipliers else changed)
-        settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
-        foreseen = AGAIN * shrunk[1] if here.chord else MULTIPLIERS if multipliers else ELASTIC
-        count_again = since >= STALE > foreseen * changed
+        rates = shrunk if here.chord else (max(_CURVED * moved, changed), MULTIPLIERS if multipliers else changed)
+        settled = moved * rates[0] < TOLERANCE and changed * rates[1] < _FORCE_TOLERANCE and since < _STALE
+        foreseen = AGAIN * shrunk[1] if here.chord else MULTIPLIERS if multipliers else _ELASTIC
+        count_again = since >= _STALE > foreseen * changed
         return replace(
             here, state=state, forces=forces, strains=strains, mismatch=float(np.abs(left).max()),
             step=step, length=moved, moved=moved, changed=changed, settled=settled, was_chord=here.chord,
@@ -279,13 +271,12 @@ def generic_motion(state: Floats, twists: Bools) -> Floats:
     """(n, 3) a motion to begin an iteration with, of which all modes are a part, in axes that turn with the structure:
     which of several equal modes is found, and how nearly, is the same at every heading.
 
-    Parameters
-    ----------
-    state : (n, 3) nodes [m] and twist angles [rad]; twists : (n,) which of its blocks are angles.
+    Args:
+        state: (n, 3) nodes [m] and twist angles [rad]; twists : (n,) which of its blocks are angles.
     """
     numbers, nodes = generic(state.size, 1).reshape(-1, 3), state[~twists]
     x, y, _ = generic(len(nodes), 1)[0] @ (nodes - nodes.mean(axis=0))
-    x, y = (x, y) if np.hypot(x, y) > SIDEWAYS * np.ptp(nodes[:, 2]) else (1.0, 0.0)  # upright: any
+    x, y = (x, y) if np.hypot(x, y) > _SIDEWAYS * np.ptp(nodes[:, 2]) else (1.0, 0.0)  # upright: any
     axes = np.array([(x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, np.hypot(x, y))]) / np.hypot(x, y)
     return np.where(twists[:, None], numbers, numbers @ axes)
 
@@ -294,8 +285,8 @@ def upwards(mode: Floats) -> Floats:
     """A mode (n, 3) in its units, or its opposite: that which goes up on the whole, or first, where it goes up and
     down by as much; along x or y where it does not go up."""
     size = np.abs(mode).max(axis=0)
-    along = mode[:, 2 if size[2] > SIDEWAYS * size.max() else int(np.argmax(size))]
+    along = mode[:, 2 if size[2] > _SIDEWAYS * size.max() else int(np.argmax(size))]
     whole = float(along.sum())
-    if abs(whole) <= SIDEWAYS * float(np.abs(along).sum()):
+    if abs(whole) <= _SIDEWAYS * float(np.abs(along).sum()):
         whole = float(along[np.argmax(np.abs(along) > 0.5 * np.abs(along).max())])
     return np.asarray(np.copysign(1.0, whole) * mode)

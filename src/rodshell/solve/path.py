@@ -28,64 +28,23 @@ from rodshell.solve.continuation import Continuation
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.newton_matrix import SparseSum
-from rodshell.solve.problem import Problem, Supports
+from rodshell.solve.problem import PointLoads, Problem, Supports
 
 EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25
 SMALLEST_STEP = 1e-3
-SNAP = 0.01  # step over which a structure may snap
-MOST_OF_ALL = 400  # iterations of the whole path; the paths that arrive take 30 to 100
+_SNAP = 0.01  # step over which a structure may snap
+_MOST_OF_ALL = 400  # iterations of the whole path; the paths that arrive take 30 to 100
 UNACCOUNTED = 0.02  # of the energy: more than the trapezoidal rule leaves of a short step along one branch
-MOST_A_STEP = 8  # iterations of a step along a branch
+_MOST_A_STEP = 8  # iterations of a step along a branch
 SAME = 1e-3  # of the length: equilibria further apart are different ones
 FINER = 10  # steps on the way back after a snap, at most, for each of the shortest ahead
-MOST_BACK = 300  # factorisations of the way back: 2 are usual
+_MOST_BACK = 300  # factorisations of the way back: 2 are usual
 TINY = 1e-300
-DISTURBANCE = 1e-3  # largest motion along the mode of an unstable equilibrium, from where the energy falls
+_DISTURBANCE = 1e-3  # largest motion along the mode of an unstable equilibrium, from where the energy falls
 
 
 def follow(
-    problem_at: Callable[[float], Problem],
-    state: Floats,
-    forces: Floats,
-    *,
-    first_step: float,
-    snap: bool = False,
-    most_factorizations: int | None = None,
-    most_modes: int | None = None,
-    progress: Callable[[float, int, float], None] | None = None,
-) -> Equilibrium:
-    """Move from t = 0 to t = 1 by steps that shrink on failure and grow back.
-
-    Parameters
-    ----------
-    problem_at : the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
-        same at all t, and their source frames are carried along the path. The first
-        iteration of each step carries them there with the tangent stiffness: it is the tangent predictor.
-    state, forces : equilibrium, or a guess of it, at t = 0.
-    snap : where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
-        structure itself would; its constraint must be `Supports`.
-    most_factorizations : no step is begun after so many, and no descent takes many more; None: as many as it takes.
-    most_modes : the path ends at an equilibrium with more negative modes; None: at none.
-
-    Returns
-    -------
-    The equilibrium at t = 1, or at the last t reached, with the status STALLED. Iterations,
-    factorizations and seconds of the report are those of the whole path, failed steps included.
-    """
-    path = followed(
-        problem_at, state, forces, first_step=first_step, snap=snap, most_factorizations=most_factorizations,
-        most_modes=most_modes, progress=progress,
-    )  # fmt: skip
-    last = path.reports[-1]
-    report = path.found.report.after(*(report for report in path.reports if report is not path.found.report))
-    if path.t < 1.0:
-        status = Status.OUT_OF_TIME if last.status is Status.OUT_OF_TIME else Status.STALLED
-        report = replace(report, status=status, reason=last.reason)
-    return replace(path.found, report=report)
-
-
-def followed(
     problem_at: Callable[[float], Problem],
     state: Floats,
     forces: Floats,
@@ -96,18 +55,25 @@ def followed(
     slide: bool = True,
     easy: int = EASY,
     most: int = MOST,
-    most_of_all: int | None = MOST_OF_ALL,
+    most_of_all: int | None = _MOST_OF_ALL,
     most_factorizations: int | None = None,
     most_modes: int | None = None,
     progress: Callable[[float, int, float], None] | None = None,
 ) -> "Trace":
-    """As `follow`, as far as it went.
+    """Move from t = 0 to t = 1 by steps that shrink on failure and grow back; see `Trace.whole`.
 
-    Parameters
-    ----------
-    neutral, slide : as of `find_stable`.
-    easy : iterations of a step that may be followed by a longer one.
-    most, most_of_all : iterations of a step, and of the path; None: as many as it takes.
+    Args:
+        problem_at: the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
+            same at all t, and their source frames are carried along the path. The first iteration of each step carries
+            them there with the tangent stiffness: it is the tangent predictor.
+        state, forces: equilibrium, or a guess of it, at t = 0.
+        snap: where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
+            structure itself would; its constraint must be `Supports`.
+        neutral, slide: as of `find_stable`.
+        easy: iterations of a step that may be followed by a longer one.
+        most, most_of_all: iterations of a step, and of the path; None: as many as it takes.
+        most_factorizations: no step is begun after so many, and no descent takes many more; None: as many as it takes.
+        most_modes: the path ends at an equilibrium with more negative modes; None: at none.
     """
     path, reports = Continuation(0.0, 1.0, first_step, SMALLEST_STEP), list[SolveReport]()
     last: Equilibrium | None = None
@@ -132,14 +98,14 @@ def followed(
             path.shorten()
         if found.report.status is Status.OUT_OF_TIME:
             break
-        if snap and last is not None and path.step < SNAP and not found.report.converged:
-            short, path.step = path.step, SNAP
+        if snap and last is not None and path.step < _SNAP and not found.report.converged:
+            short, path.step = path.step, _SNAP
             left = None if most_factorizations is None else most_factorizations - _made(reports)
             found = _fallen(going_on(problem_at(path.there), last), last, found, most_factorizations=left)
             reports.append(found.report)
             if found.report.stable:
                 path.accept()
-            last, path.step = (found, 4 * SNAP) if found.report.stable else (last, short)
+            last, path.step = (found, 4 * _SNAP) if found.report.stable else (last, short)
         spent = most_of_all is not None and sum(report.iterations for report in reports) > most_of_all
         if path.lost or spent or (most_factorizations is not None and _made(reports) >= most_factorizations):
             break
@@ -157,10 +123,9 @@ def _made(reports: Sequence[SolveReport]) -> int:
 class Snap:
     """Where a branch of stable equilibria ended and the structure went to another one.
 
-    Parameters
-    ----------
-    start, stop : of the step in t in which it happened.
-    moved : how far the node went that went farthest [m].
+    Args:
+        start, stop: of the step in t in which it happened.
+        moved: how far the node went that went farthest [m].
     """
 
     start: float
@@ -182,6 +147,17 @@ class Trace:
         """Of all solves, those of steps that were too long too."""
         return _made(self.reports)
 
+    @property
+    def whole(self) -> Equilibrium:
+        """The equilibrium at t = 1, or at the last t reached, with the status STALLED or OUT_OF_TIME. Its report counts
+        the work of the whole path, failed steps included."""
+        report = self.found.report.after(*(report for report in self.reports if report is not self.found.report))
+        if self.t < 1.0:
+            late = self.reports[-1].status is Status.OUT_OF_TIME
+            status = Status.OUT_OF_TIME if late else Status.STALLED
+            report = replace(report, status=status, reason=self.reports[-1].reason)
+        return replace(self.found, report=report)
+
 
 def trace(
     problem_at: Callable[[float], Problem], here: Equilibrium, start: float, stop: float, *,
@@ -193,24 +169,20 @@ def trace(
     Where a branch ends, the structure snaps, unless the way back undoes that: a path that rises too steeply for the
     shortest step, as where it forks, goes back to where it came from.
 
-    Parameters
-    ----------
-    problem_at : the problem at t, its constraint being `Supports` with prescribed blocks; source frames as in `follow`.
-    shortest : step in t at which a branch that cannot be followed has ended.
-    snap : whether to go down the energy there and on from where that leads; else the path ends there.
-    most_factorizations : the path ends when they are used up.
-    progress : called with t and the equilibrium there before each step; it may raise an error to end the path.
-
-    Returns
-    -------
-    The path; its t is `stop` where it arrived.
+    Args:
+        problem_at: the problem at t, its constraint being `Supports` with prescribed blocks; source frames as in
+            `follow`.
+        shortest: step in t at which a branch that cannot be followed has ended.
+        snap: whether to go down the energy there and on from where that leads; else the path ends there.
+        most_factorizations: the path ends when they are used up.
+        progress: called with t and the equilibrium there before each step; it may raise an error to end the path.
     """
     path, snaps, reports = Continuation(start, stop, abs(stop - start), shortest), list[Snap](), list[SolveReport]()
     while not path.arrived:
         progress(path.t, here)
         t, there = path.t, path.there
         problem = going_on(problem_at(there), here)
-        found = find_stable(problem, here.state, here.forces, most_iterations=MOST_A_STEP)
+        found = find_stable(problem, here.state, here.forces, most_iterations=_MOST_A_STEP)
         reports.append(found.report)
         if not found.report.stable or unaccounted(here, found):
             at_shortest = path.length <= shortest
@@ -225,7 +197,7 @@ def trace(
             if not found.report.stable:
                 break
             back = trace(
-                problem_at, found, there, t, shortest=shortest / FINER, snap=False, most_factorizations=MOST_BACK
+                problem_at, found, there, t, shortest=shortest / FINER, snap=False, most_factorizations=_MOST_BACK
             )
             reports += back.reports
             if back.t != t or farthest(here, back.found) > SAME * problem.length:
@@ -239,30 +211,20 @@ def trace(
 
 
 def going_on(problem: Problem, last: Equilibrium) -> Problem:
-    """The problem with the source frames and the pattern of an equilibrium of the same structure.
-
-    Parameters
-    ----------
-    problem : the next one on a path.
-    last : the equilibrium that the next solve starts from.
-    """
+    """The next problem on a path, with the source frames and the pattern of the equilibrium that it starts from."""
     elements = tuple(map(with_frames, problem.elements, last.elements))
     return replace(problem, elements=elements, pattern=last.problem.pattern)
 
 
 def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule; parameters as of `surplus`."""
-    return abs(surplus(here, there)) > UNACCOUNTED
+    by the trapezoidal rule: see `_surplus`."""
+    return abs(_surplus(here, there)) > UNACCOUNTED
 
 
-def surplus(here: Equilibrium, there: Equilibrium) -> float:
-    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell.
-
-    Parameters
-    ----------
-    here, there : equilibria of one structure under one load, the second with prescribed `Supports`.
-    """
+def _surplus(here: Equilibrium, there: Equilibrium) -> float:
+    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell. Of
+    equilibria of one structure under one load, the second with prescribed `Supports`."""
     supports = there.problem.constraint
     assert isinstance(supports, Supports)
     moved, before, after = supports.moved, here.energy, there.energy
@@ -287,10 +249,10 @@ def _fallen(
     supports, state, forces = problem.constraint, here.state, here.forces
     assert isinstance(supports, Supports)
     if found.mode is not None:
-        state, forces = found.state + DISTURBANCE * found.mode, found.forces
+        state, forces = found.state + _DISTURBANCE * found.mode, found.forces
         problem = replace(problem, elements=found.elements)
     down = find_equilibrium(problem, state, forces, descend=True)
-    if down.report.stable and surplus(here, down) < UNACCOUNTED:
+    if down.report.stable and _surplus(here, down) < UNACCOUNTED:
         return down
     state = state.copy()
     state[supports.moved] = supports.goals
@@ -314,21 +276,18 @@ def relax(
 ) -> Equilibrium:  # fmt: skip
     """The stable equilibrium that lies below a state; the last steps are those of `find_stable`.
 
-    Parameters
-    ----------
-    state : (N, 3) to begin with [m, at twist angles rad].
-    most_factorizations : no step down is taken after so many; None: as many as `MOST_STEPS` take.
-    progress : called with the number and the length of each step; an OutOfTimeError that it raises ends the descent.
+    Args:
+        state: (N, 3) to begin with [m, at twist angles rad].
+        most_factorizations: no step down is taken after so many; None: as many as `MOST_STEPS` take.
+        progress: called with the number and the length of each step; an OutOfTimeError that it raises ends the descent.
 
-    Returns
-    -------
-    Its report counts the descent's work too.
+    Returns:
+        Its report counts the descent's work too.
     """
     begin = time.perf_counter()
     edges = problem.stretch.with_forces(None)
-    motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, ())
-    if problem.load is not None:
-        motion = replace(motion, forces=(_Dead(problem.load),))
+    dead = () if problem.load is None else (PointLoads(np.arange(len(state)), problem.load),)
+    motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, dead)
     stepper = ImplicitEuler(lambda blocks, free: SparseSum(blocks, free, problem.flat_coordinates))
     still, unit, length, factorizations, number = np.zeros_like(state), problem.unit(len(state)), FIRST, 0, 0
     for number in range(1, MOST_STEPS + 1):
@@ -356,16 +315,6 @@ def relax(
     found = find_stable(replace(problem, elements=motion.elements[:-1]), state, forces, progress=progress)
     work = replace(found.report, iterations=number, factorizations=factorizations, seconds=time.perf_counter() - begin)
     return replace(found, report=found.report.after(replace(work, seconds=work.seconds - found.report.seconds)))
-
-
-class _Dead:
-    """A load that does not change."""
-
-    def __init__(self, load: Floats) -> None:
-        self._load = load
-
-    def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        return self._load
 
 
 def _pace(problem: Problem, state: Floats) -> Floats:

@@ -5,9 +5,9 @@ step asks a force once for the part that is held over it (`held`); a force may a
 enters Newton's matrix. Forces on a twist angle are moments [N m] in the first component of its block.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,62 +16,36 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.bounds import bounds
 from rodshell.model import Assembly, Freedom, Potential, Shell
-from rodshell.rods.elements import Elements, Stretch, twist_angles
-from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, product, upper_triangle
+from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch, evaluate_all, twist_angles
+from rodshell.solve.sparse_ldl import Multifrontal
 from rodshell.validation import array, finite, function_of, keep, number, vector
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_matrix
 
 NO_CURVATURE = np.empty((0, 3, 3))
 
 
 class Constraint(Protocol):
-    """A manifold on which the state moves. The count of free directions of each block never changes."""
+    """A manifold on which the state (n, 3) moves [m, at twist angles rad]. The count of free directions of each block
+    never changes."""
 
     def freedom(self, state: Floats) -> Freedom:
-        """The free directions.
-
-        Parameters
-        ----------
-        state : (n, 3) on the manifold [m, at twist angles rad].
-        """
+        """The free directions at a state on the manifold."""
         ...
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
-        """Contribution of the constraint forces to the Hessian.
+        """Contribution of the constraint forces to the Hessian, by the gradient (n, 3) of energy and load [N, N m].
 
-        Parameters
-        ----------
-        state : (n, 3) on the manifold [m, rad].
-        gradient : (n, 3) of energy and load there [N, N m].
-
-        Returns
-        -------
-        (n, 3, 3) -lambda phi'' of each block [N/m]; or an empty array, at every state.
+        Returns:
+            (n, 3, 3) -lambda phi'' of each block [N/m]; or an empty array, at every state.
         """
         ...
 
     def remaining(self, state: Floats) -> Floats | None:
-        """Prescribed displacement that is still to go.
-
-        Parameters
-        ----------
-        state : (n, 3) the state now [m, rad].
-
-        Returns
-        -------
-        (n, 3) across the free directions [m, rad]; None where nothing moves.
-        """
+        """(n, 3) prescribed displacement across the free directions that is still to go [m, rad]; None where nothing
+        moves."""
         ...
 
     def retract(self, state: Floats) -> Floats:
-        """The state moved back onto the manifold after a step along the free directions.
-
-        Parameters
-        ----------
-        state : (n, 3) next to the manifold [m, rad].
-        """
+        """The state moved back onto the manifold after a step along the free directions."""
         ...
 
 
@@ -79,9 +53,8 @@ class Constraint(Protocol):
 class Supports:
     """Fixed directions that never turn: supports, clamps, ghost nodes.
 
-    Parameters
-    ----------
-    moved : (k,) blocks that are prescribed, all their directions being fixed; goals : (k, 3) where they go [m].
+    Args:
+        moved: (k,) blocks that are prescribed, all their directions being fixed; goals : (k, 3) where they go [m].
     """
 
     free: Freedom
@@ -110,53 +83,37 @@ class Pattern:
     """What follows from the pattern of a problem's matrices alone. It never changes, so that any number of solves and
     tangents share it.
 
-    Parameters
-    ----------
-    blocks : (m, k) blocks of unknowns that each set of energies couples.
-    count : (n,) free directions of each block.
-    assembly : the maps from element Hessians to the sparse matrix.
-    solver : the order of elimination and the symbolic factorisation.
+    Args:
+        blocks: (m, k) blocks of unknowns that each set of energies couples.
+        count: (n,) free directions of each block.
+        assembly: the maps from element Hessians to the sparse matrix.
+        solver: the order of elimination and the symbolic factorisation.
     """
 
     blocks: tuple[Ints, ...]
     count: Ints
     assembly: Assembly
-    solver: LinearSolver
+    solver: Multifrontal
 
     def serves(self, blocks: tuple[Ints, ...], count: Ints) -> bool:
-        """Whether another problem has this pattern.
-
-        Parameters
-        ----------
-        blocks : (m, k) of each of its sets of energies.
-        count : (n,) free directions of each of its blocks.
-        """
+        """Whether another problem, with these `blocks` and this `count`, has this pattern."""
         here, there = (*self.blocks, self.count), (*blocks, count)
         return len(here) == len(there) and all(map(np.array_equal, here, there))
-
-    def upper(self, values: Floats) -> "csc_matrix":
-        """The upper triangle (dofs, dofs) of a matrix with these `values` (nnz,)."""
-        return upper_triangle(self.assembly.indptr, self.assembly.indices, values)
-
-    def product(self, values: Floats, x: Floats) -> Floats:
-        """(dofs,) product A x of the symmetric matrix whose upper triangle has these `values` (nnz,)."""
-        return product(self.assembly.indptr, self.assembly.indices, values, x)
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A structure in equilibrium: elastic elements, edges, loads and a constraint.
 
-    Parameters
-    ----------
-    elements : every energy but the stretch.
-    length : characteristic length of the shape [m], by which motions are measured, see `unit`.
-    inextensible : the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
-    load : (n, 3) dead forces [N], or None.
-    flat_coordinates : (n, 2) where the blocks lie in the flat grid [m], from which the order of elimination follows,
-        or None.
-    pattern : of a problem that was solved before; where the matrices of this one have the same pattern, they are not
-        analysed again.
+    Args:
+        elements: every energy but the stretch.
+        length: characteristic length of the shape [m], by which motions are measured, see `unit`.
+        inextensible: the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
+        load: (n, 3) dead forces [N], or None.
+        flat_coordinates: (n, 2) where the blocks lie in the flat grid [m], from which the order of elimination follows,
+            or None.
+        pattern: of a problem that was solved before; where the matrices of this one have the same pattern, they are not
+            analysed again.
     """
 
     elements: tuple[Elements, ...]
@@ -180,12 +137,11 @@ class Problem:
     ) -> Self:
         """A shell without loads whose rod ends are held, or are on their way.
 
-        Parameters
-        ----------
-        points : (k, 3) the rods' ends [m], whose mean radius is the characteristic length.
-        goals : (k, 3) where the ends, and the ghost nodes of clamps after them, go [m]; None: they stay.
-        elements : the shell's own energies, with their source frames elsewhere; None: those of the shell.
-        pattern : of an earlier solve of this shell.
+        Args:
+            points: (k, 3) the rods' ends [m], whose mean radius is the characteristic length.
+            goals: (k, 3) where the ends, and the ghost nodes of clamps after them, go [m]; None: they stay.
+            elements: the shell's own energies, with their source frames elsewhere; None: those of the shell.
+            pattern: of an earlier solve of this shell.
         """
         free = shell.held_ends()
         supports = Supports(free) if goals is None else Supports(free, np.append(shell.ends, shell.ghosts), goals)
@@ -210,12 +166,7 @@ class Problem:
         return np.where(twist_angles(self.elements, count), 2.0 * np.pi, self.length)[:, None]
 
     def pattern_at(self, state: Floats) -> Pattern:
-        """The pattern of this problem: the one that comes with it where it serves, or a new one.
-
-        Parameters
-        ----------
-        state : (n, 3) any state of the problem.
-        """
+        """The pattern of this problem, at any state: the one that comes with it where it serves, or a new one."""
         blocks, free = self.blocks(len(state)), self.constraint.freedom(state)
         if self.pattern is not None and self.pattern.serves(blocks, free.count):
             return self.pattern
@@ -235,20 +186,29 @@ class Problem:
         """The same problem with the source frames of its elements at `state` (n, 3)."""
         return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
 
+    def without_edges(self, state: Floats, hessians: Sequence[Floats]) -> Floats:
+        """(n, 3) gradient of the elements and the load at a state [N, for angles N m]; `hessians`, of each set of
+        elements, are filled unless they are empty."""
+        gradient = np.zeros_like(state) if self.load is None else -self.load
+        evaluate_all(self.elements, state, gradient, hessians)
+        return gradient
+
+    def gradient(self, state: Floats, forces: Floats) -> Floats:
+        """(n, 3) gradient of energy and load at a state [N, for angles N m], the edges carrying the axial `forces` (e,)
+        [N]."""
+        gradient = self.without_edges(state, [NO_HESSIANS] * len(self.elements))
+        self.stretch.add_axial(state, forces, gradient)
+        return gradient
+
     def potential(self, state: Floats) -> float:
         """Elastic energy at `state` (n, 3) less the work of the load [J]."""
         elastic = self.energies.energy(state)
         return elastic - (0.0 if self.load is None else float(np.sum(self.load * state)))
 
 
-def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | None) -> LinearSolver:
-    """The solver for a pattern, ordered by where the blocks lie in the flat grid if that is known.
-
-    Parameters
-    ----------
-    free : the free directions of the blocks.
-    flat_coordinates : (n, 2) of the blocks [m]; None: ordered by minimum degree.
-    """
+def linear_solver(assembly: Assembly, free: Freedom, flat_coordinates: Floats | None) -> Multifrontal:
+    """The solver for a pattern, ordered by where the blocks lie in the flat grid (n, 2) [m], if that is known; else by
+    minimum degree."""
     if flat_coordinates is None:
         return Multifrontal(assembly.indptr, assembly.indices)
     return Multifrontal(
@@ -274,15 +234,13 @@ class Force(Protocol):
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats | None:
         """The part of the force that is held over a step.
 
-        Parameters
-        ----------
-        time : of the step's end [s].
-        state, velocity : (N, 3) at its start [m, m/s].
-        mass : (N, 3) lumped mass of each component [kg, kg m2].
+        Args:
+            time: of the step's end [s].
+            state, velocity: (N, 3) at its start [m, m/s].
+            mass: (N, 3) lumped mass of each component [kg, kg m2].
 
-        Returns
-        -------
-        (N, 3) forces [N, on twist angles N m], or None.
+        Returns:
+            (N, 3) forces [N, on twist angles N m], or None.
         """
         ...
 
@@ -291,10 +249,9 @@ class Force(Protocol):
 class GravityForce:
     """Weight of the nodes. Twist angles have inertia but no weight.
 
-    Parameters
-    ----------
-    nodes : blocks that are nodes: `rod.nodes`.
-    acceleration : (3,) [m/s2].
+    Args:
+        nodes: blocks that are nodes: `rod.nodes`.
+        acceleration: (3,) [m/s2].
     """
 
     nodes: slice | Ints
@@ -306,12 +263,7 @@ class GravityForce:
         vector("the acceleration of gravity", self.acceleration)
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        """The weight of the nodes.
-
-        Parameters
-        ----------
-        mass : (N, 3) lumped mass of each component [kg, kg m2].
-        """
+        """The weight of the nodes; parameters as of `Force.held`."""
         force = np.zeros_like(mass)
         force[self.nodes] = mass[self.nodes] * self.acceleration
         return force
@@ -332,20 +284,14 @@ class PointLoads:
     def on(cls, block: int, *force: float) -> "PointLoads":
         """One load on a single block.
 
-        Parameters
-        ----------
-        block : a node or a twist angle.
-        force : (fx, fy, fz) on a node [N], or one moment on a twist angle [N m].
+        Args:
+            block: a node or a twist angle.
+            force: (fx, fy, fz) on a node [N], or one moment on a twist angle [N m].
         """
         return cls(np.array([block]), np.array([[*force, 0.0, 0.0][:3]]))
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        """The sum of the loads on each block.
-
-        Parameters
-        ----------
-        mass : (N, 3) lumped mass of each component, for its shape.
-        """
+        """The sum of the loads on each block; parameters as of `Force.held`."""
         force = np.zeros_like(mass)
         _check_blocks(self.blocks, len(mass))
         np.add.at(force, self.blocks, self.forces)
@@ -356,10 +302,9 @@ class PointLoads:
 class Damping:
     """Viscous damping -(rate M + coefficients) v, implicit: it never overshoots.
 
-    Parameters
-    ----------
-    rate : of all momenta [1/s]: alone it makes v decay as exp(-rate t), twist rates included.
-    coefficients : (N, 3) or broadcast to it: drag of each block [N s/m, N m s/rad].
+    Args:
+        rate: of all momenta [1/s]: alone it makes v decay as exp(-rate t), twist rates included.
+        coefficients: (N, 3) or broadcast to it: drag of each block [N s/m, N m s/rad].
     """
 
     rate: float = 0.0
@@ -388,9 +333,8 @@ class Damping:
 class ExplicitForce:
     """A force without a gradient, held over each step.
 
-    Parameters
-    ----------
-    force : (time, state, velocity) -> (N, 3) [N]; the time is that of the step's end, the rest of its start.
+    Args:
+        force: (time, state, velocity) -> (N, 3) [N]; the time is that of the step's end, the rest of its start.
     """
 
     force: Callable[[float, Floats, Floats], Floats]
@@ -399,14 +343,7 @@ class ExplicitForce:
         function_of("the force", self.force, "a function of time, state and velocity", 0.0, None, None)
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
-        """The force, evaluated once for the step.
-
-        Parameters
-        ----------
-        time : of the step's end [s].
-        state, velocity : (N, 3) at its start [m, m/s].
-        mass : (N, 3) lumped mass of each component, for its shape.
-        """
+        """The force, evaluated once for the step; parameters as of `Force.held`."""
         return _checked(self.force(time, state, velocity), mass.shape, self.force, time)
 
 
@@ -414,13 +351,12 @@ class ExplicitForce:
 class ImplicitForce:
     """A force with its gradient, taken at the end of each step.
 
-    Parameters
-    ----------
-    force : (time, state, velocity) -> (N, 3) [N] and its derivatives by the state and by the velocity,
-        (m, 3k, 3k) each [N/m, N s/m] on the stencils `blocks`; either may be None for zero. Of a derivative that is
-        not symmetric (a load that follows the rod) Newton's matrix takes the symmetric part: it then converges
-        linearly, to the same step.
-    blocks : (m, k).
+    Args:
+        force: (time, state, velocity) -> (N, 3) [N] and its derivatives by the state and by the velocity,
+            (m, 3k, 3k) each [N/m, N s/m] on the stencils `blocks`; either may be None for zero. Of a derivative that is
+            not symmetric (a load that follows the rod) Newton's matrix takes the symmetric part: it then converges
+            linearly, to the same step.
+        blocks: (m, k).
     """
 
     force: Callable[[float, Floats, Floats], tuple[Floats, Floats | None, Floats | None]]
@@ -434,17 +370,10 @@ class ImplicitForce:
         _check_blocks(self.blocks, len(mass))
 
     def at(self, time: float, state: Floats, velocity: Floats, step: float) -> tuple[Floats, Floats]:
-        """The force at the end of a step.
+        """The force at the `time` of a step's end, in the `state` and at the `velocity` (N, 3) there.
 
-        Parameters
-        ----------
-        time : of the end [s].
-        state, velocity : (N, 3) at the end [m, m/s].
-        step : length of the step [s].
-
-        Returns
-        -------
-        (N, 3) forces [N], and (m, 3k, 3k) minus the symmetric part of their derivative by the state at the end.
+        Returns:
+            (N, 3) forces [N], and (m, 3k, 3k) minus the symmetric part of their derivative by the state at the end.
         """
         force, by_state, by_velocity = self.force(time, state, velocity)
         force = _checked(force, state.shape, self.force, time)

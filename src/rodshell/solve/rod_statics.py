@@ -12,34 +12,31 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
-from rodshell.model import Freedom, Potential
+from rodshell.model import Freedom
+from rodshell.model.assembly import ANGLE
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.rod_line import End
-from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import is_bends
 from rodshell.solve.equilibrium import SolveReport, Status
-from rodshell.solve.path import followed
+from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem, Supports
 from rodshell.validation import array, direction, finite, flag, instance, mapping, number, short, texts, vector, whole
-
-SPIN = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RodSupports:
     """Where a rod is held. Clamps that are not named stay as they are.
 
-    Parameters
-    ----------
-    positions : node -> where it is held (3,) [m], or None: where it is. Nodes may count from the end (-1).
-    along : node -> orthonormal directions along which alone it is free.
-    tangents : clamped end -> tangent (3,) along the rod there.
-    directors : clamped end -> first material director m1 (3,) there; its part across the tangent is used.
-    turns : clamped end -> how far it is turned about its tangent in all [rad], more than once around if so given: from
-        the director, if one is given, or from where it has no twist angle, as it was built; the same again turns no
-        further.
-    spinning : clamped ends that hold position and direction but let the rod spin.
-    angles : edge -> twist angle that it is held at [rad].
+    Args:
+        positions: node -> where it is held (3,) [m], or None: where it is. Nodes may count from the end (-1).
+        along: node -> orthonormal directions along which alone it is free.
+        tangents: clamped end -> tangent (3,) along the rod there.
+        directors: clamped end -> first material director m1 (3,) there; its part across the tangent is used.
+        turns: clamped end -> how far it is turned about its tangent in all [rad], more than once around if so given:
+            from the director, if one is given, or from where it has no twist angle, as it was built; the same again
+            turns no further.
+        spinning: clamped ends that hold position and direction but let the rod spin.
+        angles: edge -> twist angle that it is held at [rad].
     """
 
     positions: Mapping[int, ArrayLike | None] = field(default_factory=dict)
@@ -72,12 +69,11 @@ class RodSupports:
 class RodLoads:
     """Dead loads on a rod.
 
-    Parameters
-    ----------
-    forces : node -> force (3,) [N]; or (n, 3), one for each node.
-    moments : edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
-        the twist angle, counted from frames transported from the last step's shape.
-    gravity : acceleration (3,) [m/s2].
+    Args:
+        forces: node -> force (3,) [N]; or (n, 3), one for each node.
+        moments: edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
+            the twist angle, counted from frames transported from the last step's shape.
+        gravity: acceleration (3,) [m/s2].
     """
 
     forces: Mapping[int, ArrayLike] | ArrayLike = field(default_factory=dict)
@@ -100,13 +96,11 @@ class RodLoads:
     def on(self, rod: ElasticRod, spinning: Sequence[End]) -> Floats:
         """(N, 3) load on each block [N, at angles N m].
 
-        Parameters
-        ----------
-        spinning : clamped ends that are free to spin.
+        Args:
+            spinning: clamped ends that are free to spin.
 
-        Raises
-        ------
-        InputError : a load that this rod cannot carry.
+        Raises:
+            InputError: a load that this rod cannot carry.
         """
         load = np.zeros((rod.block_count, 3)) if self.gravity is None else rod.weight(self.gravity)
         if isinstance(self.forces, Mapping):
@@ -140,13 +134,7 @@ class SupportPath:
 
     @staticmethod
     def of(rod: ElasticRod, state: Floats, wanted: RodSupports) -> "SupportPath":
-        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad] at the start.
-        wanted : the supports at the end.
-        """
+        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted."""
         wanted.require(rod)
         goals = dict[int, Floats]()
         for k, node in enumerate(rod.clamped_nodes):
@@ -168,7 +156,7 @@ class SupportPath:
             block = index_of(node, rod.node_count, "node")
             free = free.with_directions(np.array([block]), *_orthonormal(node, directions))
         spins = [int(rod.ghost_angles[rod.clamps.index(end)]) for end in wanted.spinning]
-        free = free.with_directions(np.array(spins, dtype=np.intp), SPIN).with_directions(moved)
+        free = free.with_directions(np.array(spins, dtype=np.intp), ANGLE).with_directions(moved)
         last = np.array([goals[block] for block in goals]).reshape(-1, 3)
         return SupportPath(free, moved, state[moved], last, clamps, holds_spin)
 
@@ -236,14 +224,8 @@ def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) ->
 
 
 def index_of(given: int, count: int, what: str) -> int:
-    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`.
-
-    Parameters
-    ----------
-    given : the index; a negative one counts from the end.
-    count : number of all that there are.
-    what : is counted, for messages: "node" or "edge".
-    """
+    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`, a
+    "node" or an "edge"."""
     if not isinstance(given, int | np.integer):
         raise InputError(f"a {what} is a whole number, not {short(given)}")
     if not -count <= given < count:
@@ -261,14 +243,13 @@ NEUTRAL = 1e-6  # a mode of less than this of EI/L, the rod moving by its length
 class RodShape:
     """A rod in equilibrium.
 
-    Parameters
-    ----------
-    rod : with its source frames at `state`, so that a further solve can start here.
-    state : (N, 3) blocks.
-    axial_forces : (edges,) [N].
-    load : (N, 3) what it carries [N, at angles N m].
-    reactions : (N, 3) of the supports [N, at angles N m]; zero where nothing is held.
-    report : iterations, residual, and whether the equilibrium is stable.
+    Args:
+        rod: with its source frames at `state`, so that a further solve can start here.
+        state: (N, 3) blocks.
+        axial_forces: (edges,) [N].
+        load: (N, 3) what it carries [N, at angles N m].
+        reactions: (N, 3) of the supports [N, at angles N m]; zero where nothing is held.
+        report: iterations, residual, and whether the equilibrium is stable.
     """
 
     rod: ElasticRod
@@ -325,24 +306,22 @@ def solve_rod(
 ) -> RodShape:
     """Equilibrium of a rod, followed from `start` while supports and loads go to the goals given here.
 
-    Parameters
-    ----------
-    supports, loads : where the rod is held, and what it carries; None: as its clamps are, and nothing. A rod that
-        nothing keeps from spinning about itself is held at its first edge's angle.
-    start : a state (N, 3), or a shape found before (then `rod` is shape.rod); by default the rest shape. What held
-        it is let go bit by bit, unless it is given again: the loads and supports of a shape; of a state, natural
-        strains go from what they are there to the rod's own, and forces that hold what is left fade.
-    steps : equal steps to begin with; they halve where the solver fails and grow back.
-        Where ends travel far in a step, the solver can land on another branch than the one that a rod would
-        follow, with loops or twist in it: an equilibrium, but another. Give ten steps or more then, and see whether
-        twice as many end with the same energy.
-    stable : leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path continues
-        over saddles, and the report counts the negative modes at its end.
+    Args:
+        supports, loads: where the rod is held, and what it carries; None: as its clamps are, and nothing. A rod that
+            nothing keeps from spinning about itself is held at its first edge's angle.
+        start: a state (N, 3), or a shape found before (then `rod` is shape.rod); by default the rest shape. What held
+            it is let go bit by bit, unless it is given again: the loads and supports of a shape; of a state, natural
+            strains go from what they are there to the rod's own, and forces that hold what is left fade.
+        steps: equal steps to begin with; they halve where the solver fails and grow back.
+            Where ends travel far in a step, the solver can land on another branch than the one that a rod would
+            follow, with loops or twist in it: an equilibrium, but another. Give ten steps or more then, and see whether
+            twice as many end with the same energy.
+        stable: leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path continues
+            over saddles, and the report counts the negative modes at its end.
 
-    Raises
-    ------
-    InputError : a support or a load that this rod does not have.
-    ConvergenceError : the goal was not reached, or not in a stable equilibrium; `report` holds the figures.
+    Raises:
+        InputError: a support or a load that this rod does not have.
+        ConvergenceError: the goal was not reached, or not in a stable equilibrium; `report` holds the figures.
     """
     instance("rod", rod, ElasticRod)
     whole("steps", steps, 1)
@@ -356,19 +335,21 @@ def solve_rod(
     path, load = SupportPath.of(rod, state, supports), loads.on(rod, supports.spinning)
     if path.holds_spin and load[rod.angles.start :, 0].any():
         raise InputError("nothing keeps this rod from spinning under its moments: hold an angle, or clamp an end")
-    held: tuple[Elements, ...] = ()
+    held = rod.elements
     if isinstance(start, RodShape):
         axial = start.axial_forces
     else:
         axial = rod.stretch.stiffness * rod.stretch.strains(state)
-        held = tuple(_stress_free(element, state) for element in rod.elements)
-    before = _gradient(held or rod.elements, rod, state, axial)  # this load makes the start an equilibrium
+        held = tuple(element.relaxed(state) for element in rod.elements)
+    # this load makes the start an equilibrium
+    before = Problem(held, rod.stretch, path.at(0.0), rod.length).gradient(state, axial)
 
     def problem_at(t: float) -> Problem:
-        elements, pulls = _released(held, rod.elements, t), (1 - t) * before + t * load
+        pulls = (1 - t) * before + t * load
+        elements = tuple(last.between(first, t) for first, last in zip(held, rod.elements, strict=True))
         return Problem(elements, rod.stretch, path.at(t), rod.length, load=pulls)
 
-    way = followed(
+    way = follow(
         problem_at, state, axial, first_step=1.0 / steps, slide=stable, neutral=NEUTRAL * rod.bend_energy, easy=EASY,
         most=MOST, most_of_all=None,
     )  # fmt: skip
@@ -386,7 +367,10 @@ def solve_rod(
             "to the side that it is to take; or pass stable=False to have it as it is",
             report,
         )
-    return _shape(replace(rod, elements=way.found.elements), way.found.state, way.found.forces, load, path.free, report)
+    found, solved = way.found, replace(rod, elements=tuple(filter(is_bends, way.found.elements)))
+    reactions = found.gradient - path.free.within(found.gradient)
+    residual = float(np.abs(found.gradient[rod.nodes] - reactions[rod.nodes]).max())
+    return RodShape(solved, found.state, found.forces, load, reactions, replace(report, force_residual=residual))
 
 
 def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
@@ -399,36 +383,3 @@ def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
     if state.shape != (rod.block_count, 3):
         raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
     return finite("the state to start from", state, *state.shape).copy()
-
-
-def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Freedom, report: SolveReport) -> RodShape:
-    gradient = _gradient(rod.elements, rod, state, axial) - load
-    reactions = gradient - free.expand(free.reduce(gradient))
-    residual = float(np.abs(gradient[rod.nodes] - reactions[rod.nodes]).max())
-    return RodShape(rod, state, axial, load, reactions, replace(report, force_residual=residual))
-
-
-def _stress_free(element: Elements, state: Floats) -> Elements:
-    """The element without stress at `state`, if it has natural strains to choose."""
-    return element.relaxed(state) if isinstance(element, BendTwist) else element
-
-
-def _released(held: tuple[Elements, ...], elements: tuple[Elements, ...], t: float) -> tuple[Elements, ...]:
-    """The elements, their natural strains only the share t of the way from those of `held`, if any."""
-    result = list(elements)
-    for k, first in enumerate(held):
-        last = elements[k]
-        if isinstance(first, BendTwist) and isinstance(last, BendTwist) and t < 1:
-            result[k] = replace(
-                last,
-                natural_curvature=(1 - t) * first.natural_curvature + t * last.natural_curvature,
-                natural_twist=(1 - t) * first.natural_twist + t * last.natural_twist,
-            )
-    return tuple(result)
-
-
-def _gradient(elements: tuple[Elements, ...], rod: ElasticRod, state: Floats, axial: Floats) -> Floats:
-    """(N, 3) of the energy, the edges carrying the axial forces (edges,) [N]."""
-    gradient = Potential(elements).gradient(state)
-    rod.stretch.add_axial(state, axial, gradient)
-    return gradient

@@ -32,10 +32,9 @@ PROBE = 3e-5  # motion: half the largest one of the differences in `_change_of_s
 class Parameters:
     """What p parameters change, to first order.
 
-    Parameters
-    ----------
-    by_properties : (5e, p) derivatives of the logarithms of the edges' properties, edge by edge.
-    moved : (p, N, 3) prescribed motion of held blocks [m, rad a unit of each parameter]; None: none moves.
+    Args:
+        by_properties: (5e, p) derivatives of the logarithms of the edges' properties, edge by edge.
+        moved: (p, N, 3) prescribed motion of held blocks [m, rad a unit of each parameter]; None: none moves.
     """
 
     by_properties: csc_array
@@ -51,10 +50,9 @@ class Parameters:
 class Response:
     """Derivatives of an equilibrium by p parameters.
 
-    Parameters
-    ----------
-    motions : (p, N, 3) of the state [m, rad].
-    forces : (p, e) of the edges' axial forces [N].
+    Args:
+        motions: (p, N, 3) of the state [m, rad].
+        forces: (p, e) of the edges' axial forces [N].
     """
 
     motions: Floats
@@ -64,10 +62,9 @@ class Response:
 class Sensitivity:
     """Derivatives at one equilibrium, by its tangent's factors.
 
-    Parameters
-    ----------
-    here : an equilibrium with elastic edges.
-    edges : the shell that it belongs to; its source frames at the equilibrium.
+    Args:
+        here: an equilibrium with elastic edges.
+        edges: the shell that it belongs to; its source frames at the equilibrium.
     """
 
     def __init__(self, here: Equilibrium, edges: EdgeProperties) -> None:
@@ -100,9 +97,8 @@ class Sensitivity:
     def forces_of(self, motions: Floats, parameters: Parameters) -> Floats:
         """(p, e) change of the axial forces [N].
 
-        Parameters
-        ----------
-        motions : (p, N, 3) change of the state [m, rad].
+        Args:
+            motions: (p, N, 3) change of the state [m, rad].
         """
         stretch, state = self._stretch, self.here.state
         axial = stretch.stiffness * stretch.strains(state)
@@ -116,9 +112,8 @@ class Sensitivity:
     def by_adjoint(self, by_state: Floats, parameters: Parameters) -> Floats:
         """(k, p) derivatives of k functions of the state alone: one solve for each function.
 
-        Parameters
-        ----------
-        by_state : (k, N, 3) derivatives of the functions by the state.
+        Args:
+            by_state: (k, N, 3) derivatives of the functions by the state.
         """
         adjoint = self.tangent.solve(by_state).reshape(len(by_state), -1)
         result = -np.asarray((parameters.by_properties.T @ (self.gradient_slopes.T @ adjoint.T)).T)
@@ -135,9 +130,8 @@ class Sensitivity:
     def mode_slopes(self, modes: Modes, parameters: Parameters) -> Floats:
         """(k, p) derivatives of the modes' values by the parameters; of equal values those of their mean alone count.
 
-        Parameters
-        ----------
-        modes : k modes of the tangent.
+        Args:
+            modes: k modes of the tangent.
         """
         state = self.here.state
         direct = np.array([self.edges.curvature_slopes(state, shape) for shape in modes.shapes])

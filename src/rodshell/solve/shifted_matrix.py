@@ -8,20 +8,18 @@ from rodshell.solve.sparse_ldl import Factors, SingularError
 from rodshell.solve.tangent import subspace_iteration
 
 GROWTH, MOST_SHIFTS = 8.0, 40
-LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eigenvalues may be round-off
+_LEAST_SHIFT = 1e-3  # of the first shift that is tried for several: smaller eigenvalues may be round-off
 
 
 class ShiftedMatrix:
     """The matrix of an iteration; the memory of its factors serves for all of them.
 
-    Parameters
-    ----------
-    units : (dofs,) what the motion of each unknown is measured by [m, rad].
+    Args:
+        units: (dofs,) what the motion of each unknown is measured by [m, rad].
 
-    Attributes
-    ----------
-    values : (nnz,) of the matrix as it was given last, in the order of the pattern.
-    negative_modes : of the matrix as it was given, not shifted; a mode without stiffness counts as a negative one.
+    Attributes:
+        values: (nnz,) of the matrix as it was given last, in the order of the pattern.
+        negative_modes: of the matrix as it was given, not shifted; a mode without stiffness counts as a negative one.
     """
 
     def __init__(self, pattern: Pattern, units: Floats) -> None:
@@ -35,13 +33,11 @@ class ShiftedMatrix:
     def factorise(self, values: Floats) -> bool:
         """Factorise another matrix; whether that can be done.
 
-        Parameters
-        ----------
-        values : (nnz,) in the order of the pattern.
+        Args:
+            values: (nnz,) in the order of the pattern.
 
-        Raises
-        ------
-        SingularError : some are not finite.
+        Raises:
+            SingularError: some are not finite.
         """
         self.values = values
         try:
@@ -68,7 +64,7 @@ class ShiftedMatrix:
         """
         shift, tries = max(softest, self._shift / GROWTH), 0
         negative = self._factor_shifted(shift)
-        while down and not negative and shift > LEAST_SHIFT * softest:
+        while down and not negative and shift > _LEAST_SHIFT * softest:
             shift /= GROWTH
             negative = self._factor_shifted(shift)
         while negative and tries < MOST_SHIFTS:

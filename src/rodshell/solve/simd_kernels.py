@@ -44,10 +44,9 @@ def subtracting(rows: int, registers: int) -> Kernel:
 
     Arguments: C, its stride, A, its stride, B, its stride, depth, and keep, which is 0 or 1.
 
-    Parameters
-    ----------
-    rows : of C, the columns of A.
-    registers : number of registers, of `LANES` numbers each, that a row of B and C takes.
+    Args:
+        rows: of C, the columns of A.
+        registers: number of registers, of `LANES` numbers each, that a row of B and C takes.
     """
 
     def emit(code: _Code, c, stride_c, a, stride_a, b, stride_b, depth, keep) -> None:  # type: ignore[no-untyped-def]

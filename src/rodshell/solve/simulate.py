@@ -53,11 +53,10 @@ _SENTENCES = {
 class MotionReport:
     """Figures of a motion.
 
-    Parameters
-    ----------
-    steps, refused_steps : taken, and tried in vain.
-    smallest_step : of those taken [s].
-    reason : why the last refused step was refused, or "".
+    Args:
+        steps, refused_steps: taken, and tried in vain.
+        smallest_step: of those taken [s].
+        reason: why the last refused step was refused, or "".
     """
 
     end: End
@@ -74,9 +73,8 @@ class MotionReport:
 class Sample:
     """A time of a motion; its `motion` has its source frames there, so that it can be continued.
 
-    Parameters
-    ----------
-    time : [s]; state, velocity : (N, 3); energies : elastic and kinetic [J].
+    Args:
+        time: [s]; state, velocity : (N, 3); energies : elastic and kinetic [J].
     """
 
     time: float
@@ -93,10 +91,9 @@ class Sample:
 class TimeSeries:
     """A motion at k times.
 
-    Parameters
-    ----------
-    times : (k,) [s]; states, velocities : (k, N, 3); energies : (k, 2) elastic and kinetic [J].
-    last : the end reached, recorded or not; None for a series that was loaded.
+    Args:
+        times: (k,) [s]; states, velocities : (k, N, 3); energies : (k, 2) elastic and kinetic [J].
+        last: the end reached, recorded or not; None for a series that was loaded.
     """
 
     times: Floats
@@ -164,19 +161,10 @@ def _written(times: Floats) -> int:
 
 
 class Stepper(Protocol):
-    """Takes single steps."""
+    """Takes single steps, as `ImplicitEuler` does."""
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
-        """One step, or why it was refused.
-
-        Parameters
-        ----------
-        motion : its source frames being at the state.
-        state : (N, 3) at the start [m, at twist angles rad].
-        velocity : (N, 3) at the start [m/s, rad/s].
-        time : of the start [s].
-        step : its length [s].
-        """
+        """One step, or why it was refused; parameters as of `ImplicitEuler.take`."""
         ...
 
 
@@ -201,27 +189,25 @@ def simulate(
     Implicit Euler is of first order and damps: an oscillation of angular frequency w loses about a share w h / 2 of
     its amplitude per radian. Choose the step by the fastest motion that matters.
 
-    Parameters
-    ----------
-    until, start : times at which the motion ends and starts [s].
-    step : longest step [s]; the longest that divides the time evenly and is not longer is taken. A step that
-        fails is taken in halves, these again in halves, and so on; steps grow back where that goes easily, and
-        always meet the even grid again.
-    every : record each so many steps of the grid; the start is always recorded.
-    halvings : how often a step may be halved.
-    stream : folder for the record, instead of memory; read it with `TimeSeries.load`. No file is replaced there.
-    progress : called with every sample that is recorded.
-    stepper : takes the steps; None: `ImplicitEuler()`.
-    stop : called with the sample at every time of the grid; the motion ends where it returns True.
-    interruptible : whether a KeyboardInterrupt ends the motion and what was finished is returned, `report.end` saying
-        so; else it is raised, as everywhere.
+    Args:
+        until, start: times at which the motion ends and starts [s].
+        step: longest step [s]; the longest that divides the time evenly and is not longer is taken. A step that
+            fails is taken in halves, these again in halves, and so on; steps grow back where that goes easily, and
+            always meet the even grid again.
+        every: record each so many steps of the grid; the start is always recorded.
+        halvings: how often a step may be halved.
+        stream: folder for the record, instead of memory; read it with `TimeSeries.load`. No file is replaced there.
+        progress: called with every sample that is recorded.
+        stepper: takes the steps; None: `ImplicitEuler()`.
+        stop: called with the sample at every time of the grid; the motion ends where it returns True.
+        interruptible: whether a KeyboardInterrupt ends the motion and what was finished is returned, `report.end`
+            saying so; else it is raised, as everywhere.
 
-    Raises
-    ------
-    ConvergenceError : a step fails at its smallest; the record up to there is the error's `report`.
-    StabilityError : the step is beyond the limit of the motion's explicit ties.
-    OutputError : `stream` cannot be written, or holds a record.
-    InputError : a value that is not finite comes in, from the caller or from a force.
+    Raises:
+        ConvergenceError: a step fails at its smallest; the record up to there is the error's `report`.
+        StabilityError: the step is beyond the limit of the motion's explicit ties.
+        OutputError: `stream` cannot be written, or holds a record.
+        InputError: a value that is not finite comes in, from the caller or from a force.
     """
     instance("motion", motion, Motion)
     state = _of_motion("the state", state, motion)

@@ -10,9 +10,8 @@ eliminated, what remains is the update matrix for its parent (Duff and Reid 1983
 none, by minimum degree; the symbolic phase once per pattern (`symbolic`).
 """
 
-from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -26,10 +25,8 @@ from rodshell.solve.dense import (
     PAD,
     add_rows,
     backward,
-    backward_rows,
     eliminate,
     forward,
-    forward_rows,
     padded,
     room,
     subtract_product,
@@ -39,55 +36,14 @@ from rodshell.solve.simd_kernels import ROWS, matrix_view
 from rodshell.solve.symbolic import Plan, blocks_of, coupled, plan_of
 from rodshell.threads import in_threads, threads
 
-ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
+_ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
 SURELY = 1e-14  # and after this small a one, no other is looked at
-
-
-NONE_ABOVE = np.empty(0, dtype=np.int64)
+_NONE_ABOVE = np.empty(0, dtype=np.int64)
+_GIVEN_AWAY = "the memory of these factors was given to another factorisation"
 
 
 class SingularError(ArithmeticError):
     """A pivot of the factorisation is zero: nothing holds some motion."""
-
-
-class Factors(Protocol):
-    """The factors of one matrix. They never change, unless their memory is given to another factorisation."""
-
-    @property
-    def negative(self) -> int:
-        """Number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia)."""
-        ...
-
-    def solve(self, right: Floats) -> Floats:
-        """Solution for a right-hand side (n,), or for each of many (k, n), with one step of iterative refinement where
-        it is not accurate.
-
-        Accuracy is a matter of the factors more than of the right-hand side: after an accurate solution no other is
-        looked at.
-        """
-        ...
-
-
-class LinearSolver(Protocol):
-    """Factorises matrices of one pattern, upper triangle in compressed columns."""
-
-    def factor(self, data: Floats, *, reuse: Factors | None = None) -> Factors:
-        """The factors of the matrix with the values `data`, which they keep: it must not be changed afterwards.
-
-        Parameters
-        ----------
-        data : (nnz,) values of the upper triangle, in the order of the pattern.
-        reuse : factors by the same solver that are not needed any more: the new ones take over their memory, and
-            solving with the old ones is an error from then on.
-
-        Raises
-        ------
-        SingularError : a pivot vanishes or is not finite.
-        """
-        ...
-
-
-GIVEN_AWAY = "the memory of these factors was given to another factorisation"
 
 
 class _Scratch(NamedTuple):
@@ -99,14 +55,13 @@ class _Scratch(NamedTuple):
 
 
 class Multifrontal:
-    """Multifrontal LDL^T of matrices of one pattern.
+    """Multifrontal LDL^T of matrices of one pattern, upper triangle in compressed columns.
 
-    Parameters
-    ----------
-    indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
-    coordinates : (n, d) where each unknown lies, or (b, d) where each of the `blocks` does, for nested dissection; None
-        orders by minimum degree.
-    blocks : of unknowns that lie at one place; None: they are looked for.
+    Args:
+        indptr, indices: the pattern, every diagonal present.
+        coordinates: (n, d) where each unknown lies, or (b, d) where each of the `blocks` does, for nested dissection;
+            None orders by minimum degree.
+        blocks: of unknowns that lie at one place; None: they are looked for.
     """
 
     def __init__(
@@ -132,8 +87,18 @@ class Multifrontal:
         """Stored values of the factor, with the padding of its rows."""
         return int(self.plan.panel_start[-1])
 
-    def factor(self, data: Floats, *, reuse: Factors | None = None) -> "MultifrontalFactors":
-        memory = reuse.given_away() if isinstance(reuse, MultifrontalFactors) else None
+    def factor(self, data: Floats, *, reuse: "Factors | None" = None) -> "Factors":
+        """The factors of the matrix with the values `data`, which they keep: it must not be changed afterwards.
+
+        Args:
+            data: (nnz,) values of the upper triangle, in the order of the pattern.
+            reuse: factors by this solver that are not needed any more: the new ones take over their memory, and solving
+                with the old ones is an error from then on.
+
+        Raises:
+            SingularError: a pivot vanishes or is not finite.
+        """
+        memory = None if reuse is None else reuse.given_away()
         data = np.ascontiguousarray(data, dtype=np.float64)
         panels, pivots = memory or (room(self.fill), np.empty(len(self.indptr) - 1))
         scratch = self.take_scratch()
@@ -141,7 +106,13 @@ class Multifrontal:
         self.give_back(scratch)
         if not regular:
             raise SingularError("a pivot of the factorisation vanishes")
-        return MultifrontalFactors(self, data, panels, pivots)
+        return Factors(self, data, panels, pivots)
+
+    def product(self, data: Floats, x: Floats) -> Floats:
+        """(n,) product A x of the symmetric matrix whose upper triangle has the values `data` (nnz,)."""
+        data = np.require(data, requirements="W")  # that of a tangent cannot be written to, see there
+        residual, *_ = _residual(self.indptr, self.indices, data, np.ascontiguousarray(x), np.zeros(len(x)))
+        return np.asarray(-residual)
 
     @cached_property
     def above(self) -> tuple[Longs, Longs]:
@@ -170,8 +141,12 @@ class Multifrontal:
         self._spare.append(scratch)
 
 
-class MultifrontalFactors:
-    """Factors by `Multifrontal` (see `Factors`)."""
+class Factors:
+    """The factors of one matrix. They never change, unless their memory is given to another factorisation.
+
+    Attributes:
+        negative: number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia).
+    """
 
     def __init__(self, solver: Multifrontal, data: Floats, panels: Floats, pivots: Floats) -> None:
         self._solver, self._data = solver, data
@@ -185,12 +160,18 @@ class MultifrontalFactors:
         return memory
 
     def solve(self, right: Floats) -> Floats:
+        """Solution for a right-hand side (n,), or for each of many (k, n), with one step of iterative refinement where
+        it is not accurate.
+
+        Accuracy is a matter of the factors more than of the right-hand side: after an accurate solution no other is
+        looked at.
+        """
         right = np.ascontiguousarray(right, dtype=np.float64)
         x = self._substitute(right)
         rows = () if self._surely else zip(x.reshape(-1, x.shape[-1]), right.reshape(-1, x.shape[-1]), strict=True)
         for solution, given in rows:
             residual, left, size = _residual(self._solver.indptr, self._solver.indices, self._data, solution, given)
-            if left > ACCURATE * size:
+            if left > _ACCURATE * size:
                 solution += self._substitute(residual)
             self._surely = 0.0 < left <= SURELY * size
             if self._surely:
@@ -199,66 +180,38 @@ class MultifrontalFactors:
 
     def _substitute(self, right: Floats) -> Floats:
         """Solutions for a right-hand side (n,) or for many (k, n), `ROWS` of which share the reading of the factors."""
-        if right.ndim == 1:
-            return self._solved(right, _forward, _backward)
-        result, together = np.empty_like(right), len(right) // ROWS * ROWS
-        for k in range(0, together, ROWS):
-            result[k : k + ROWS] = self._solved(right[k : k + ROWS].T, _forward_rows, _backward_rows).T
-        for k in range(together, len(right)):
-            result[k] = self._solved(right[k], _forward, _backward)
-        return result
+        rows = right.reshape(-1, right.shape[-1])
+        result = np.empty_like(rows)
+        for k in range(0, len(rows), ROWS):
+            result[k : k + ROWS] = self._solved(rows[k : k + ROWS])
+        return result.reshape(right.shape)
 
-    def _solved(self, right: Floats, upwards: Callable[..., None], downwards: Callable[..., None]) -> Floats:
-        """(n,) or (n, ROWS), by the kernels for it."""
-        assert self._memory is not None, GIVEN_AWAY
+    def _solved(self, right: Floats) -> Floats:
+        """(m, n) of at most `ROWS` right-hand sides."""
+        assert self._memory is not None, _GIVEN_AWAY
         solver, plan, (panels, pivots) = self._solver, self._solver.plan, self._memory
-        x, parts, scratch = right.take(plan.order, axis=0), solver.parts, solver.take_scratch()
+        x, parts, scratch = right.take(plan.order, axis=1), solver.parts, solver.take_scratch()
         fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
         memory, (above, place) = scratch.fronts, solver.above
         # each part's own, so that the sum does not depend on the threads
-        sums = np.zeros((last, len(above), *x.shape[1:]))
+        sums = np.zeros((last, len(x), len(above)))
 
         def rise(part: int, thread: int) -> None:
-            upwards(parts[part], x, place, sums[part], *fronts, *memory[thread])
+            _forward(parts[part], x, place, sums[part], *fronts, *memory[thread])
 
         def descend(part: int, thread: int) -> None:
-            downwards(parts[part], x, *fronts, pivots, *memory[thread])
+            _backward(parts[part], x, *fronts, pivots, *memory[thread])
 
         if last:
             in_threads(rise, last, most=len(memory))
-            x[above] += sums.sum(axis=0)
-        upwards(parts[last], x, NONE_ABOVE, np.empty((0, *x.shape[1:])), *fronts, *memory[0])
+            x[:, above] += sums.sum(axis=0)
+        _forward(parts[last], x, _NONE_ABOVE, np.empty((len(x), 0)), *fronts, *memory[0])
         descend(last, 0)
         in_threads(descend, last, most=len(memory))
         solver.give_back(scratch)
         result = np.empty_like(x)
-        result[plan.order] = x
+        result[:, plan.order] = x
         return result
-
-
-def upper_triangle(indptr: Longs, indices: Longs, data: Floats) -> "csc_matrix":
-    """The upper triangle of a matrix, in SciPy's form.
-
-    Parameters
-    ----------
-    indptr, indices : the pattern, upper triangle in compressed columns.
-    data : (nnz,) its values.
-    """
-    return csc_matrix((data, indices, indptr), shape=(len(indptr) - 1, len(indptr) - 1))
-
-
-def product(indptr: Longs, indices: Longs, data: Floats, x: Floats) -> Floats:
-    """(n,) product A x of a symmetric matrix that is given by its upper triangle.
-
-    Parameters
-    ----------
-    indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
-    data : (nnz,) its values.
-    x : (n,) vector.
-    """
-    data = np.require(data, requirements="W")  # that of a tangent cannot be written to, see there
-    residual, *_ = _residual(indptr, indices, data, np.ascontiguousarray(x), np.zeros(len(x)))
-    return np.asarray(-residual)
 
 
 def _eliminate_all(
@@ -298,11 +251,11 @@ def _minimum_degree(indptr: Longs, indices: Longs) -> Longs:
     size = len(indptr) - 1
     data = np.full(len(indices), 1e-3 / max(1, size))
     data[indptr[1:] - 1] = 0.5
-    upper = upper_triangle(indptr, indices, data)
+    upper = csc_matrix((data, indices, indptr), shape=(size, size))
     return np.argsort(splu(upper + upper.T, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0).perm_c).astype(np.int64)
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("i1 f1 i1 i1 i1 i1 i1 i2 i1 i1 i1 i1 i1 f1 f1 f1 f1 f1", nogil=True)
 def _numeric(  # type: ignore[no-untyped-def]
     part, data, first, row_start, child_start, children, run_start, runs, entry_start, entry_source, entry_place,
     panel_start, update_start, stacks, unscaled, work, panels, pivots,
@@ -340,7 +293,7 @@ def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyp
     return matrix_view(stacks, update_start[s], size, padded(size))
 
 
-@njit(error_model="numpy")
+@njit("i1 i1 f1 f1 f1")
 def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     """right - A x of a matrix stored by its upper triangle; its largest entry, and that of |D x|, D being its
     diagonal."""
@@ -359,100 +312,67 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     return residual, left, size
 
 
-@njit(error_model="numpy", nogil=True)
+@njit("i1 f2 i1 f2 i1 i1 i1 i1 f1 f1 f1", nogil=True)
 def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
-    """Forward substitution in place, supernode by supernode of a `part`. What goes to unknowns outside of the part is
-    added to `sums` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
-    for s in part:
-        begin, at = first[s], row_start[s]
-        size, width = row_start[s + 1] - at, first[s + 1] - begin
-        panel = matrix_view(panels, panel_start[s], width, padded(size))
-        values = local[: padded(size)]
-        for i in range(width):
-            values[i] = x[begin + i]
-        for i in range(width, len(values)):
-            values[i] = 0.0
-        forward(panel, values, aside)
-        for i in range(width):
-            x[begin + i] = values[i]
-        for i in range(width, size):
-            row = rows[at + i]
-            if len(above) > 0 and above[row] >= 0:
-                sums[above[row]] += values[i]
-            else:
-                x[row] += values[i]
-
-
-@njit(error_model="numpy", nogil=True)
-def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
-    """Backward substitution in place, supernode by supernode of a `part`."""
-    for k in range(len(part) - 1, -1, -1):
-        s = part[k]
-        begin, at = first[s], row_start[s]
-        size, width = row_start[s + 1] - at, first[s + 1] - begin
-        panel = matrix_view(panels, panel_start[s], width, padded(size))
-        values = local[: padded(size)]
-        for i in range(size):
-            values[i] = x[rows[at + i]]
-        for i in range(size, len(values)):
-            values[i] = 0.0
-        backward(panel, pivots[begin : begin + width], values, aside)
-        for i in range(width):
-            x[begin + i] = values[i]
-
-
-@njit(error_model="numpy", nogil=True)
-def _forward_rows(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
-    """`_forward` for each column of `x` (n, ROWS), `sums` being (m, ROWS)."""
+    """Forward substitution in place, supernode by supernode of a `part`, for each row of `x` (m, n). What goes to
+    unknowns outside of the part is added to `sums` (m, l), at the place that `above` (n,) gives them; it is -1 within
+    the part, or empty."""
+    count = len(x)
     for s in part:
         begin, at = first[s], row_start[s]
         size, width = row_start[s + 1] - at, first[s + 1] - begin
         stride = padded(size)
-        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, ROWS, stride)
-        for i in range(width):
-            for r in range(ROWS):
-                values[r, i] = x[begin + i, r]
-        for r in range(ROWS):
+        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, count, stride)
+        for r in range(count):
+            right, whole = values[r], x[r]
+            for i in range(width):
+                right[i] = whole[begin + i]
             for i in range(width, stride):
-                values[r, i] = 0.0
-        forward_rows(panel, values, aside)
-        for i in range(width):
-            for r in range(ROWS):
-                x[begin + i, r] = values[r, i]
-        for i in range(width, size):
-            row = rows[at + i]
-            if len(above) > 0 and above[row] >= 0:
-                for r in range(ROWS):
-                    sums[above[row], r] += values[r, i]
-            else:
-                for r in range(ROWS):
-                    x[row, r] += values[r, i]
+                right[i] = 0.0
+        if count == 1:
+            forward(panel, values, 1, aside)
+        else:
+            forward(panel, values, count, aside)
+        for r in range(count):
+            right, whole = values[r], x[r]
+            for i in range(width):
+                whole[begin + i] = right[i]
+            for i in range(width, size):
+                row = rows[at + i]
+                if len(above) > 0 and above[row] >= 0:
+                    sums[r, above[row]] += right[i]
+                else:
+                    whole[row] += right[i]
 
 
-@njit(error_model="numpy", nogil=True)
-def _backward_rows(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
-    """`_backward` for each column of `x` (n, ROWS)."""
+@njit("i1 f2 i1 i1 i1 i1 f1 f1 f1 f1", nogil=True)
+def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
+    """Backward substitution in place, supernode by supernode of a `part`, for each row of `x` (m, n)."""
+    count = len(x)
     for k in range(len(part) - 1, -1, -1):
         s = part[k]
         begin, at = first[s], row_start[s]
         size, width = row_start[s + 1] - at, first[s + 1] - begin
         stride = padded(size)
-        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, ROWS, stride)
-        for i in range(size):
-            row = rows[at + i]
-            for r in range(ROWS):
-                values[r, i] = x[row, r]
-        for r in range(ROWS):
+        panel, values = matrix_view(panels, panel_start[s], width, stride), matrix_view(local, 0, count, stride)
+        for r in range(count):
+            right, whole = values[r], x[r]
+            for i in range(size):
+                right[i] = whole[rows[at + i]]
             for i in range(size, stride):
-                values[r, i] = 0.0
-        backward_rows(panel, pivots[begin : begin + width], values, aside)
-        for i in range(width):
-            for r in range(ROWS):
-                x[begin + i, r] = values[r, i]
+                right[i] = 0.0
+        if count == 1:
+            backward(panel, pivots[begin : begin + width], values, 1, aside)
+        else:
+            backward(panel, pivots[begin : begin + width], values, count, aside)
+        for r in range(count):
+            right, whole = values[r], x[r]
+            for i in range(width):
+                whole[begin + i] = right[i]
 
 
-LEAF = 12  # blocks that are not divided further
-UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
+_LEAF = 12  # blocks that are not divided further
+_UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
 NEAREST = 4  # blocks to which one within a span is coupled, two on each side
 SHORT = 3  # blocks within a span that are not worth to be taken together
 
@@ -463,14 +383,12 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     The inner nodes of a span come before all others: what is cut is a graph of joints and a single node of each span,
     coupled as they are after that elimination.
 
-    Parameters
-    ----------
-    coordinates : (n, d) where each block lies; any in which neighbours are near are suitable.
-    start, neighbours : the blocks coupled to block i are neighbours[start[i] : start[i + 1]].
+    Args:
+        coordinates: (n, d) where each block lies; any in which neighbours are near are suitable.
+        start, neighbours: the blocks coupled to block i are neighbours[start[i] : start[i + 1]].
 
-    Returns
-    -------
-    (n,) blocks in the order of their elimination.
+    Returns:
+        (n,) blocks in the order of their elimination.
     """
     inner, kept, start, neighbours = _without_spans(start, neighbours)
     points = np.ascontiguousarray(coordinates[kept], dtype=np.float64)
@@ -479,7 +397,7 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     return np.concatenate([inner, kept[along[0]]])
 
 
-@njit()
+@njit("i1 i1")
 def _without_spans(start, neighbours):  # type: ignore[no-untyped-def]
     """Blocks within spans, without the first of each, so that those of two spans are not coupled; all others; and the
     graph of these after the elimination of the first. Blocks within a span follow one after the other."""
@@ -530,7 +448,7 @@ def _without_spans(start, neighbours):  # type: ignore[no-untyped-def]
     return inner[: n - count].copy(), kept[:count].copy(), graph_start, graph[:used].copy()
 
 
-@njit()
+@njit("f2 i2 i1 i1")
 def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-def]
     """Segments of the rows of `along` (d, n), blocks sorted by each coordinate, are divided in place until they are
     small, and stay sorted; `segment` is the segment of each block."""
@@ -544,7 +462,7 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
     while height > 0:
         height -= 1
         begin, end = begins[height], ends[height]
-        if end - begin <= LEAF:
+        if end - begin <= _LEAF:
             continue
         here, longest = segment[along[0, begin]], _longest(coordinates, along, begin, end)
         for k in range(begin, end):
@@ -610,7 +528,7 @@ def _best_cut(blocks, segment, here, rank, start, neighbours, first, last, touch
         touching[0, high] -= 1
         touching[1, low] += 1  # behind the cut
         touching[1, k] -= 1
-    margin = max(1, int(UNBALANCED * n))
+    margin = max(1, int(_UNBALANCED * n))
     best, least, joining, before, behind = margin - 1, np.inf, 0, 0, 0
     for k in range(n - margin):
         before += touching[0, k]

@@ -76,36 +76,19 @@ class Blocks(NamedTuple):
 
 def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> BlockRows:
     """The blocks of a pattern (upper triangle, compressed columns); single unknowns, where some unknown of a block is
-    not coupled as the others are.
-
-    Parameters
-    ----------
-    indptr, indices : the pattern of the upper triangle, in compressed columns.
-    begin : (b + 1,) first unknown of each block, and the number of unknowns.
-    """
+    not coupled as the others are; `begin` (b + 1,) holds the first unknown of each, and the number of unknowns."""
     whole, start, rows = _block_rows(indptr, indices, begin)
     return BlockRows(begin, start, rows) if whole else blocks_of(indptr, indices, np.arange(begin[-1] + 1))
 
 
 def coupled(indptr: Longs, blocks: BlockRows) -> Blocks:
-    """The graph of blocks.
-
-    Parameters
-    ----------
-    indptr : where columns begin in the pattern of the upper triangle.
-    blocks : see `BlockRows`.
-    """
+    """The graph of blocks; `indptr` says where columns begin in the pattern of the upper triangle."""
     return Blocks(blocks.begin, *_coupled(indptr, *blocks))
 
 
 def plan_of(indptr: Longs, blocks: Blocks, order: Longs) -> Plan:
-    """Of a pattern whose `blocks` are eliminated in `order` (b,), except what the tree leaves open.
-
-    Parameters
-    ----------
-    indptr : where columns begin in the pattern of the upper triangle.
-    order : (b,) blocks in the order of elimination.
-    """
+    """Of a pattern whose `blocks` are eliminated in `order` (b,), except what the tree leaves open; parameters as of
+    `coupled`."""
     order, tree, weight, count, *earlier = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
     first = _supernodes(tree, count, weight)
     up, child_start, children = _children(tree, first)
@@ -122,7 +105,7 @@ def start_after(count, start):  # type: ignore[no-untyped-def]
         start[k + 1] = start[k] + count[k]
 
 
-@njit()
+@njit("i1 i1 i1")
 def _block_rows(indptr, indices, begin):  # type: ignore[no-untyped-def]
     """Whether these are blocks that are coupled as wholes; and their `BlockRows`."""
     n, used, other = len(begin) - 1, 0, 0  # entries that are not where those of blocks are
@@ -149,7 +132,7 @@ def _block_rows(indptr, indices, begin):  # type: ignore[no-untyped-def]
     return other == 0, start, rows[:used].copy()
 
 
-@njit()
+@njit("i1 i1 i1 i1")
 def _coupled(indptr, begin, row_start, rows):  # type: ignore[no-untyped-def]
     """The other blocks to which each block of unknowns is coupled, and more: see `Blocks`."""
     n = len(begin) - 1
@@ -175,7 +158,7 @@ def _coupled(indptr, begin, row_start, rows):  # type: ignore[no-untyped-def]
     return start, neighbours, source, above
 
 
-@njit()
+@njit("i1 i1 i1 i1")
 def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
     """Blocks in a postorder of their elimination tree; for each, its parent, unknowns, and rows of its columns; and the
     earlier ones to which block k is coupled, earlier[first[k] : first[k + 1]]."""
@@ -275,7 +258,7 @@ def _postorder(parent):  # type: ignore[no-untyped-def]
     return post
 
 
-@njit()
+@njit("i1 i1 i1")
 def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
     """First block of each supernode: blocks of one structure, and small ones merged for a few zeros more."""
     n = len(parent)
@@ -310,7 +293,7 @@ def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
     return first[: kept + 1]
 
 
-@njit()
+@njit("i1 i1")
 def _children(parent, first):  # type: ignore[no-untyped-def]
     """Parent of each supernode, -1 for roots; and the children of each, ascending."""
     supers = len(first) - 1
@@ -335,7 +318,7 @@ def _children(parent, first):  # type: ignore[no-untyped-def]
     return up, start, children
 
 
-@njit()
+@njit("i1 i1 i1 i1")
 def _fronts(first, start, earlier, up):  # type: ignore[no-untyped-def]
     """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]].
 
@@ -371,7 +354,7 @@ def _fronts(first, start, earlier, up):  # type: ignore[no-untyped-def]
     return row_start, rows
 
 
-@njit()
+@njit("i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1")
 def _maps(  # type: ignore[no-untyped-def]
     indptr, begin, start, neighbours, source, above, order, weight, first, up, row_start, rows, child_start, children
 ):
@@ -452,11 +435,9 @@ WORTHWHILE = 1e8  # multiplications from which on work is shared
 def parts_of(up, width, below):  # type: ignore[no-untyped-def]
     """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them.
 
-    Parameters
-    ----------
-    up : (n_s,) parent of each supernode, negative for a root; children come before their parents.
-    width : (n_s,) number of pivots of each supernode.
-    below : (n_s,) number of rows of each update matrix.
+    Args:
+        up, width, below: (n_s,) parent of each supernode, negative for a root; numbers of its pivots and of the rows of
+            its update matrix.
     """
     supers = len(up)
     lowest, work, total = np.empty(supers, dtype=np.int64), np.empty(supers), 0.0
@@ -490,17 +471,11 @@ def parts_of(up, width, below):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def stacks_of(up, below, child_start, children, part_start, parts):  # type: ignore[no-untyped-def]
-    """Where update matrices (rows `below`) lie, and room for all.
+    """Where update matrices lie, and room for all; arguments as of `parts_of` and `Plan`.
 
     Each part has two stacks, for even and for odd depths of the tree: what a supernode reads, its children's, and what
     it writes are then never on the same stack, and the children's lie on top of theirs. The last that a part writes
     stays there for the part that needs all; in that one every matrix stays, since threads share its supernodes.
-
-    Parameters
-    ----------
-    up : (n_s,) parent of each supernode, negative for a root.
-    below : (n_s,) number of rows of each update matrix.
-    child_start, children, part_start, parts : see `Plan`.
     """
     supers = len(up)
     odd, part = np.zeros(supers, dtype=np.int64), np.zeros(supers, dtype=np.int64)

@@ -6,18 +6,18 @@ axial stiffness EA and the geometric stiffness of the axial forces at hand; a su
 curvature times its contact forces. Where edges are inextensible, their stiffness is a penalty, and so it is in K.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, State
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.model.potential import product, room_for
-from rodshell.rods.elements import NO_HESSIANS, Elements, Stressed, Stretch, evaluate_all
+from rodshell.rods.elements import evaluate_all, is_stressed
 from rodshell.solve.problem import NO_CURVATURE, Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
@@ -34,10 +34,9 @@ class Modes:
 
     W is the lumped mass [kg], s then a squared angular frequency [1/s2]; or the identity, and s a stiffness [N/m].
 
-    Parameters
-    ----------
-    settled : whether the values did; if not, they are too large, and the shapes span no more than a space that is rich
-        in the lowest modes.
+    Args:
+        settled: whether the values did; if not, they are too large, and the shapes span no more than a space that is
+            rich in the lowest modes.
     """
 
     values: Floats
@@ -49,14 +48,13 @@ class Modes:
 class Tangent:
     """The tangent stiffness K at a state, factorised. It never changes: nothing that another solve does reaches it.
 
-    Parameters
-    ----------
-    state : (N, 3) [m, at twist angles rad].
-    forces : (e,) axial forces of the edges [N].
-    freedom : the free directions at the state.
-    values : (nnz,) upper triangle of K in the free directions, in the order of the pattern.
-    pattern : what belongs to the pattern alone, shared with other solves.
-    factors : the factors of K, its own.
+    Args:
+        state: (N, 3) [m, at twist angles rad].
+        forces: (e,) axial forces of the edges [N].
+        freedom: the free directions at the state.
+        values: (nnz,) upper triangle of K in the free directions, in the order of the pattern.
+        pattern: what belongs to the pattern alone, shared with other solves.
+        factors: the factors of K, its own.
     """
 
     state: Floats
@@ -72,27 +70,23 @@ class Tangent:
         return self.factors.negative
 
     def solve(self, loads: Floats) -> Floats:
-        """Displacements K^-1 f in the free directions; zero across them.
+        """Displacements K^-1 f [m, rad] in the free directions; zero across them.
 
-        Parameters
-        ----------
-        loads : (N, 3) forces [N, at twist angles N m], or (k, N, 3) of k cases.
-
-        Returns
-        -------
-        Displacements of the same shape [m, rad].
+        Args:
+            loads: (N, 3) forces [N, at twist angles N m], or (k, N, 3) of k cases.
         """
         return self._of_fields("loads", loads, self.factors.solve)
 
     def product(self, motions: Floats) -> Floats:
         """Forces K x in the free directions; zero across them.
 
-        Parameters
-        ----------
-        motions : (N, 3) displacements [m, rad], or (k, N, 3) of k cases; their part in the free directions counts.
+        Args:
+            motions: (N, 3) displacements [m, rad], or (k, N, 3) of k cases; their part in the free directions counts.
         """
         return self._of_fields(
-            "displacements", motions, lambda rows: np.array([self.pattern.product(self.values, row) for row in rows])
+            "displacements",
+            motions,
+            lambda rows: np.array([self.pattern.solver.product(self.values, row) for row in rows]),
         )
 
     def lowest_modes(
@@ -109,19 +103,17 @@ class Tangent:
         By subspace iteration with the inverse [Bathe 2014, section 11.6], shifted where K is not positive definite.
         `Modes.settled` says whether it converged. Certified modes of a stable state are those of `solve.modes`.
 
-        Parameters
-        ----------
-        mass : (N, 3) lumped mass of each component [kg, of a twist angle kg m2], some of which may be 0; None: the
-            modes of K itself.
-        tolerance : relative error of the eigenvalues, as their residuals estimate it.
-        most_sweeps : the iteration ends after so many in any case: a few give directions that are good enough to
-            search in.
-        guards : further vectors that are iterated: the more, the faster the modes asked for converge.
+        Args:
+            mass: (N, 3) lumped mass of each component [kg, of a twist angle kg m2], some of which may be 0; None: the
+                modes of K itself.
+            tolerance: relative error of the eigenvalues, as their residuals estimate it.
+            most_sweeps: the iteration ends after so many in any case: a few give directions that are good enough to
+                search in.
+            guards: further vectors that are iterated: the more, the faster the modes asked for converge.
 
-        Raises
-        ------
-        InputError : the mass has another shape, is negative, or is zero everywhere.
-        SingularError : the state is not stable along a motion without mass.
+        Raises:
+            InputError: the mass has another shape, is negative, or is zero everywhere.
+            SingularError: the state is not stable along a motion without mass.
         """
         size = self.freedom.size
         weight = np.ones(size) if mass is None else self.freedom.reduce_diagonal(self._checked_mass(mass))
@@ -191,24 +183,21 @@ class Tangent:
 
 
 class TangentAssembly:
-    """The energies of a problem and their tangent stiffness, at one state after another.
+    """The tangent stiffness of a structure, at one state after another.
 
     Its buffers serve for all states; what it returns is not touched again. Where supports are on their way (`Supports`
-    with nodes still to move), what their motion takes is `product`.
+    with nodes still to move), what their motion takes is `product`. Methods take what acts at a state: a problem on the
+    same blocks, its source frames at, or near, the state; and the axial forces (e,) of the edges there [N].
 
-    Parameters
-    ----------
-    problem : the structure; its elements may be replaced at each state, on the same blocks.
-    state : (N, 3) any state, for the pattern.
+    Args:
+        problem: the structure at any state (N, 3), for the pattern.
 
-    Attributes
-    ----------
-    blocks : (m, k) of each set of energies, of the edges, and of the constraint's curvature.
-    hessians : (m, 3k, 3k) of each of these at the last state; of a constraint that is not `curved` empty.
+    Attributes:
+        blocks: (m, k) of each set of energies, of the edges, and of the constraint's curvature.
+        hessians: (m, 3k, 3k) of each of these at the last state; of a constraint that is not `curved` empty.
     """
 
     def __init__(self, problem: Problem, state: Floats) -> None:
-        self._problem = problem
         self.blocks = problem.blocks(len(state))
         self.pattern = problem.pattern_at(state)
         self.hessians = [*room_for(self.blocks[:-1]), NO_CURVATURE]
@@ -218,38 +207,23 @@ class TangentAssembly:
         """Whether the constraint turns its free directions."""
         return len(self.hessians[-1]) > 0
 
-    def gradient(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Floats:
-        """(N, 3) gradient [N] of energy and load, the edges carrying the axial forces (e,) [N].
-
-        Parameters
-        ----------
-        elements : with their source frames at, or near, the state.
-        state : (N, 3) node positions [m] and twist angles [rad].
-        forces : (e,) axial forces of the edges [N].
-        """
-        return self._gradient(elements, state, forces, [NO_HESSIANS] * len(elements))[1]
-
     def linearise(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, *,
-        multipliers: Floats | None = None, stretch: Stretch | None = None,
-    ) -> Floats:  # fmt: skip
+        self, problem: Problem, state: Floats, forces: Floats, *, multipliers: Floats | None = None
+    ) -> Floats:
         """Evaluate all Hessians at a state.
 
-        Parameters
-        ----------
-        elements : with their source frames at, or near, the state.
-        state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
-        multipliers : (e,) N0 [N]; None: those of the edges.
-        stretch : the edges with other lengths at rest; None: those of the problem.
+        Args:
+            multipliers: (e,) N0 [N]; None: those of the edges.
 
-        Returns
-        -------
-        (N, 3) gradient of energy and load [N], the edges carrying N0 + EA eps.
+        Returns:
+            (N, 3) gradient of energy and load [N], the edges carrying N0 + EA eps.
         """
-        stretch = self._problem.stretch if stretch is None else stretch
-        gradient, by_force = self._gradient(elements, state, forces, self.hessians[:-2], stretch)
-        self.hessians[-1] = self._problem.constraint.curvature(state, by_force)
-        evaluate_all((stretch.with_forces(forces, multipliers=multipliers),), state, gradient, self.hessians[-2:-1])
+        gradient = problem.without_edges(state, self.hessians[:-2])
+        by_force = gradient.copy()
+        problem.stretch.add_axial(state, forces, by_force)
+        self.hessians[-1] = problem.constraint.curvature(state, by_force)
+        stretch = problem.stretch.with_forces(forces, multipliers=multipliers)
+        evaluate_all((stretch,), state, gradient, self.hessians[-2:-1])
         return gradient
 
     def assembled(self, free: Freedom) -> Floats:
@@ -257,56 +231,36 @@ class TangentAssembly:
         return self.pattern.assembly.assemble(self.hessians, self.blocks, free)
 
     def product(self, motion: Floats) -> Floats:
-        """(N, 3) product of the Hessian at the last state with displacements (N, 3) across the free directions too."""
+        """(N, 3) product of the Hessian at the last state with displacements, across the free directions too."""
         return product(self.hessians[:-1], self.blocks[:-1], motion)
 
-    def values(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
-    ) -> tuple[Freedom, Floats]:
-        """The free directions, and the values (nnz,) of K in the order of the pattern; parameters as of `linearise`."""
-        self.linearise(elements, state, forces, stretch=stretch)
-        free = self._problem.constraint.freedom(state)
+    def values(self, problem: Problem, state: Floats, forces: Floats) -> tuple[Freedom, Floats]:
+        """The free directions, and the values (nnz,) of K in the order of the pattern."""
+        self.linearise(problem, state, forces)
+        free = problem.constraint.freedom(state)
         return free, self.assembled(free)
 
-    def _gradient(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, hessians: Sequence[Floats],
-        stretch: Stretch | None = None,
-    ) -> tuple[Floats, Floats]:  # fmt: skip
-        """(N, 3) of the elements and the load, without and with the axial forces."""
-        load, stretch = self._problem.load, self._problem.stretch if stretch is None else stretch
-        gradient = np.zeros_like(state) if load is None else -load
-        evaluate_all(elements, state, gradient, hessians)
-        whole = gradient.copy()
-        stretch.add_axial(state, forces, whole)
-        return gradient, whole
-
-    def stress_values(self, elements: Sequence[Elements], state: Floats, change: Floats, motion: Floats) -> Floats:
+    def stress_values(self, problem: Problem, state: State, change: Floats, motion: Floats) -> Floats:
         """(nnz,) values of the change of K with the internal forces alone, the geometry being frozen.
 
-        Parameters
-        ----------
-        elements : with their source frames at, or near, the state.
-        state : (N, 3) node positions [m] and twist angles [rad].
-        change : (e,) of the axial forces [N].
-        motion : (N, 3) along which moments change, of the elements that are `Stressed` [m, rad].
+        Args:
+            change: (e,) of the axial forces [N].
+            motion: (N, 3) along which moments change, of the elements that are `Stressed` [m, rad].
         """
         hessians = room_for(self.blocks)
-        for element, values in zip(elements, hessians, strict=False):
-            if isinstance(element, Stressed):
+        for element, values in zip(problem.elements, hessians, strict=False):
+            if is_stressed(element):
                 element.stress_stiffness(state, motion, values)
-        self._problem.stretch.axial_stiffness(state, change, hessians[-2])
-        return self.pattern.assembly.assemble(hessians, self.blocks, self._problem.constraint.freedom(state))
+        problem.stretch.axial_stiffness(state, change, hessians[-2])
+        return self.pattern.assembly.assemble(hessians, self.blocks, problem.constraint.freedom(state))
 
-    def tangent(
-        self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
-    ) -> Tangent:
-        """The tangent at a state; parameters as of `linearise`.
+    def tangent(self, problem: Problem, state: Floats, forces: Floats) -> Tangent:
+        """The tangent at a state.
 
-        Raises
-        ------
-        SingularError : a pivot vanishes.
+        Raises:
+            SingularError: a pivot vanishes.
         """
-        free, values = self.values(elements, state, forces, stretch)
+        free, values = self.values(problem, state, forces)
         factors = self.pattern.solver.factor(values)
         return Tangent(_fixed(state.copy()), _fixed(forces.copy()), free, _fixed(values), self.pattern, factors)
 
@@ -329,18 +283,16 @@ def subspace_iteration(
     """The largest eigenvalues of a symmetric positive operator, and their directions, by subspace iteration with
     Rayleigh and Ritz's values, which are a little too small, never too large [Golub and Van Loan 2013, 8.2.4].
 
-    Parameters
-    ----------
-    apply : the operator, on each of the vectors (m, n).
-    start : (m, n) vectors to begin with.
-    settled : so many of the largest eigenvalues must have settled.
-    tolerance : of the square of these ones' residuals over the eigenvalue, which is about the relative error of the
-        eigenvalue [Parlett 1998, section 11.7].
-    most_sweeps : it ends after so many in any case.
+    Args:
+        apply: the operator, on each of the vectors (m, n).
+        start: (m, n) vectors to begin with.
+        settled: so many of the largest eigenvalues must have settled.
+        tolerance: of the square of these ones' residuals over the eigenvalue, which is about the relative error of the
+            eigenvalue [Parlett 1998, section 11.7].
+        most_sweeps: it ends after so many in any case.
 
-    Returns
-    -------
-    Values (m,) descending, directions (m, n), orthogonal but not of unit length, and whether the values settled.
+    Returns:
+        Values (m,) descending, directions (m, n), orthogonal but not of unit length, and whether the values settled.
     """
     rows, done = start, False
     for _ in range(most_sweeps):
@@ -365,11 +317,10 @@ def generic(size: int, count: int) -> Floats:
 def negative_mode(inverse: Callable[[Floats], Floats], start: Floats, *, tolerance: float) -> Floats:
     """(n,) direction of the negative eigenvalue of a symmetric matrix that is nearest to zero.
 
-    Parameters
-    ----------
-    inverse : of the matrix, on a vector (n,) or on each of many (k, n).
-    start : (m, n) directions near which it is looked for: it is found at once if it is one of the m softest.
-    tolerance : as of `subspace_iteration`.
+    Args:
+        inverse: of the matrix, on a vector (n,) or on each of many (k, n).
+        start: (m, n) directions near which it is looked for: it is found at once if it is one of the m softest.
+        tolerance: as of `subspace_iteration`.
     """
     values, (row, *_), settled = subspace_iteration(
         lambda rows: -inverse(rows), start, settled=1, tolerance=tolerance, most_sweeps=FEW_SWEEPS

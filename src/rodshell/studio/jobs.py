@@ -25,16 +25,15 @@ def _status(kept: dict[str, Any]) -> dict[str, Any]:
     return kept
 
 
-STATUS = Annotated[dict[str, Any], AfterValidator(_status)]
+_STATUS = Annotated[dict[str, Any], AfterValidator(_status)]
 
 
 class Jobs:
     """A queue of jobs with one process, and what became of them, in a folder each.
 
-    Parameters
-    ----------
-    folder : in which each job has a folder with status.json and, when it is done, result/.
-    time_limit : of a job [s].
+    Args:
+        folder: in which each job has a folder with status.json and, when it is done, result/.
+        time_limit: of a job [s].
     """
 
     def __init__(self, folder: Path, time_limit: float, room: Room) -> None:
@@ -48,7 +47,7 @@ class Jobs:
             if not NAME.fullmatch(path.parent.name):
                 continue
             try:
-                status = read_record(path, STATUS)
+                status = read_record(path, _STATUS)
             except InputError as reason:
                 logging.getLogger(__name__).warning("a job is lost: %s", reason)
                 continue
@@ -62,13 +61,11 @@ class Jobs:
     def add(self, case: dict[str, Any], size: int) -> str:
         """Queue a case; the id of its job.
 
-        Parameters
-        ----------
-        size : of the case [bytes].
+        Args:
+            size: of the case [bytes].
 
-        Raises
-        ------
-        InputError : too many jobs wait, or there is no room for another.
+        Raises:
+            InputError: too many jobs wait, or there is no room for another.
         """
         if len(self._queue) >= limit(WAITING):
             raise InputError(
@@ -89,7 +86,7 @@ class Jobs:
             return None
         result = folder / "result"
         try:
-            status: dict[str, Any] = read_record(folder / "status.json", STATUS)
+            status: dict[str, Any] = read_record(folder / "status.json", _STATUS)
             if status["status"] == "done":
                 status["result"] = read_record(result / "result.json", dict[str, Any])
         except InputError:

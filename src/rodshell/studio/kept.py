@@ -31,13 +31,11 @@ def write_record(path: Path, value: Any) -> None:
 def read_record(path: Path, kind: Any) -> Any:
     """What a file holds as JSON; null in the place of NaN and infinities, which cases of earlier versions had.
 
-    Parameters
-    ----------
-    kind : the type that it has, such as a TypedDict.
+    Args:
+        kind: the type that it has, such as a TypedDict.
 
-    Raises
-    ------
-    InputError : it is not a file, too large, damaged, or something else.
+    Raises:
+        InputError: it is not a file, too large, damaged, or something else.
     """
     if not path.is_file():  # a pipe would be waited for
         raise InputError(f"{path} is not a file")
@@ -58,10 +56,9 @@ def _finite(text: str) -> float | None:
 class Room:
     """Keeps what lies in a server's folder below a limit: those sessions and jobs go that nobody used for longest.
 
-    Parameters
-    ----------
-    folder : of the server; with a folder for each session in sessions/, for each job in jobs/, and perhaps with what
-        is not the server's, which stays.
+    Args:
+        folder: of the server; with a folder for each session in sessions/, for each job in jobs/, and perhaps with what
+            is not the server's, which stays.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -72,9 +69,8 @@ class Room:
     def make(self, needed: float) -> None:
         """Make room for so many bytes.
 
-        Raises
-        ------
-        InputError : what is in use leaves none.
+        Raises:
+            InputError: what is in use leaves none.
         """
         if needed > self._left:
             self._left = limit(FOLDER) - self._sweep(limit(FOLDER) - needed)

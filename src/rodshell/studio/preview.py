@@ -6,25 +6,22 @@ An update while somebody drags costs little more than net and drape.
 from collections.abc import Mapping
 from functools import partial
 from math import degrees
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding.patches import PatchedForm
+from rodshell.form import Form
 from rodshell.layout import GridMesh
 from rodshell.output.colour_scale import Colour, gap_scale
-from rodshell.output.grid import CAPTIONS, Shape
+from rodshell.output.grid import CAPTIONS, Shape, supported
 from rodshell.output.models import section_outline
 from rodshell.output.viewer.scene import Coloured, Drawn
 from rodshell.results import wording
 from rodshell.results.from_form import rod_type
 from rodshell.targets import Target
 from rodshell.targets.surface_mesh import BEYOND, surface_mesh
-
-if TYPE_CHECKING:
-    from rodshell.form import Form
 
 Figures = list[tuple[str, str]]
 Surface = tuple[NDArray[np.float32], Ints]  # points [m] and triangles
@@ -34,31 +31,17 @@ class Preview:
     """Shows forms one after the other; the triangles of a target are kept while shells lie on the same part of it."""
 
     def __init__(self) -> None:
-        self._target: Target | None = None
-        self._around = np.zeros((2, 2))  # lowest and highest x, y of the shell for which the triangles were made
-        self._surface: tuple[NDArray[np.float32], Ints] = (
-            np.zeros((0, 3), dtype=np.float32),
-            np.zeros((0, 3), dtype=np.intp),
-        )
+        self._kept: tuple[Target, Floats, Surface] | None = None  # with the box, in plan, of the shell of the triangles
 
-    def of(self, form: "Form") -> tuple[dict[str, Any], bytes]:
+    def of(self, form: Form) -> tuple[dict[str, Any], bytes]:
         """Facts and scene of a form.
 
-        Parameters
-        ----------
-        form : of a target; with or without popped-up shells.
+        Args:
+            form: of a target; with or without popped-up shells.
         """
-        facts = {
-            "name": form.case.drawings.name or form.target.name,
-            "status": form.status,
-            "warnings": list(form.warnings),
-            "figures": figures(form),
-            "plan": plan(form),
-            "handles": handles(form),
-        }
-        return facts, self._scene(form)
+        return facts(form), self._scene(form)
 
-    def _scene(self, form: "Form") -> bytes:
+    def _scene(self, form: Form) -> bytes:
         mesh, draped, target = form.footprint.mesh, form.boundary.draped, form.target
         if draped is None:
             return b""
@@ -68,7 +51,9 @@ class Preview:
         shapes = [Shape("draped", CAPTIONS["draped"], draped, gaps), Shape("flat", CAPTIONS["flat"], mesh.flat)]
         for ends, shell in form.popped.items():
             name, found = f"popped_{ends}", form.agreement.get(ends)
-            shapes.append(Shape(name, CAPTIONS[name], shell.positions, None if found is None else found.gaps))
+            shapes.append(
+                Shape(name, f"Popped up, {supported(name)}", shell.positions, None if found is None else found.gaps)
+            )
             if found is not None:
                 where[name], largest[name] = np.array(found.where), found.max
         rounding, top = rounding_of(form), 1e3 * max(largest.values())
@@ -94,18 +79,29 @@ class Preview:
     def _surface_under(self, target: Target, draped: Floats) -> Surface:
         box = np.array([draped[:, :2].min(axis=0), draped[:, :2].max(axis=0)])
         room = 0.5 * BEYOND * float(np.ptp(box, axis=0).max())
-        if target is not self._target or np.abs(box - self._around).max() > room:
+        if self._kept is None or target is not self._kept[0] or np.abs(box - self._kept[1]).max() > room:
             points, faces = surface_mesh(target, draped)
-            self._target, self._around, self._surface = target, box, (points.astype(np.float32), faces)
-        return self._surface
+            self._kept = target, box, (points.astype(np.float32), faces)
+        return self._kept[2]
 
 
-def figures(form: "Form") -> Figures:
+def facts(form: Form) -> dict[str, Any]:
+    """What the page says of a form, checked or not."""
+    return {
+        "name": form.case.drawings.name or form.target.name,
+        "status": form.status,
+        "warnings": list(form.warnings),
+        "figures": figures(form),
+        "plan": plan(form),
+        "handles": handles(form),
+    }
+
+
+def figures(form: Form) -> Figures:
     """Figures of a form in words, by their names."""
     rods, rounding = form.footprint.rods, rounding_of(form)
     stages = form.stages
-    nets = [laid.net for laid in stages.patch_nets.values()] if isinstance(stages, PatchedForm) else [stages.draped.net]
-    angles = [net.min_angle for net in nets if net is not None]
+    angles = [part.draped.figures.min_angle for part in stages.parts]
     return lengths([rod.length for rod in rods], rounding) + [
         *(("smallest angle between rods", wording.degrees(degrees(min(angles)))) for _ in angles[:1]),
         *(gap(ends, found.max, found.max_relative, rounding) for ends, found in form.agreement.items()),
@@ -124,14 +120,16 @@ def gap(ends: str, largest: float | None, relative: float | None, rounding: word
     return f"largest gap, {ends}", f"{shown} ({wording.percent(relative)} of the size)"
 
 
-def rounding_of(form: "Form") -> wording.Rounding:
+def rounding_of(form: Form) -> wording.Rounding:
     """How finely lengths of a form are shown."""
     longest = max((rod.length for rod in form.footprint.rods), default=0.0)
     return wording.rounding_to(form.options.drawings.tolerance, longest)
 
 
-def plan(form: "Form") -> list[dict[str, Any]]:
-    """The flat grid: rods by name with both ends (x, y) and the cut length [m]."""
+def plan(form: Form) -> list[dict[str, Any]]:
+    """The flat grid: rods by name with both ends (x, y) and the cut length [m]; empty if the rods do not lie flat."""
+    if (flat := form.flat_state) is not None and not flat.lies_flat:
+        return []
     mesh, allowance = form.footprint.mesh, form.options.fabrication.end_allowance
     ends = mesh.flat[mesh.ends.ravel(), :2].reshape(-1, 4).tolist()
     return [
@@ -140,7 +138,7 @@ def plan(form: "Form") -> list[dict[str, Any]]:
     ]
 
 
-def handles(form: "Form") -> Mapping[str, Any] | None:
+def handles(form: Form) -> Mapping[str, Any] | None:
     """Where the handles of anchor, heading and base plane stand; None for a form in patches."""
     if form.seams:
         return None

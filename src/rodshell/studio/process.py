@@ -11,9 +11,9 @@ from typing import Any
 
 from rodshell.studio.worker import News, Order, run_worker
 
-ENDED = "the job was ended by the system, perhaps for lack of memory: use fewer rods, or longer edges"
+_ENDED = "the job was ended by the system, perhaps for lack of memory: use fewer rods, or longer edges"
 ENDS = ("done", "left", "failed")  # kinds of news with which an order ends
-GRACE = 15.0  # s beyond the time limit after which a worker that says nothing is ended
+_GRACE = 15.0  # s beyond the time limit after which a worker that says nothing is ended
 Heard = Callable[[News], None]
 
 
@@ -119,7 +119,7 @@ class WorkerProcess:
     def _ended(self, process: Any) -> None:
         """The process ended although nobody asked it to."""
         if process is self._process:
-            self._lose(ENDED)
+            self._lose(_ENDED)
 
     def _lose(self, sentence: str) -> None:
         """Without its process an order has failed; what waits is sent to another."""
@@ -133,7 +133,7 @@ class WorkerProcess:
         if self._watch is not None:
             self._watch.cancel()
         loop = asyncio.get_running_loop()
-        self._watch = loop.call_later(order.time_limit + GRACE, self._stop, order)
+        self._watch = loop.call_later(order.time_limit + _GRACE, self._stop, order)
 
     def _stop(self, order: Order) -> None:
-        self._lose(f"out of time: the job was stopped, since it said nothing for {order.time_limit + GRACE:g} s")
+        self._lose(f"out of time: the job was stopped, since it said nothing for {order.time_limit + _GRACE:g} s")

@@ -33,17 +33,17 @@ from rodshell.untrusted import limit, raised
 
 STATIC = files("rodshell.studio").joinpath("static")
 TYPES = {".js": "text/javascript", ".css": "text/css"}
-PAGES = ("studio.js", "studio.css", "lil-gui.js", "lil-gui.css")
+_PAGES = ("studio.js", "studio.css", "lil-gui.js", "lil-gui.css")
 DEEPEST = 20  # tables and lists of a case within one another
-NO_CASE = "the body must be a case as JSON, with the tables of a case file"
-OTHER_PAGE = "the page and the server are of different versions: load the page again"
+_NO_CASE = "the body must be a case as JSON, with the tables of a case file"
+_OTHER_PAGE = "the page and the server are of different versions: load the page again"
 NO_TOKEN = "this server needs its token: open the address that it printed when it was started"
-POLICY = (
+_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "font-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 HEADERS = {
-    "content-security-policy": POLICY,
+    "content-security-policy": _POLICY,
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "cross-origin-opener-policy": "same-origin",
@@ -56,15 +56,14 @@ HEADERS = {
 class Settings:
     """How a server runs.
 
-    Parameters
-    ----------
-    folder : in which sessions and jobs are kept.
-    hosts : names, with the port, by which it may be reached.
-    token : that requests must bring; "": none is needed. once : another one, for a single request: the address that a
-        browser was started with is seen by other users of the machine.
-    key : which pages that brought a token keep in a cookie, and need no token then; default: the token.
-    first : the case with which a session begins, and the files that it names.
-    time_limit : of a job [s]; largest_upload : [bytes], before RODSHELL_LIMITS.
+    Args:
+        folder: in which sessions and jobs are kept.
+        hosts: names, with the port, by which it may be reached.
+        token: that requests must bring; "": none is needed. once : another one, for a single request: the address that
+            a browser was started with is seen by other users of the machine.
+        key: which pages that brought a token keep in a cookie, and need no token then; default: the token.
+        first: the case with which a session begins, and the files that it names.
+        time_limit: of a job [s]; largest_upload : [bytes], before RODSHELL_LIMITS.
     """
 
     folder: Path
@@ -79,12 +78,7 @@ class Settings:
 
 
 def studio_app(settings: Settings) -> ASGIApp:
-    """The server as an ASGI application.
-
-    Parameters
-    ----------
-    settings : see there.
-    """
+    """The server as an ASGI application."""
     first = settings.first or presets()["pavilion"]
     room = Room(settings.folder)
     sessions = Sessions(settings.folder / "sessions", first, settings.files or {}, settings.time_limit, room)
@@ -205,7 +199,7 @@ async def _static(request: Request) -> Response:
         return Response(viewer_script(), media_type="text/javascript")
     if name == "viewer.css":
         return Response(viewer_style(), media_type="text/css")
-    if name not in PAGES:
+    if name not in _PAGES:
         return _missing("file")
     return Response(STATIC.joinpath(name).read_bytes(), media_type=TYPES[Path(name).suffix])
 
@@ -289,9 +283,8 @@ async def _send_news(socket: WebSocket, news: asyncio.Queue[News]) -> None:
 def _message(received: Message) -> dict[str, Any]:
     """What a page sent.
 
-    Raises
-    ------
-    InputError : it is not a table as JSON, or too large.
+    Raises:
+        InputError: it is not a table as JSON, or too large.
     """
     text = received.get("text")
     if text is None:
@@ -302,16 +295,15 @@ def _message(received: Message) -> dict[str, Any]:
     except (ValueError, RecursionError):
         raise InputError("a message must be JSON") from None
     if not isinstance(message, dict):
-        raise InputError(OTHER_PAGE)
+        raise InputError(_OTHER_PAGE)
     return message
 
 
 def _obey(session: Session, message: dict[str, Any]) -> None:
     """Do what a page asks for.
 
-    Raises
-    ------
-    InputError : it cannot be done, or is nothing that a page asks for.
+    Raises:
+        InputError: it cannot be done, or is nothing that a page asks for.
     """
     try:
         match message:
@@ -324,7 +316,7 @@ def _obey(session: Session, message: dict[str, Any]) -> None:
             case {"kind": "drop", "name": str(name)}:
                 session.drop_variant(name)
             case _:
-                raise InputError(OTHER_PAGE)
+                raise InputError(_OTHER_PAGE)
     except OSError as reason:
         raise InputError(_why_not_kept(reason)) from None
 
@@ -383,9 +375,9 @@ async def _new_job(request: Request) -> Response:
     try:
         case = json.loads(body)
     except (ValueError, RecursionError):
-        raise InputError(NO_CASE) from None
+        raise InputError(_NO_CASE) from None
     if not isinstance(case, dict):
-        raise InputError(NO_CASE)
+        raise InputError(_NO_CASE)
     _refuse_unwritable(case)
     jobs: Jobs = request.app.state.jobs
     return JSONResponse({"id": jobs.add(case, len(body))}, 202)

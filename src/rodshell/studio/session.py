@@ -29,16 +29,16 @@ from rodshell.untrusted import limit, raised
 
 ALONE = 60.0  # s without a page after which a session's process is ended
 SESSIONS = 50  # with a page or a process at once
-MOST_CASES = 500  # of a session's history
+_MOST_CASES = 500  # of a session's history
 HISTORY = 10e6  # bytes of these cases
-VARIANTS = 100  # of a session
-SCENE = re.compile("[0-9a-f]{16}")
+_VARIANTS = 100  # of a session
+_SCENE = re.compile("[0-9a-f]{16}")
 
 
 def _variant(kept: dict[str, Any]) -> dict[str, Any]:
     """A variant as it is kept; its scene is the name of a file in the session's folder."""
     kinds = {"name": str, "case": dict, "scene": str, "figures": list, "verdict": dict}
-    if not all(isinstance(kept.get(key), kind) for key, kind in kinds.items()) or not SCENE.fullmatch(kept["scene"]):
+    if not all(isinstance(kept.get(key), kind) for key, kind in kinds.items()) or not _SCENE.fullmatch(kept["scene"]):
         raise ValueError("a variant is not as it was kept")
     return kept
 
@@ -47,10 +47,9 @@ def _variant(kept: dict[str, Any]) -> dict[str, Any]:
 class State:
     """What is kept of a session.
 
-    Parameters
-    ----------
-    cases : in their order, for undo and redo; at : the present one.
-    variants : kept by name: their case, figures and verdict.
+    Args:
+        cases: in their order, for undo and redo; at : the present one.
+        variants: kept by name: their case, figures and verdict.
     """
 
     cases: list[dict[str, Any]] = field(default_factory=list)
@@ -65,16 +64,14 @@ class State:
 class Session:
     """A session in its folder.
 
-    Parameters
-    ----------
-    folder : of the session; made if it is missing.
-    time_limit : of a job [s].
-    room : makes room for so many bytes.
-    left : called when the process was ended since there is no page; the session can then be opened again.
+    Args:
+        folder: of the session; made if it is missing.
+        time_limit: of a job [s].
+        room: makes room for so many bytes.
+        left: called when the process was ended since there is no page; the session can then be opened again.
 
-    Raises
-    ------
-    InputError : what was kept of it is damaged.
+    Raises:
+        InputError: what was kept of it is damaged.
     """
 
     def __init__(
@@ -128,10 +125,9 @@ class Session:
     def show(self, serial: int, case: dict[str, Any], *, live: bool) -> None:
         """Find the form of a case, which may name uploaded files.
 
-        Parameters
-        ----------
-        serial : of the page's input; what is found carries it.
-        live : somebody drags; else the case becomes the present one, for undo and redo.
+        Args:
+            serial: of the page's input; what is found carries it.
+            live: somebody drags; else the case becomes the present one, for undo and redo.
         """
         if not live and case != self.state.case:
             self._record(case)
@@ -154,19 +150,18 @@ class Session:
     def keep_variant(self, name: str) -> None:
         """Keep the present case with what was found of it under a name.
 
-        Raises
-        ------
-        InputError : nothing was checked yet, the name is empty, or there are too many.
+        Raises:
+            InputError: nothing was checked yet, the name is empty, or there are too many.
         """
         if not name.strip():
             raise InputError("a variant needs a name")
         if not self._facts or self.state.case is None:
             raise InputError("there is no verdict yet: keep the variant when it is there")
         self._drop(name)
-        if len(self.state.variants) >= limit(VARIANTS):
+        if len(self.state.variants) >= limit(_VARIANTS):
             raise InputError(
-                f"a session keeps {limit(VARIANTS):g} variants at most: forget one first, "
-                f"{raised(VARIANTS, len(self.state.variants) + 1)}"
+                f"a session keeps {limit(_VARIANTS):g} variants at most: forget one first, "
+                f"{raised(_VARIANTS, len(self.state.variants) + 1)}"
             )
         self.room(len(self._scene))
         key = secrets.token_hex(8)
@@ -200,7 +195,7 @@ class Session:
     def _record(self, case: dict[str, Any]) -> None:
         self.room(len(json.dumps(case)))
         state = self.state
-        state.cases = [*state.cases[: state.at + 1], case][-MOST_CASES:]
+        state.cases = [*state.cases[: state.at + 1], case][-_MOST_CASES:]
         sizes = [len(json.dumps(case)) for case in state.cases]
         while sum(sizes) > limit(HISTORY) and len(sizes) > 1:
             del sizes[0], state.cases[0]
@@ -236,10 +231,9 @@ def _with_names(value: Any, folder: str) -> Any:
 class Sessions:
     """All sessions of a server, by their ids.
 
-    Parameters
-    ----------
-    folder : in which each session has a folder.
-    first : the case with which a new session begins, and files that it names, by name.
+    Args:
+        folder: in which each session has a folder.
+        first: the case with which a new session begins, and files that it names, by name.
     """
 
     def __init__(
@@ -252,9 +246,8 @@ class Sessions:
     def new(self) -> str:
         """A new session's id.
 
-        Raises
-        ------
-        InputError : there is no room for it.
+        Raises:
+            InputError: there is no room for it.
         """
         name = secrets.token_urlsafe(18)
         self._room.make(2 * BLOCK + sum(map(len, self._files.values())))
@@ -280,9 +273,8 @@ class Sessions:
     def hearing(self, session: Session, heard: Heard) -> AbstractContextManager[None]:
         """Hear a session's news, as `Session.listening`.
 
-        Raises
-        ------
-        InputError : too many others have a page or a process.
+        Raises:
+            InputError: too many others have a page or a process.
         """
         others = [other for other in self._open.values() if other.listeners or other.worker.is_running]
         count = len(others) - (session in others)

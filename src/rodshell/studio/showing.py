@@ -1,40 +1,34 @@
 """What the page shows of a form that was checked: as of a preview, with verdict, reasons and all figures."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rodshell.figures.checks import OTHER_SHAPES
+from rodshell.form import Form
+from rodshell.job import Job
 from rodshell.output.viewer import scene_of
-from rodshell.results import wording
+from rodshell.results import Archive, wording
 from rodshell.results.verdict import facts as facts_of
 from rodshell.results.wording import rounding_of
 from rodshell.schema import written
-from rodshell.studio.preview import Figures, figures, handles, plan
-
-if TYPE_CHECKING:
-    from rodshell.form import Form
-    from rodshell.job import Job
-    from rodshell.results import Archive
+from rodshell.studio.preview import Figures, facts
 
 
-def checked(form: "Form", job: "Job") -> tuple[dict[str, Any], bytes]:
+def checked(form: Form, job: Job) -> tuple[dict[str, Any], bytes]:
     """Facts and scene of a form with its checks and verdict."""
     archive = form.archive()
     scene, verdict = scene_of(archive), archive.verdict
-    facts = {
-        "name": archive.name,
-        "status": form.status,
-        "warnings": list(form.warnings),
-        "figures": figures(form) + _checked(archive),
-        "plan": plan(form),
-        "handles": handles(form),
+    found = facts(form)
+    found |= {
+        "figures": found["figures"] + _checked(archive),
         "verdict": {"level": verdict.level, "headline": verdict.headline, "reasons": list(verdict.reasons)},
         "facts": facts_of(archive.results),
         "case": job.to_toml(),
         "resolved": _resolved(form),
     }
-    return facts, b"" if scene is None else scene.content()
+    return found, b"" if scene is None else scene.content()
 
 
-def _resolved(form: "Form") -> dict[str, Any]:
+def _resolved(form: Form) -> dict[str, Any]:
     """The case with the values that were chosen where it says "auto"."""
     tables = written(form.case)
     chosen = form.layout.parameters()
@@ -42,18 +36,18 @@ def _resolved(form: "Form") -> dict[str, Any]:
     return tables
 
 
-def _checked(archive: "Archive") -> Figures:
+def _checked(archive: Archive) -> Figures:
     """Figures of checks, refinement and loads, by which variants are compared."""
     results, rows = archive.results, []
     for shape, bent in (results.bending.shapes() if results.bending else {}).items():
-        if shape in ("pinned", "clamped") and bent.utilisation is not None:
+        if shape not in OTHER_SHAPES and bent.utilisation is not None:
             rows.append((f"utilisation, {shape}, unloaded", wording.percent(bent.utilisation)))
     for ends, weight in results.self_weight.items():
         rows.append((f"carries, {ends}", wording.share_of_weight(weight)))
     return rows + _refinement(archive) + _loads(archive)
 
 
-def _refinement(archive: "Archive") -> Figures:
+def _refinement(archive: Archive) -> Figures:
     """What the refinement gained, and why a design was refused."""
     found = archive.results.refinement
     if found is None or found.before is None or found.after is None:
@@ -64,7 +58,7 @@ def _refinement(archive: "Archive") -> Figures:
     return rows + ([("refused", found.refused)] if found.refused else [])
 
 
-def _loads(archive: "Archive") -> Figures:
+def _loads(archive: Archive) -> Figures:
     """What each combination of loads does."""
     rows, rounding = [], rounding_of(archive.results)
     for name, by_ends in archive.results.loads.items():

@@ -15,19 +15,17 @@ from rodshell.errors import InputError, OutputError
 from rodshell.studio.session import presets
 from rodshell.untrusted import read_bytes, read_text
 
-KEY = re.compile("[0-9a-f]{48}")
+_KEY = re.compile("[0-9a-f]{48}")
 
 
 def first_case(name: str) -> tuple[dict[str, Any], dict[str, bytes]]:
     """A case for the page, and the files that it names, as if they had been uploaded.
 
-    Parameters
-    ----------
-    name : a built-in case, a case file or a surface.
+    Args:
+        name: a built-in case, a case file or a surface.
 
-    Raises
-    ------
-    InputError : as of `load_case`.
+    Raises:
+        InputError: as of `load_case`.
     """
     if name in BUILT_IN:
         return presets()[name], {}
@@ -52,9 +50,8 @@ def own_folder(folder: Path) -> str:
 
     It is kept there, so that pages continue when the server is started again.
 
-    Raises
-    ------
-    OutputError : nothing can be kept there.
+    Raises:
+        OutputError: nothing can be kept there.
     """
     key = folder / "key"
     try:
@@ -63,7 +60,7 @@ def own_folder(folder: Path) -> str:
             part.chmod(0o700)
         if key.is_file() and stat.S_IMODE(key.stat().st_mode) == 0o600:
             with suppress(InputError):
-                if KEY.fullmatch(secret := read_text(key, 1000)):
+                if _KEY.fullmatch(secret := read_text(key, 1000)):
                     return secret
         key.unlink(missing_ok=True)
         secret = secrets.token_hex(24)

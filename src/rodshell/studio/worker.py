@@ -20,21 +20,19 @@ from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from time import monotonic, process_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from rodshell.case.link import UPLOAD
 from rodshell.case.load import load_case
 from rodshell.errors import InputError, RodshellError
+from rodshell.form import Form
 from rodshell.job import Job
+from rodshell.progress import Progress
 from rodshell.studio.preview import Preview
 from rodshell.studio.showing import checked
 
-if TYPE_CHECKING:
-    from rodshell.job import Job
-    from rodshell.progress import Progress
-
-TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
+_TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
 PAUSE = 0.1  # s between two messages of progress at least
 MEMORY = 3_000_000_000  # bytes of a worker's data at most
 
@@ -43,16 +41,15 @@ MEMORY = 3_000_000_000  # bytes of a worker's data at most
 class Order:
     """What a worker is to do.
 
-    Parameters
-    ----------
-    serial : numbers the orders of a session.
-    kind : "form": find the form of a case; "files": the last form's files as a ZIP archive; "job": find the form and
-        write its folder.
-    case : tables as in a case file, in which "upload:NAME" stands for a file.
-    uploads : folder of the files that it may name; "": it may name none.
-    live : somebody drags: start from the form before, and leave refinement and checks out.
-    time_limit : of form finding [s].
-    folder : of the result of a "job".
+    Args:
+        serial: numbers the orders of a session.
+        kind: "form": find the form of a case; "files": the last form's files as a ZIP archive; "job": find the form and
+            write its folder.
+        case: tables as in a case file, in which "upload:NAME" stands for a file.
+        uploads: folder of the files that it may name; "": it may name none.
+        live: somebody drags: start from the form before, and leave refinement and checks out.
+        time_limit: of form finding [s].
+        folder: of the result of a "job".
     """
 
     serial: int
@@ -68,11 +65,10 @@ class Order:
 class News:
     """What a worker sends.
 
-    Parameters
-    ----------
-    serial : of the order; kind : "taken", "progress", "stage", "files"; at its end "done", "failed", or "left", for a
-        newer one.
-    facts : plain values for the page; content : a scene, or a file.
+    Args:
+        serial: of the order; kind : "taken", "progress", "stage", "files"; at its end "done", "failed", or "left", for
+            a newer one.
+        facts: plain values for the page; content : a scene, or a file.
     """
 
     serial: int
@@ -88,16 +84,14 @@ class _Superseded(Exception):
 def run_worker(connection: Connection, memory: int = MEMORY) -> None:
     """Obey orders until the other end of the connection is closed.
 
-    Parameters
-    ----------
-    connection : receives `Order`, sends `News`.
-    memory : bytes of data that the process may have.
+    Args:
+        connection: receives `Order`, sends `News`.
+        memory: bytes of data that the process may have.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its workers
     resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     worker = _Worker(connection)
-    for task in (_end_with_the_server, _import_all):
-        threading.Thread(target=task, daemon=True).start()
+    threading.Thread(target=_end_with_the_server, daemon=True).start()
     while True:
         try:
             order = connection.recv()
@@ -114,18 +108,11 @@ def _end_with_the_server() -> None:
         os._exit(1)
 
 
-def _import_all() -> None:
-    """What the first order needs, before it comes."""
-    import rodshell.job
-    import rodshell.studio.showing  # noqa: F401
-
-
-def job_of(order: Order) -> "Job":
+def job_of(order: Order) -> Job:
     """The job of an order's case, which reads no file of the server but uploads, whatever its keys are.
 
-    Raises
-    ------
-    InputError : the case names another file, or cannot be used.
+    Raises:
+        InputError: the case names another file, or cannot be used.
     """
 
     def uploaded(value: object) -> str:
@@ -140,8 +127,8 @@ def job_of(order: Order) -> "Job":
 class _Worker:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._form: Any = None  # the last form, from which the next drag starts
-        self._preview: Any = None
+        self._form: Form | None = None  # the last form, from which the next drag starts
+        self._preview = Preview()
 
     def obey(self, order: Order) -> None:
         if order.kind == "form" and self._connection.poll():
@@ -157,7 +144,7 @@ class _Worker:
             self._send(order, "failed", {"sentence": str(error)})
         except MemoryError:
             self._form = None
-            self._send(order, "failed", {"sentence": TOO_LARGE})
+            self._send(order, "failed", {"sentence": _TOO_LARGE})
         except Exception as error:
             self._send(
                 order,
@@ -168,8 +155,7 @@ class _Worker:
             self._send(order, "done", {"cpu": process_time() - start})
 
     def _find(self, order: Order) -> None:
-        self._preview = show = self._preview or Preview()
-        job = job_of(order)
+        show, job = self._preview, job_of(order)
         plain = job.changed(refine__vary="") if job.case.refine.vary else job
         earlier, shown = self._form if order.live else None, False
         progress = self._progress(order, lambda: shown or not order.live)
@@ -186,7 +172,7 @@ class _Worker:
             self._form = form = form.finished(progress)
             self._show(order, "checks", *checked(form, job))
 
-    def _progress(self, order: Order, may_leave: Callable[[], bool]) -> "Progress":
+    def _progress(self, order: Order, may_leave: Callable[[], bool]) -> Progress:
         """Progress that is sent now and then, and leaves the order for a newer one where it may."""
         said = monotonic() if order.live else 0.0
 

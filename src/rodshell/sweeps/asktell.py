@@ -4,73 +4,48 @@ A search depends on its seed and the values that it is given, and on nothing els
 values.
 """
 
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from rodshell.arrays import Floats
 
+DIFFERENCE, CROSSED = 0.6, 0.9  # smaller steps or populations converge to a worse minimum
+
 
 class AskTell:
-    """A search for small values, maybe of several objectives, where no constraint is above zero.
+    """A search for small values where no constraint is above zero.
 
-    Make one by `differential_evolution` or `nsga2`.
+    Of one objective by differential evolution, DE/best/1/bin: each individual has one child, the best of all moved by
+    the difference of two others and crossed with the parent, which it replaces if it is better. Of several objectives
+    by the non-dominated sorting genetic algorithm [Deb et al. 2002].
+
+    Args:
+        lower, upper: (n,) bounds.
+        first: (k, n) population.
+        objectives, constraints: their numbers.
+        seed: of the random numbers.
+
+    Raises:
+        ImportError: pymoo is not installed.
     """
 
     def __init__(
-        self, algorithm: Any, lower: Floats, upper: Floats, *, objectives: int, constraints: int, seed: int
+        self, lower: Floats, upper: Floats, first: Floats, *, objectives: int = 1, constraints: int = 0, seed: int
     ) -> None:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.algorithms.soo.nonconvex.de import DE
         from pymoo.core.problem import Problem
 
+        self._algorithm: Any
+        if objectives == 1:
+            best = {"variant": "DE/best/1/bin", "F": DIFFERENCE, "CR": CROSSED, "prob_mut": 0.0}
+            self._algorithm = DE(pop_size=len(first), sampling=first, **best)
+        else:
+            self._algorithm = NSGA2(pop_size=len(first), sampling=first)
         problem = Problem(n_var=len(lower), n_obj=objectives, n_ieq_constr=constraints, xl=lower, xu=upper)
-        algorithm.setup(problem, seed=seed, termination=("n_gen", np.inf))
-        self._algorithm = algorithm
+        self._algorithm.setup(problem, seed=seed, termination=("n_gen", np.inf))
         self._asked: Any = None
-
-    @classmethod
-    def differential_evolution(
-        cls, lower: Floats, upper: Floats, first: Floats, *, constraints: int = 0, seed: int, difference: float,
-        crossed: float,
-    ) -> Self:  # fmt: skip
-        """Of one objective, DE/best/1/bin: each individual has one child, the best of all moved by the difference of
-        two others and crossed with the parent, which it replaces if it is better.
-
-        Parameters
-        ----------
-        lower, upper : (n,) bounds; first : (k, n) population.
-        constraints : their number; seed : of the random numbers.
-        difference : factor of the difference; crossed : share of the variables that come from the moved one.
-
-        Raises
-        ------
-        ImportError : pymoo is not installed.
-        """
-        from pymoo.algorithms.soo.nonconvex.de import DE
-
-        algorithm = DE(
-            pop_size=len(first), sampling=first, variant="DE/best/1/bin", F=difference, CR=crossed, prob_mut=0.0
-        )
-        return cls(algorithm, lower, upper, objectives=1, constraints=constraints, seed=seed)
-
-    @classmethod
-    def nsga2(
-        cls, lower: Floats, upper: Floats, first: Floats, *, objectives: int, constraints: int = 0, seed: int
-    ) -> Self:
-        """Of several objectives: the non-dominated sorting genetic algorithm [Deb et al. 2002].
-
-        Parameters
-        ----------
-        lower, upper : (n,) bounds; first : (k, n) population.
-        objectives, constraints : their numbers; seed : of the random numbers.
-
-        Raises
-        ------
-        ImportError : pymoo is not installed.
-        """
-        from pymoo.algorithms.moo.nsga2 import NSGA2
-
-        algorithm = NSGA2(pop_size=len(first), sampling=first)
-        return cls(algorithm, lower, upper, objectives=objectives, constraints=constraints, seed=seed)
 
     def ask(self) -> Floats:
         """(k, n) points of the next generation."""
@@ -81,9 +56,9 @@ class AskTell:
     def tell(self, values: Floats, violations: Floats | None = None) -> None:
         """What was found there.
 
-        Parameters
-        ----------
-        values : (k, objectives); violations : (k, constraints), above zero where a constraint does not hold.
+        Args:
+            values: (k, objectives).
+            violations: (k, constraints), above zero where a constraint does not hold.
         """
         self._asked.set("F", values)
         if violations is not None:

@@ -24,35 +24,38 @@ from rodshell.units import shown
 from rodshell.validation import choice
 
 BASE = "base"
+_BELOW_ONE = 1 - 1e-12
 MOST = 1_000_000  # designs
 METHODS = ("latin-hypercube", "sobol")
 SCALES = ("linear", "log")
-PATHS = {f"{table}.{key}" for table, keys in FILE_KEYS.items() for key in keys}
+_PATHS = {f"{table}.{key}" for table, keys in FILE_KEYS.items() for key in keys}
 
 
 @dataclass(frozen=True)
 class Axis:
     """Values of one key, or of several that change together.
 
-    Parameters
-    ----------
-    keys : of the case, dotted; "base" for the base itself.
-    rows : values of these keys, in SI where they are numbers.
+    Args:
+        keys: of the case, dotted; "base" for the base itself.
+        rows: values of these keys, in SI where they are numbers.
     """
 
     keys: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
+
+    def row(self, share: float) -> tuple[Any, ...]:
+        """The values at a share of the axis in [0, 1]."""
+        return self.rows[min(int(share * len(self.rows)), len(self.rows) - 1)]
 
 
 @dataclass(frozen=True)
 class Span:
     """An interval of one key.
 
-    Parameters
-    ----------
-    low, high : its ends in SI: numbers, or as many numbers in a tuple.
-    whole : whether its values are whole numbers, both ends included.
-    scale : "linear", or "log" with equal ratios.
+    Args:
+        low, high: its ends in SI: numbers, or as many numbers in a tuple.
+        whole: whether its values are whole numbers, both ends included.
+        scale: "linear", or "log" with equal ratios.
     """
 
     key: str
@@ -61,8 +64,17 @@ class Span:
     whole: bool
     scale: str
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Its key, as `Axis.keys`."""
+        return (self.key,)
+
+    def row(self, share: float) -> tuple[Any, ...]:
+        """As `Axis.row`."""
+        return (self.drawn(min(share, _BELOW_ONE) if self.whole else share),)
+
     def at(self, share: float) -> Any:
-        """The value at a share in [0, 1) or of 1 of the interval."""
+        """The value at a share in [0, 1] of the interval."""
         if isinstance(self.low, tuple):
             parts = zip(self.low, self.high, strict=True)
             return tuple(Span(self.key, low, high, self.whole, self.scale).at(share) for low, high in parts)
@@ -82,17 +94,15 @@ class Span:
 def read_axes(given: Mapping[str, Any], sample: Mapping[str, Any] | None, base: Job, folder: Path) -> tuple[Axis, ...]:
     """The axes of the tables [axes] and [sample].
 
-    Parameters
-    ----------
-    given : by key, or by keys with commas: a list of values, { from, to, count, scale }, or without count what is
-        sampled.
-    sample : { method, count, seed }; None without a sample.
-    base : a job by whose case quantities are read.
-    folder : in which files lie whose paths are relative.
+    Args:
+        given: by key, or by keys with commas: a list of values, { from, to, count, scale }, or without count what is
+            sampled.
+        sample: { method, count, seed }; None without a sample.
+        base: a job by whose case quantities are read.
+        folder: in which files lie whose paths are relative.
 
-    Raises
-    ------
-    InputError : a value cannot be used, a key occurs twice, or there are too many designs.
+    Raises:
+        InputError: a value cannot be used, a key occurs twice, or there are too many designs.
     """
     axes, spans = list[Axis | None](), list[Span]()
     for name, values in flat_keys(given):
@@ -139,14 +149,13 @@ def flat_keys(given: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 def read_span(key: str, given: Mapping[str, Any], base: Job, known: Sequence[str]) -> Span:
     """The interval of a key.
 
-    Parameters
-    ----------
-    given : { from, to, scale }; known : the names that it may have.
-    base : a job by whose case quantities are read.
+    Args:
+        given: { from, to, scale }.
+        base: a job by whose case quantities are read.
+        known: the names that `given` may have.
 
-    Raises
-    ------
-    InputError : an end is missing or not a number, both are the same, or zero with a logarithmic scale.
+    Raises:
+        InputError: an end is missing or not a number, both are the same, or zero with a logarithmic scale.
     """
     for name in given:
         if name not in known:
@@ -169,7 +178,7 @@ def read_span(key: str, given: Mapping[str, Any], base: Job, known: Sequence[str
 
 def _evenly(span: Span, count: object) -> list[Any]:
     """So many values from one end to the other."""
-    count = _count(f"axes {shown(span.key)}: count", count, 2)
+    count = count_of(f"axes {shown(span.key)}: count", count, 2)
     values = [span.at(k / (count - 1)) for k in range(count)]
     if len(set(values)) < count:
         raise InputError(f"axes {shown(span.key)}: count = {count}: there are fewer whole numbers from from to to")
@@ -184,8 +193,8 @@ def _sampled(spans: Sequence[Span], sample: Mapping[str, Any]) -> Axis:
     if "count" not in sample:
         raise InputError("sample.count is missing: give the number of designs to be drawn")
     method = choice("sample.method", sample.get("method", METHODS[0]), METHODS)
-    count = _count("sample.count", sample["count"], 2)
-    shares = drawn_shares(method, len(spans), count, _count("sample.seed", sample.get("seed", 0), 0))
+    count = count_of("sample.count", sample["count"], 2)
+    shares = drawn_shares(method, len(spans), count, count_of("sample.seed", sample.get("seed", 0), 0))
     return Axis(
         tuple(span.key for span in spans),
         tuple(tuple(span.drawn(float(u)) for span, u in zip(spans, row, strict=True)) for row in shares),
@@ -193,15 +202,10 @@ def _sampled(spans: Sequence[Span], sample: Mapping[str, Any]) -> Axis:
 
 
 def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
-    """(count, dimensions) points in the unit cube [0, 1).
+    """(count, dimensions) points in the unit cube [0, 1), by one of `METHODS`.
 
-    Parameters
-    ----------
-    method : one of `METHODS`; dimensions : of the cube; count : of points; seed : of the random numbers.
-
-    Raises
-    ------
-    InputError : Sobol points, whose count is not a power of two.
+    Raises:
+        InputError: Sobol points, whose count is not a power of two.
     """
     if method == "sobol":
         power = (count - 1).bit_length()
@@ -215,16 +219,13 @@ def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
 
 
 def read_listed(name: str, values: object, base: Job, folder: Path) -> Axis:
-    """An axis of listed values.
+    """An axis of listed values; `base` and `folder` as of `read_axes`.
 
-    Parameters
-    ----------
-    name : of its key; of several keys, "a, b", whose values are rows.
-    values : the list; base, folder : as of `read_axes`.
+    Args:
+        name: of its key; of several keys, "a, b", whose values are rows.
 
-    Raises
-    ------
-    InputError : it is not such a list.
+    Raises:
+        InputError: it is not such a list.
     """
     keys = tuple(key.strip() for key in name.split(","))
     if not isinstance(values, list | tuple) or not values:
@@ -247,7 +248,7 @@ def _placed(key: str, value: Any, folder: Path) -> Any:
     """A value whose files lie in the sweep's folder, unless they are given from the root."""
     if isinstance(value, Mapping):
         return {name: _placed(f"{key}.{name}", item, folder) for name, item in value.items()}
-    return str(folder / value) if key in PATHS and isinstance(value, str) else value
+    return str(folder / value) if key in _PATHS and isinstance(value, str) else value
 
 
 def _plain(base: Job, key: str, given: Any) -> Any:
@@ -264,9 +265,8 @@ def _plain(base: Job, key: str, given: Any) -> Any:
 def _resolved(base: Job, key: str, given: Any) -> Any:
     """What a value becomes in the case; one number that stands for a pair stays one number.
 
-    Raises
-    ------
-    InputError : the case cannot have it.
+    Raises:
+        InputError: the case cannot have it.
     """
     _require_one_turn(key, given)
     found = _at(base.changed({key: given}).case, key)
@@ -302,7 +302,8 @@ def _numbers(value: object) -> tuple[float, ...]:
     return tuple(items) if real else ()
 
 
-def _count(name: str, value: object, least: int) -> int:
+def count_of(name: str, value: object, least: int) -> int:
+    """A count from a table; InputError for anything but a whole number of at least so many."""
     if type(value) is not int or value < least:
         raise InputError(f"{name} = {shown(value)}: give a whole number of at least {least}")
     if value > MOST:

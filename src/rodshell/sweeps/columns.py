@@ -12,11 +12,12 @@ from typing import Any
 
 from rodshell.errors import InputError
 from rodshell.results.results import Results, Verdict, json_schema
+from rodshell.rods.supports import SUPPORTS
 from rodshell.units import shown
 
 FINDINGS = "findings"  # codes of what the verdict says, with blanks between them
 TEXTS = ("verdict", "status", FINDINGS)
-NUMBERS = ("rms_pinned", "rms_clamped", "min_angle_deg", "total_length", "seconds")
+NUMBERS = (*(f"rms_{ends}" for ends in SUPPORTS), "min_angle_deg", "total_length", "seconds")
 STANDARD = (*TEXTS, *NUMBERS)
 JOB = "job"  # its identity, by which its result folder is called
 CONVERGED = "converged"
@@ -30,10 +31,9 @@ Short = dict[str, Any]
 class Column:
     """A key of result.json.
 
-    Parameters
-    ----------
-    name : dotted, such as "bending.pop_up.utilisation".
-    counts : whether it is a list, of which the table shows the number of entries.
+    Args:
+        name: dotted, such as "bending.pop_up.utilisation".
+        counts: whether it is a list, of which the table shows the number of entries.
     """
 
     name: str
@@ -50,14 +50,12 @@ class Column:
 def read_columns(given: object, taken: Sequence[str]) -> tuple[Column, ...]:
     """The columns named in `columns`.
 
-    Parameters
-    ----------
-    given : keys of result.json, or "job".
-    taken : names of the axes' keys.
+    Args:
+        given: keys of result.json, or "job".
+        taken: names of the axes' keys.
 
-    Raises
-    ------
-    InputError : result.json has no such key, it is a table, or it is already a column.
+    Raises:
+        InputError: result.json has no such key, it is a table, or it is already a column.
     """
     if isinstance(given, str) or not isinstance(given, Sequence):
         raise InputError(f'columns = {shown(given)}: give a list of keys of result.json, such as ["net.min_angle_deg"]')
@@ -115,26 +113,26 @@ def _inside(node: Mapping[str, Any]) -> dict[str, Any]:
     for choice in _choices(node):
         found |= choice.get("properties", {})
         each, names = choice.get("additionalProperties"), choice.get("propertyNames", {})
-        if each and isinstance(each, Mapping):
+        if each and isinstance(each, Mapping) and "oneOf" not in each:  # that is a `TableOr`
             found |= dict.fromkeys(names.get("enum", (ANY,)), each)
+        for each in choice.get("patternProperties", {}).values():  # cases have no other supports
+            found |= dict.fromkeys(SUPPORTS, each)
     return found
 
 
 def row_of(results: Results, *, verdict: Verdict | None, seconds: float) -> dict[str, Any]:
     """What is kept of a form: the standard columns, and the short content of its result.json.
 
-    Parameters
-    ----------
-    verdict : None where it was not checked.
-    seconds : processor time [s].
+    Args:
+        verdict: None where it was not checked.
+        seconds: processor time [s].
     """
     drape = results.drape
     return {
         "verdict": verdict.level if verdict else "",
         "status": results.status,
         FINDINGS: " ".join(dict.fromkeys(found.code for found in verdict.findings)) if verdict else None,
-        "rms_pinned": _rms(results, "pinned"),
-        "rms_clamped": _rms(results, "clamped"),
+        **{f"rms_{ends}": _rms(results, ends) for ends in SUPPORTS},
         "min_angle_deg": drape.min_angle_deg if drape else None,
         "total_length": sum(rod.length or 0.0 for rod in results.rods) if results.rods else None,
         "seconds": seconds,
@@ -155,7 +153,7 @@ def number_of(findings: object, codes: Collection[str]) -> int | None:
     return len({*findings.split()} & {*codes}) if isinstance(findings, str) else None
 
 
-def _rms(results: Results, ends: Any) -> float | None:
+def _rms(results: Results, ends: str) -> float | None:
     """The gap over the size of a shell that converged: of no other it means anything."""
     shell, gap = results.pop_up.get(ends), results.agreement.get(ends)
     return gap.rms_relative if shell and gap and shell.status == CONVERGED else None

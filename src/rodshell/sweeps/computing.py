@@ -19,19 +19,18 @@ from rodshell.sweeps.store import ARCHIVES, FOUND, LOST, STORE, Store, replaced
 from rodshell.sweeps.table import CSV, PARQUET, Table, write_parquet
 from rodshell.sweeps.watched import Reply
 
-COPY = "sweep.toml"
-LOOK = 0.2  # s between two calls of progress
+_COPY = "sweep.toml"
+_LOOK = 0.2  # s between two calls of progress
 
 
 @dataclass(frozen=True)
 class Wanted:
     """A job that is wanted.
 
-    Parameters
-    ----------
-    id : its identity; job : itself.
-    archive : the folder for its files; None: they are not wanted.
-    again : whether it is run even if it is finished.
+    Args:
+        id: its identity.
+        archive: the folder for its files; None: they are not wanted.
+        again: whether it is run even if it is finished.
     """
 
     id: str
@@ -43,11 +42,9 @@ class Wanted:
 class Computation:
     """Computes jobs and records them; see `opened_computation`.
 
-    Parameters
-    ----------
-    plan : whose settings count; store : of finished jobs; table : which shows them; engine : that runs them.
-    progress : called at least each fifth of a second.
-    retry : whether jobs that were stopped by a limit, or died, are run again.
+    Args:
+        progress: called at least each fifth of a second.
+        retry: whether jobs that were stopped by a limit, or died, are run again.
     """
 
     def __init__(
@@ -60,27 +57,20 @@ class Computation:
         self._begun = monotonic()
 
     def wanted(self, job: Job, *, kept: bool) -> Wanted:
-        """A job as it is wanted; kept : with its result folder in archives/.
-
-        Raises
-        ------
-        InputError : a file of its case cannot be read.
-        """
+        """A job, perhaps with its result folder in archives/; InputError where a file of its case cannot be read."""
         name = job_identity(job, self._plan.settings.until)
         return Wanted(name, job, self.store.inside(f"{ARCHIVES}/{name}") if kept else None)
 
     def compute(self, wanted: Iterable[Wanted], stage: str, total: int) -> None:
         """Compute those that are not finished.
 
-        Parameters
-        ----------
-        wanted : jobs, taken one by one as there is room for them; the same job may come twice.
-        stage : for the progress; total : number of jobs.
+        Args:
+            wanted: jobs, taken one by one as there is room for them; the same job may come twice.
+            total: number of jobs.
 
-        Raises
-        ------
-        KeyboardInterrupt : what is finished is recorded. OutputError : it cannot be recorded. EngineError : jobs cannot
-            be run.
+        Raises:
+            KeyboardInterrupt: what is finished is recorded. OutputError : it cannot be recorded. EngineError : jobs
+                cannot be run.
         """
         done = 0
         try:
@@ -122,7 +112,7 @@ class Computation:
 
     def _collect(self, stage: str, done: int, total: int) -> None:
         """Wait for jobs, and record those that have finished."""
-        for future in wait(self._running, LOOK, FIRST_COMPLETED).done:
+        for future in wait(self._running, _LOOK, FIRST_COMPLETED).done:
             self._record(future)
         rate = self.computed / max(monotonic() - self._begun, 1e-9)
         speed = f", {rate:.3g} a second, {_time_text((total - done) / rate)} left" if self.computed else ""
@@ -148,21 +138,18 @@ def opened_computation(
 ) -> Iterator[Computation]:
     """A computation into a folder, in which the table shows what is finished however this is left.
 
-    Parameters
-    ----------
-    plan : of the sweep or search; folder : for it; progress, retry : as of `Computation`; address : of a
-        scheduler.
+    Args:
+        retry, address: as of `Computation` and `opened_engine`.
 
-    Raises
-    ------
-    InputError, EngineError : the engine cannot be used. OutputError : the folder cannot be written, is in use, or has
-        files that are not of a sweep. KeyboardInterrupt : with what is finished, in a sentence.
+    Raises:
+        InputError, EngineError: the engine cannot be used. OutputError : the folder cannot be written, is in use, or
+            has files that are not of a sweep. KeyboardInterrupt : with what is finished, in a sentence.
     """
     require_progress(progress)
     _require_own(folder)
     with Store(folder, writing=True) as store:
         if plan.origin.text:
-            with replaced(folder / COPY) as part:
+            with replaced(folder / _COPY) as part:
                 part.write_text(plan.origin.text, encoding="utf-8")
         table = Table(store)
         try:
@@ -183,7 +170,7 @@ def opened_computation(
 def _require_own(folder: Path) -> None:
     """OutputError where there are files of these names that a sweep did not write."""
     if not (folder / STORE).exists():
-        for name in (CSV, PARQUET, REPORT, COPY):
+        for name in (CSV, PARQUET, REPORT, _COPY):
             if (folder / name).exists():
                 raise OutputError(
                     f"will not replace {folder / name}, which is not of a sweep: choose another folder, or move it"

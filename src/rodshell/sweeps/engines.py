@@ -19,43 +19,40 @@ from rodshell.sweeps.watched import TICK, EngineError, Reply, Task, Workers, los
 from rodshell.untrusted import PATIENCE, read_text
 from rodshell.validation import instance
 
-QUEUED = 2  # tasks for each worker: one that runs, one that waits
-HERE_ONLY = "127.0.0.1:0"  # where a local cluster shows its state: dask would have it seen from everywhere
-COUNTED = 5.0  # s between two looks at the size of a cluster
+_QUEUED = 2  # tasks for each worker: one that runs, one that waits
+_HERE = "127.0.0.1:0"  # where a local cluster shows its state: dask would have it seen from everywhere
+_COUNTED = 5.0  # s between two looks at the size of a cluster
 HERE = Workers()  # of a process of dask
 
 
 class Engine:
-    """Runs tasks; `full` says when to wait.
+    """Runs tasks, at the same time `slots` at most.
 
-    Parameters
-    ----------
-    executor : that runs them; workers : of this process; None: those of dask.
-    settings : with the limits of a job.
+    Args:
+        workers: of this process; None: those of dask.
+        settings: with the limits of a job.
     """
 
     def __init__(self, executor: Executor, workers: Workers | None, settings: Settings) -> None:
         self._executor, self._workers, self._settings = executor, workers, settings
 
     def submit(self, task: Task) -> "Future[Reply]":
-        """Run a task."""
         limits = (self._settings.time_limit, self._settings.memory_limit)
-        run = run_here if self._workers is None else self._workers.run
+        run = _run_here if self._workers is None else self._workers.run
         return self._executor.submit(run, task, *limits)
 
     def reply(self, future: "Future[Reply]") -> Reply:
         """What a task that has finished came to.
 
-        Raises
-        ------
-        EngineError : no task can be run any more. OutputError : a form cannot be saved.
+        Raises:
+            EngineError: no task can be run any more. OutputError : a form cannot be saved.
         """
         return future.result()
 
     @property
     def slots(self) -> int:
         """Number of tasks that it takes at the same time."""
-        return QUEUED * self._settings.workers
+        return _QUEUED * self._settings.workers
 
 
 class DaskEngine(Engine):
@@ -64,7 +61,7 @@ class DaskEngine(Engine):
     def __init__(self, client: Any, settings: Settings) -> None:
         super().__init__(client.get_executor(pure=False, retries=0), None, settings)
         self._client = client
-        self._slots, self._counted = 0, -COUNTED
+        self._slots, self._counted = 0, -_COUNTED
 
     def reply(self, future: "Future[Reply]") -> Reply:
         """As of `Engine`; dask has tried a task several times whose workers went away."""
@@ -80,12 +77,12 @@ class DaskEngine(Engine):
     @property
     def slots(self) -> int:
         """Number of tasks that the cluster takes now."""
-        if monotonic() - self._counted > COUNTED:
-            self._slots, self._counted = QUEUED * max(sum(self._client.nthreads().values()), 1), monotonic()
+        if monotonic() - self._counted > _COUNTED:
+            self._slots, self._counted = _QUEUED * max(sum(self._client.nthreads().values()), 1), monotonic()
         return self._slots
 
 
-def run_here(task: Task, time_limit: float | None, memory_limit: float | None) -> Reply:
+def _run_here(task: Task, time_limit: float | None, memory_limit: float | None) -> Reply:
     """Run a task in a process that belongs to this thread."""
     return HERE.run(task, time_limit, memory_limit)
 
@@ -94,14 +91,12 @@ def run_here(task: Task, time_limit: float | None, memory_limit: float | None) -
 def opened_engine(settings: Settings, address: str | None = None) -> Iterator[Engine]:
     """The engine of a sweep; when it is left, jobs that still run are stopped.
 
-    Parameters
-    ----------
-    address : of a dask scheduler, or its scheduler file, which implies that engine; None: the scheduler that dask's own
-        settings name (DASK_SCHEDULER_ADDRESS), else a local one. It can run any program here.
+    Args:
+        address: of a dask scheduler, or its scheduler file, which implies that engine; None: the scheduler that dask's
+            own settings name (DASK_SCHEDULER_ADDRESS), else a local one. It can run any program here.
 
-    Raises
-    ------
-    InputError : dask is not installed, or not reached. EngineError : no process can be started.
+    Raises:
+        InputError: dask is not installed, or not reached. EngineError : no process can be started.
     """
     with ExitStack() as stack:
         if address is not None:
@@ -130,7 +125,7 @@ def _dask(settings: Settings, address: str | None) -> Iterator[Engine]:
             HERE.open()
             cluster = LocalCluster(
                 n_workers=1, threads_per_worker=settings.workers, processes=False, memory_limit=0,
-                dashboard_address=HERE_ONLY, worker_dashboard_address=HERE_ONLY, scheduler_kwargs={"dashboard": False},
+                dashboard_address=_HERE, worker_dashboard_address=_HERE, scheduler_kwargs={"dashboard": False},
             )  # fmt: skip
             place = stack.enter_context(cluster)
         else:

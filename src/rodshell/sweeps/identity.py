@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rodshell.case.load import FILE_KEYS
+from rodshell.case.load import named_files
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.schema import written
@@ -22,22 +22,14 @@ DIGITS = 32
 
 
 def job_identity(job: Job, until: str) -> str:
-    """32 hexadecimal digits of SHA-256.
+    """`DIGITS` hexadecimal digits of SHA-256, of a job whose case a file can describe and the last stage that is run.
 
-    Parameters
-    ----------
-    job : of a case that a file can describe.
-    until : the last stage that is run.
-
-    Raises
-    ------
-    InputError : a file of the case cannot be read.
+    Raises:
+        InputError: a file of the case cannot be read.
     """
     tables: dict[str, Any] = written(job.case)
-    for table, keys in FILE_KEYS.items():
-        for key in keys:
-            if key in tables.get(table, ()):
-                tables[table][key] = content_digest(Path(tables[table][key]))
+    for table, key in named_files(tables):
+        table[key] = content_digest(Path(table[key]))
     content = json.dumps([program_version(), until, tables], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()[:DIGITS]
 

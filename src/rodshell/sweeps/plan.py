@@ -2,70 +2,64 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from importlib.util import find_spec
 from itertools import product
 from math import prod
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from rodshell.case import BUILT_IN
 from rodshell.case.load import flattened, toml_of
 from rodshell.errors import InputError
 from rodshell.figures.findings import CODES
 from rodshell.job import Job
+from rodshell.quantities import Duration, Memory, Value
+from rodshell.schema import Place, read
 from rodshell.sweeps.axes import BASE, Axis, read_axes
 from rodshell.sweeps.columns import NUMBERS, Column, read_columns
-from rodshell.units import parse_quantity, shown
+from rodshell.units import shown
 from rodshell.untrusted import read_text
 from rodshell.validation import choice, choices_of, file_path
 
-EngineName = Literal["processes", "dask"]
-Keep = Literal["none", "best", "all"]
-Until = Literal["pop-up", "fabrication"]
 Source = str | PathLike[str] | Mapping[str, Any]
 GENERATION = "generation"
 TABLES = ("base", "columns", "axes", "sample", "run")
-RUN = ("engine", "workers", "keep", "best", "without", "until", "time_limit", "memory_limit")
+
+
+def _workers(given: object) -> int:
+    if type(given) is not int or not 1 <= given <= 1024:
+        raise ValueError("give a number of processes from 1 to 1024")
+    return given
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How jobs are run.
+    """How jobs are run: the table [run]."""
 
-    Parameters
-    ----------
-    engine : "processes" on this machine, or "dask".
-    workers : number of jobs at the same time, on this machine.
-    keep : which forms are kept as result folders.
-    best : the column whose smallest value is the best form's.
-    without : codes of findings; a form whose verdict has any of them is not the best.
-    until : the last stage of a job, see `Job.run`; with "pop-up" there is no verdict.
-    time_limit : longest time of one job [s]; memory_limit : largest memory of one job [B]; None: no limit.
-    """
-
-    engine: EngineName = "processes"
-    workers: int = 1
-    keep: Keep = "none"
-    best: str = "rms_pinned"
-    without: tuple[str, ...] = ()
-    until: Until = "fabrication"
-    time_limit: float | None = None
-    memory_limit: float | None = None
+    engine: Annotated[Literal["processes", "dask"], "processes of this machine, or a dask cluster"] = "processes"
+    workers: Annotated[int, Value(_workers), "number of jobs at the same time, on this machine"] = 1
+    keep: Annotated[Literal["none", "best", "all"], "forms that are kept as result folders"] = "none"
+    best: Annotated[str, "column whose smallest value is the best form's"] = "rms_pinned"
+    without: Annotated[tuple[str, ...], Value(tuple), "codes of findings that the best form has none of"] = ()
+    until: Annotated[
+        Literal["pop-up", "fabrication"], "last stage of a job, as of `Job.run`; a pop-up has no verdict"
+    ] = "fabrication"
+    time_limit: Annotated[Duration | None, "longest time of one job"] = None
+    memory_limit: Annotated[Memory | None, "largest memory of one job"] = None
 
 
 @dataclass(frozen=True)
 class Origin:
     """What a plan is read from.
 
-    Parameters
-    ----------
-    name : of the file, for titles and the default folder.
-    text : the file as it was given; "" for a mapping.
-    folder : in which its files lie.
-    bases : its jobs by the name that the column "base" shows, at least one.
+    Args:
+        name: of the file, for titles and the default folder.
+        text: the file as it was given; "" for a mapping.
+        folder: in which its files lie.
+        bases: its jobs by the name that the column "base" shows, at least one.
     """
 
     name: str
@@ -95,11 +89,10 @@ class Origin:
 class Plan:
     """What the plan of a sweep and that of a search have in common.
 
-    Parameters
-    ----------
-    origin : what it was read from.
-    keys : by whose values a design is known: of the case, or "base", or "generation".
-    columns : in addition to those of every table.
+    Args:
+        origin: what it was read from.
+        keys: by whose values a design is known: of the case, or "base", or "generation".
+        columns: in addition to those of every table.
     """
 
     origin: Origin
@@ -110,18 +103,14 @@ class Plan:
     def job(self, values: Sequence[Any]) -> Job:
         """The job of a design, by the values of its keys.
 
-        Raises
-        ------
-        InputError : no case can have them together.
+        Raises:
+            InputError: no case can have them together.
         """
         base, changes = self._changes(values)
         return self.origin.bases[base].changed(changes) if changes else self.origin.bases[base]
 
     def command(self, values: Sequence[Any]) -> str | None:
-        """The command that forms a design alone; None for a base that no command can name.
-
-        values : of its keys.
-        """
+        """The command that forms a design alone, by the values of its keys; None for a base that none can name."""
         base, changes = self._changes(values)
         if (source := self.origin.source(base)) is None:
             return None
@@ -141,9 +130,8 @@ class Plan:
 class SweepPlan(Plan):
     """A whole sweep.
 
-    Parameters
-    ----------
-    axes : the first one changes slowest.
+    Args:
+        axes: the first one changes slowest.
     """
 
     axes: tuple[Axis, ...]
@@ -156,9 +144,8 @@ class SweepPlan(Plan):
     def designs(self) -> Iterator[tuple[tuple[Any, ...], Job]]:
         """Values of the keys, and the job, of each design in the order of the axes, made one by one.
 
-        Raises
-        ------
-        InputError : a case cannot have these values.
+        Raises:
+            InputError: a case cannot have these values.
         """
         for rows in product(*(axis.rows for axis in self.axes)):
             values = tuple(value for row in rows for value in row)
@@ -168,13 +155,11 @@ class SweepPlan(Plan):
 def read_plan(source: Source) -> SweepPlan:
     """The plan of a sweep.
 
-    Parameters
-    ----------
-    source : path of a TOML file, or its content as a mapping.
+    Args:
+        source: path of a TOML file, or its content as a mapping.
 
-    Raises
-    ------
-    InputError : it cannot be read or used; in one sentence.
+    Raises:
+        InputError: it cannot be read or used; in one sentence.
     """
     origin = read_origin(source, TABLES)
     given = origin.tables
@@ -193,13 +178,11 @@ def read_plan(source: Source) -> SweepPlan:
 def read_origin(source: Source, tables: Sequence[str]) -> Origin:
     """What a plan is read from.
 
-    Parameters
-    ----------
-    source : as of `read_plan`; tables : that the file may have.
+    Args:
+        tables: that the file may have.
 
-    Raises
-    ------
-    InputError : it cannot be read, has an unknown key, or its base cannot be used.
+    Raises:
+        InputError: it cannot be read, has an unknown key, or its base cannot be used.
     """
     name, text, folder, given = _opened(source)
     known("", given, tables)
@@ -222,12 +205,10 @@ def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:
     sources = given[BASE] if isinstance(given[BASE], list | tuple) else [given[BASE]]
     bases = dict[str, Job]()
     for number, source in enumerate(sources, start=1):
-        if isinstance(source, Job):
-            name, job = source.case.drawings.name or f"{source.case.target.kind} {number}", source
-        else:
-            inside = isinstance(source, str) and source not in BUILT_IN and file_path(BASE, folder / source).exists()
-            job = Job.load(folder / source if inside else source)
-            name = source if isinstance(source, str) else job.case.drawings.name or f"{job.case.target.kind} {number}"
+        inside = isinstance(source, str) and source not in BUILT_IN and file_path(BASE, folder / source).exists()
+        job = source if isinstance(source, Job) else Job.load(folder / source if inside else source)
+        called = job.case.drawings.name or f"{job.case.target.kind} {number}"
+        name = source if isinstance(source, str) else called
         if name in bases:
             raise InputError(f"base: {shown(name)} occurs twice: leave one out")
         job.to_toml()  # workers read it
@@ -242,50 +223,26 @@ def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:
 def read_settings(given: Mapping[str, Any], columns: Sequence[str]) -> Settings:
     """The table [run].
 
-    Parameters
-    ----------
-    given : the table; columns : names of columns in addition to those of every sweep.
+    Args:
+        columns: names of columns in addition to those of every sweep.
 
-    Raises
-    ------
-    InputError : an unknown key, or a value that cannot be used.
+    Raises:
+        InputError: an unknown key, or a value that cannot be used.
     """
     if "address" in given:
         raise InputError(
             f"run.address = {shown(given['address'])}: a scheduler can run any program here, so that no file names it: "
             "leave it out, and type --address ADDRESS where you trust what answers there"
         )
-    known("run", given, RUN)
-    engine: EngineName = choice("run.engine", given.get("engine", "processes"), get_args(EngineName))
-    workers = given.get("workers", 1)
-    if type(workers) is not int or not 1 <= workers <= 1024:
-        raise InputError(f"run.workers = {shown(workers)}: give a number of processes from 1 to 1024")
-    until = choice("run.until", given.get("until", "fabrication"), get_args(Until))
+    known("run", given, [each.name for each in fields(Settings)])
     without = choices_of("run.without", given.get("without", ()), tuple(CODES))
-    if without and until == "pop-up":
+    settings = read(Settings, {**given, "without": without}, Place("run"))
+    choice("run.best", settings.best, (*NUMBERS, *columns))
+    if settings.without and settings.until == "pop-up":
         raise InputError('run.without needs the verdict, which run.until = "pop-up" leaves out: leave one out')
-    return Settings(
-        engine=engine,
-        workers=workers,
-        keep=choice("run.keep", given.get("keep", "none"), get_args(Keep)),
-        best=choice("run.best", given.get("best", "rms_pinned"), (*NUMBERS, *columns)),
-        without=without,
-        until=until,
-        time_limit=_limit(given, "time_limit", "time"),
-        memory_limit=_limit(given, "memory_limit", "memory"),
-    )
-
-
-def _limit(given: Mapping[str, Any], name: str, kind: Literal["time", "memory"]) -> float | None:
-    value = given.get(name)
-    if value is None:
-        return None
-    limit = parse_quantity(value, kind, f"run.{name}")
-    if limit <= 0:
-        raise InputError(f"run.{name} = {shown(value)}: must be larger than zero")
-    if kind == "memory" and find_spec("psutil") is None:
-        raise InputError(f'run.{name} needs the package psutil: pip install "rodshell[sweep]"')
-    return limit
+    if settings.memory_limit is not None and find_spec("psutil") is None:
+        raise InputError('run.memory_limit needs the package psutil: pip install "rodshell[sweep]"')
+    return settings
 
 
 def table(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -297,12 +254,7 @@ def table(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 
 def known(name: str, given: Mapping[str, Any], names: Sequence[str]) -> None:
-    """InputError for a key that a table does not have.
-
-    Parameters
-    ----------
-    name : of the table, "" for the whole file; given : the table; names : of the keys that it has.
-    """
+    """InputError for a key that a table does not have; its name is "" for the whole file."""
     for key in given:
         if key not in names:
             near = get_close_matches(str(key), names, n=1)

@@ -17,7 +17,7 @@ from rodshell.results import read
 from rodshell.sweeps.columns import JOB
 from rodshell.sweeps.plan import GENERATION, Plan
 from rodshell.sweeps.store import ARCHIVES, FOUND, Finished, Store, replaced
-from rodshell.sweeps.table import header_of, in_short, names_of, plain, table_rows
+from rodshell.sweeps.table import Sheet, in_short, plain
 
 REPORT = "report.html"
 SHAPES = 12  # pictures at most
@@ -27,14 +27,14 @@ SHAPES = 12  # pictures at most
 class Page:
     """What a report says.
 
-    Parameters
-    ----------
-    kind : of the plan, in its heading; plan : whose designs are shown; summary : lines in its heading.
-    first : the two columns that are shown first, across and up.
-    measures : columns that say how good a design is; of two the front is shown.
-    larger : those of them that are to be large, and not small.
-    counts : whether a design may be on the front.
-    shapes : jobs whose shapes are shown, kept in archives/; caption : what they are, in a sentence.
+    Args:
+        kind, summary: in its heading.
+        first: the two columns that are shown first, across and up.
+        measures: columns that say how good a design is; of two the front is shown.
+        larger: those of them that are to be large, and not small.
+        counts: whether a design may be on the front.
+        shapes: jobs whose shapes are shown, kept in archives/.
+        caption: what they are, in a sentence.
     """
 
     kind: str
@@ -57,15 +57,10 @@ def require_plotly() -> None:
 
 
 def write_report(store: Store, page: Page) -> Path:
-    """Write report.html; returns its path.
+    """Write report.html; its path.
 
-    Parameters
-    ----------
-    store : of the sweep, whose designs it shows; page : what it says.
-
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises:
+        OutputError: it cannot be written.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
@@ -93,18 +88,18 @@ def write_report(store: Store, page: Page) -> Path:
 
 def _data(store: Store, page: Page) -> dict[str, Any]:
     """The table by column, and for each design its report, its link to the studio and its command."""
-    keys, columns = header_of(store)
-    names = names_of(keys, columns)
-    rows = list(table_rows(store, columns))
-    designs = [(design.job if design.outcome == FOUND else None, page.counts(design)) for design in store.finished()]
-    cells = {name: [plain(row[k]) for row in rows] for k, name in enumerate(names) if name != JOB}
-    given = [row[: len(keys)] for row in rows]
+    sheet = Sheet(store)
+    designs, rows = list[tuple[str | None, bool, list[Any]]](), list[dict[str, Any]]()
+    for design, cells in sheet.rows():
+        designs.append((design.job if design.outcome == FOUND else None, page.counts(design), design.keys))
+        rows.append(cells)
+    columns = {name: [plain(cells[name]) for cells in rows] for name in sheet.names if name != JOB}
     return {
-        "keys": keys, "rows": cells, "first": list(page.first), "larger": list(page.larger),
-        "usable": [k for k, (_, counts) in enumerate(designs) if counts],
-        "reports": [job and _report(store, job) for job, _ in designs],
-        "studio": [_studio(page.plan, values) for values in given],
-        "commands": [page.plan.command(values) for values in given],
+        "keys": sheet.keys, "rows": columns, "first": list(page.first), "larger": list(page.larger),
+        "usable": [k for k, (_, counts, _) in enumerate(designs) if counts],
+        "reports": [job and _report(store, job) for job, _, _ in designs],
+        "studio": [_studio(page.plan, values) for _, _, values in designs],
+        "commands": [page.plan.command(values) for _, _, values in designs],
     }  # fmt: skip
 
 
@@ -124,11 +119,9 @@ def _studio(plan: Plan, values: Sequence[Any]) -> str | None:
 
 def _shapes(store: Store, page: Page) -> Iterable[dict[str, str]]:
     """Picture, link and caption of each shape."""
-    keys, columns = header_of(store)
-    names = names_of(keys, columns)
-    rows = zip(store.finished(), table_rows(store, columns), strict=True)
-    by_job = {design.job: dict(zip(names, row, strict=True)) for design, row in rows if design.job in page.shapes}
-    changing = [key for key in keys if len({json.dumps(row[key]) for row in by_job.values()}) > 1]
+    sheet = Sheet(store)
+    by_job = {design.job: cells for design, cells in sheet.rows() if design.job in page.shapes}
+    changing = [key for key in sheet.keys if len({json.dumps(row[key]) for row in by_job.values()}) > 1]
     said = [*(key for key in changing if key != GENERATION), *page.measures, "verdict"]
     for job in page.shapes:
         folder = store.folder / ARCHIVES / job

@@ -28,20 +28,18 @@ from rodshell.sweeps.table import header_notes, in_short, write_csv
 from rodshell.validation import file_path
 
 FRONT = "front.csv"
-MOST_SHOWN = 10  # designs of the front in text
-DIFFERENCE, CROSSED = 0.6, 0.9
+_MOST_SHOWN = 10  # designs of the front in text
 
 
 @dataclass(frozen=True)
 class Optimised:
     """What a search has come to.
 
-    Parameters
-    ----------
-    designs : their number; computed : jobs that were computed now.
-    feasible : number of designs that converged and keep all constraints.
-    front : of those, the ones that no other is better than in all objectives, the smallest first objective first: by
-        name the values of the variables' keys, objectives, verdict, further columns, and the job.
+    Args:
+        computed: number of jobs that were computed now.
+        feasible: number of designs that converged and keep all constraints.
+        front: of those, the ones that no other is better than in all objectives, the smallest first objective first: by
+            name the values of the variables' keys, objectives, verdict, further columns, and the job.
     """
 
     folder: Path
@@ -60,10 +58,10 @@ class Optimised:
         if not self.front:
             return ""
         names = [name for name in self.front[0] if name != JOB]
-        cells = [names, *([in_short(design[name]) for name in names] for design in self.front[:MOST_SHOWN])]
+        cells = [names, *([in_short(design[name]) for name in names] for design in self.front[:_MOST_SHOWN])]
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
-        more = [f"and {len(self.front) - MOST_SHOWN} more in {FRONT}"] if len(self.front) > MOST_SHOWN else []
+        more = [f"and {len(self.front) - _MOST_SHOWN} more in {FRONT}"] if len(self.front) > _MOST_SHOWN else []
         title = "the best of them" if len(self.front) == 1 else "those that no other is better than in all objectives"
         return "\n".join([f"{title}:", *lines, *more])
 
@@ -81,23 +79,18 @@ def optimise(
 
     With one objective by differential evolution, with several by NSGA-II, both of pymoo.
 
-    Parameters
-    ----------
-    source : path of a search file, or its content as a mapping, see docs/sweeps.md.
-    out : folder of the search. What an earlier run has finished there is not computed again.
-    retry : run jobs again that were stopped by a limit, or whose process died.
-    report : also write report.html, and keep the results of up to twelve designs of the front.
-    address : as of `sweep`.
-    progress : called as progress(stage, detail, 0.0).
+    Args:
+        source: path of a search file, or its content as a mapping, see docs/sweeps.md.
+        out: folder of the search. What an earlier run has finished there is not computed again.
+        report: also write report.html, and keep the results of up to twelve designs of the front.
+        retry, address, progress: as of `sweep`.
 
-    Returns
-    -------
-    The best designs, also in front.csv; all are in table.csv, see `read_sweep`.
+    Returns:
+        The best designs, also in front.csv; all are in table.csv, see `read_sweep`.
 
-    Raises
-    ------
-    InputError : the search cannot be used, or pymoo is not installed. OutputError : the folder cannot be written, or is
-        in use. KeyboardInterrupt : the same call continues.
+    Raises:
+        InputError: the search cannot be used, or pymoo is not installed. OutputError : the folder cannot be written, or
+            is in use. KeyboardInterrupt : the same call continues.
     """
     plan = source if isinstance(source, SearchPlan) else read_search(source)
     folder = file_path("out", out)
@@ -117,7 +110,7 @@ def optimise(
         computation.compute(computation.archived(kept), "best designs", len(kept))
         names = list(dict.fromkeys([*plan.keys[1:], *objectives, "verdict", *(c.name for c in plan.columns), JOB]))
         rows = tuple(dict(zip(names, _cells(plan, design, names), strict=True)) for design in front)
-        write_csv(folder / FRONT, names, (list(row.values()) for row in rows))
+        write_csv(folder / FRONT, names, rows)
         found = Optimised(folder, store.count(), computed, feasible, rows)
         if report:
             page = Page(
@@ -138,15 +131,9 @@ def optimise(
 def _algorithm(plan: SearchPlan) -> AskTell:
     dimensions, violations = len(plan.variables), 1 + len(plan.constraints)
     first = drawn_shares("latin-hypercube", dimensions, plan.population, plan.seed)
-    lower, upper = np.zeros(dimensions), np.ones(dimensions)
+    cube = np.zeros(dimensions), np.ones(dimensions)
     try:
-        if len(plan.objectives) == 1:
-            return AskTell.differential_evolution(
-                lower, upper, first, constraints=violations, seed=plan.seed, difference=DIFFERENCE, crossed=CROSSED
-            )
-        return AskTell.nsga2(
-            lower, upper, first, objectives=len(plan.objectives), constraints=violations, seed=plan.seed
-        )
+        return AskTell(*cube, first, objectives=len(plan.objectives), constraints=violations, seed=plan.seed)
     except ImportError:
         raise InputError('optimise needs the package pymoo: pip install "rodshell[optimise]"') from None
 
@@ -193,10 +180,6 @@ def front_of(plan: SearchPlan, store: Store) -> tuple[list[Finished], int]:
     """The designs that keep all constraints and that no other is better than, and the number that keep them.
 
     Of designs that are as good in every objective, the first is taken.
-
-    Parameters
-    ----------
-    plan : of the search; store : with its designs.
     """
     kept = [
         (_judged(plan, design.outcome, design.row)[0], design)

@@ -11,14 +11,14 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.figures.findings import CODES
 from rodshell.job import Job
-from rodshell.sweeps.axes import Axis, Span, flat_keys, read_listed, read_span
+from rodshell.sweeps.axes import Axis, Span, count_of, flat_keys, read_listed, read_span
 from rodshell.sweeps.columns import FINDINGS, NUMBERS, STANDARD, number_of, read_column, read_columns
 from rodshell.sweeps.plan import GENERATION, Plan, Source, known, read_origin, read_settings, table
 from rodshell.units import shown
 from rodshell.validation import choices_of
 
 TABLES = ("base", "columns", "variables", "objectives", "constraints", "search", "run")
-BELOW_ONE = 1 - 1e-12
+COUNTS = {"population": (24, 4), "generations": (20, 1), "seed": (0, 0)}  # of a search, and the least of each
 FAR = 1e3  # violation of a design without a form: larger than that of any constraint
 
 
@@ -34,11 +34,10 @@ class Objective:
 class Constraint:
     """What a column must be.
 
-    Parameters
-    ----------
-    low, high : bounds of a number; None: there is none.
-    words : that it may be, in place of bounds.
-    without : codes of which the column "findings" may have none.
+    Args:
+        low, high: bounds of a number; None: there is none.
+        words: that it may be, in place of bounds.
+        without: codes of which the column "findings" may have none.
     """
 
     column: str
@@ -61,19 +60,13 @@ class Constraint:
         return min(max(below, above, 0.0), FAR)
 
 
-def keys_of(variable: Span | Axis) -> tuple[str, ...]:
-    """The keys of a variable, several where they change together."""
-    return variable.keys if isinstance(variable, Axis) else (variable.key,)
-
-
 @dataclass(frozen=True)
 class SearchPlan(Plan):
     """A whole search; its keys are "generation" and those of its variables.
 
-    Parameters
-    ----------
-    variables : intervals, or lists of values.
-    objectives, constraints : on columns of the table.
+    Args:
+        variables: intervals, or lists of values.
+        objectives, constraints: on columns of the table.
     """
 
     variables: tuple[Span | Axis, ...]
@@ -85,13 +78,8 @@ class SearchPlan(Plan):
 
     def values(self, generation: int, point: Floats) -> tuple[Any, ...]:
         """Values of the keys at a point (n,) of the unit cube."""
-        found: list[Any] = [generation]
-        for variable, share in zip(self.variables, point.tolist(), strict=True):
-            if isinstance(variable, Axis):
-                found += variable.rows[min(int(share * len(variable.rows)), len(variable.rows) - 1)]
-            else:
-                found.append(variable.drawn(min(share, BELOW_ONE) if variable.whole else share))
-        return tuple(found)
+        rows = (variable.row(share) for variable, share in zip(self.variables, point.tolist(), strict=True))
+        return (generation, *(value for row in rows for value in row))
 
 
 def read_search(source: Source) -> SearchPlan:
@@ -107,7 +95,7 @@ def read_search(source: Source) -> SearchPlan:
         raise InputError(
             '[variables] is missing: give at least one key, such as "layout.spacing" = { from = "25 mm", to = "35 mm" }'
         )
-    keys = (GENERATION, *(key for variable in variables for key in keys_of(variable)))
+    keys = (GENERATION, *(key for variable in variables for key in variable.keys))
     objectives = _objectives(table(given, "objectives"))
     constraints = tuple(_constraint(key, value) for key, value in _flat_constraints(table(given, "constraints")))
     columns = read_columns(given.get("columns", ()), keys)
@@ -119,11 +107,11 @@ def read_search(source: Source) -> SearchPlan:
         raise InputError("run.best: a search has objectives, which say what is best: leave it out")
     if "without" in run:
         raise InputError("run.without: a search has constraints: give findings = { without = [...] } there")
-    known("search", search, ("population", "generations", "seed"))
+    known("search", search, tuple(COUNTS))
     plan = SearchPlan(
         origin, keys, columns, read_settings(run, [column.name for column in columns]),
         variables, objectives, constraints,
-        _whole(search, "population", 24, 4), _whole(search, "generations", 20, 1), _whole(search, "seed", 0, 0),
+        *(count_of(f"search.{name}", search.get(name, default), least) for name, (default, least) in COUNTS.items()),
     )  # fmt: skip
     for corner in (0.0, 0.5, 1.0):
         plan.job(plan.values(1, np.full(len(variables), corner)))
@@ -183,10 +171,3 @@ def _constraint(column: str, given: Any) -> Constraint:
         if not isinstance(bound, int | float) or isinstance(bound, bool):
             raise InputError(f"constraints {shown(column)}: {name} = {shown(bound)}: give a number in SI")
     return Constraint(column, low=given.get("min"), high=given.get("max"))
-
-
-def _whole(given: Mapping[str, Any], name: str, default: int, least: int) -> int:
-    value = given.get(name, default)
-    if type(value) is not int or value < least:
-        raise InputError(f"search.{name} = {shown(value)}: give a whole number of at least {least}")
-    return value

@@ -22,8 +22,8 @@ from rodshell.untrusted import limit, raised
 
 STORE, LOCK, ARCHIVES = "sweep.sqlite", "sweep.lock", "archives"  # in the folder of a sweep
 FORMAT = 1
-CACHE = 500  # kB of the coordinator's memory
-LOG = 200  # pages of SQLite's log, which is then merged into the file
+_CACHE = 500  # kB of the coordinator's memory
+_LOG = 200  # pages of SQLite's log, which is then merged into the file
 PAGE = 8192  # B: some rows fit on each, so that little of it is left empty
 TABLES = """
 CREATE TABLE jobs (id TEXT PRIMARY KEY, outcome TEXT NOT NULL, row BLOB NOT NULL);
@@ -33,7 +33,7 @@ CREATE TABLE notes (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 """
 FOUND = "found"
 LOST = ("stopped", "crashed")  # by a limit or with its process: another try may end differently
-OUTCOMES = (FOUND, "refused", "failed", *LOST)
+_OUTCOMES = (FOUND, "refused", "failed", *LOST)
 JOB = re.compile(r"\w+")  # that was found: the name of its folder
 KINDS = {
     "status": str,
@@ -42,7 +42,7 @@ KINDS = {
     "results": dict,
 }  # of what is kept of a job; all else are numbers
 ROW = 20e6  # bytes of what is kept of a job
-MOST_OF_SQLITE = 1e9  # bytes of a value that SQLite can be asked for
+_MOST_OF_SQLITE = 1e9  # bytes of a value that SQLite can be asked for
 REMEDY = "move it to compute all designs again, or choose another folder"
 
 
@@ -50,12 +50,12 @@ REMEDY = "move it to compute all designs again, or choose another folder"
 class Finished:
     """A design whose job is finished.
 
-    Parameters
-    ----------
-    position : of the design; job : its identity.
-    keys : values of the axes' keys, in JSON's types.
-    outcome : "found", "refused" (bad input), "failed" (an error of the program), "stopped" (by a limit) or "crashed".
-    row : what is kept of it, see `columns.row_of`; of a job that found no form its status alone.
+    Args:
+        job: its identity.
+        keys: values of the axes' keys, in JSON's types.
+        outcome: "found", "refused" (bad input), "failed" (an error of the program), "stopped" (by a limit) or
+            "crashed".
+        row: what is kept of it, see `columns.row_of`; of a job that found no form its status alone.
     """
 
     position: int
@@ -68,13 +68,11 @@ class Finished:
 class Store:
     """The file of a sweep; use it in a `with`.
 
-    Parameters
-    ----------
-    writing : whether jobs are recorded; then the folder is made, and no other sweep can use it.
+    Args:
+        writing: whether jobs are recorded; then the folder is made, and no other sweep can use it.
 
-    Raises
-    ------
-    OutputError : it cannot be opened, or another sweep is writing there.
+    Raises:
+        OutputError: it cannot be opened, or another sweep is writing there.
     """
 
     def __init__(self, folder: Path, *, writing: bool) -> None:
@@ -110,8 +108,8 @@ class Store:
                 raise OutputError(f"{self.path} was written by another version of rodshell: choose another folder")
             if self.writing:
                 self._connection.execute("PRAGMA synchronous = NORMAL")
-                self._connection.execute(f"PRAGMA cache_size = -{CACHE}")
-                self._connection.execute(f"PRAGMA wal_autocheckpoint = {LOG}")
+                self._connection.execute(f"PRAGMA cache_size = -{_CACHE}")
+                self._connection.execute(f"PRAGMA wal_autocheckpoint = {_LOG}")
 
     def __exit__(self, *_: object) -> None:
         for connection in (self._connection, self._lock):
@@ -163,9 +161,8 @@ class Store:
     def inside(self, name: str) -> Path:
         """A path in the folder.
 
-        Raises
-        ------
-        OutputError : it leads outside by a link.
+        Raises:
+            OutputError: it leads outside by a link.
         """
         path = self.folder / name
         if not path.resolve().is_relative_to(self.folder.resolve()):
@@ -188,12 +185,10 @@ class Store:
     # Designs
 
     def plan(self, designs: Iterable[tuple[Sequence[Any], str]], *, notes: Mapping[str, str] | None = None) -> None:
-        """Write the designs of the sweep in place of earlier ones, all or none.
+        """Write the designs of the sweep in place of earlier ones, all or none, with notes by their names.
 
-        Parameters
-        ----------
-        designs : values of the keys, and the identity of the job.
-        notes : by name, to be noted with them.
+        Args:
+            designs: values of the keys, and the identity of the job.
         """
         self._write(designs, notes or {}, more=False)
 
@@ -233,7 +228,7 @@ class Store:
         query = "SELECT position, job, keys, outcome, row FROM designs JOIN jobs ON job = id ORDER BY position"
         with self.errors():
             for position, job, keys, outcome, row in self._connection.execute(query):
-                if outcome not in OUTCOMES or (outcome == FOUND and not JOB.fullmatch(job)):
+                if outcome not in _OUTCOMES or (outcome == FOUND and not JOB.fullmatch(job)):
                     raise ValueError(f"its design {position} is of no job")
                 yield Finished(position, job, read_json(keys, list), outcome, _read_row(row))
 
@@ -252,16 +247,7 @@ class Store:
             return _read_row(row)
 
     def record(self, job: str, outcome: str, row: Mapping[str, Any]) -> None:
-        """A job is finished.
-
-        Parameters
-        ----------
-        job : its identity; outcome, row : see `Finished`.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
-        """
+        """A job is finished, see `Finished`; OutputError where that cannot be written."""
         try:
             content = json.dumps(row, separators=(",", ":"), allow_nan=False)
         except ValueError:
@@ -275,7 +261,7 @@ class Store:
 def _opened(path: Path, mode: str) -> sqlite3.Connection:
     """A database; `mode` as of its URIs."""
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", isolation_level=None, uri=True, timeout=30)
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, int(min(limit(ROW), MOST_OF_SQLITE)))
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, int(min(limit(ROW), _MOST_OF_SQLITE)))
     return connection
 
 
@@ -295,9 +281,8 @@ def _require_plain(path: Path, *, most: int | None = None) -> None:
 def read_json(text: str | bytes, kind: type) -> Any:
     """Content of a store.
 
-    Raises
-    ------
-    ValueError : it is not JSON of this kind; a number is not finite, or a text has half of a character.
+    Raises:
+        ValueError: it is not JSON of this kind; a number is not finite, or a text has half of a character.
     """
     text = text if isinstance(text, str) else text.decode()
     found = json.loads(text, parse_float=_finite, parse_constant=_finite, parse_int=_whole)
@@ -325,7 +310,7 @@ def _whole(text: str) -> int:
 def _read_row(packed: bytes) -> dict[str, Any]:
     """What is kept of a job."""
     unpacking = zlib.decompressobj()
-    content = unpacking.decompress(packed, int(min(limit(ROW), MOST_OF_SQLITE)))
+    content = unpacking.decompress(packed, int(min(limit(ROW), _MOST_OF_SQLITE)))
     if unpacking.unconsumed_tail:
         raise ValueError(f"a job has more than {limit(ROW) / 1e6:.4g} MB, {raised(ROW, 2 * limit(ROW))}")
     row: dict[str, Any] = read_json(content, dict)
@@ -340,9 +325,8 @@ def _read_row(packed: bytes) -> dict[str, Any]:
 def replaced(file: Path) -> Iterator[Path]:
     """A path to write to, which then takes the place of a file of the sweep in one step.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises:
+        OutputError: it cannot be written.
     """
     part = file.with_name(f".{file.name}.part")
     try:

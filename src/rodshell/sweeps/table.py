@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
@@ -25,44 +25,44 @@ PAUSE = 2.0  # s between two of them at least
 HEADER = "header"  # note of the store: {"keys", "columns"}
 
 
-def header_of(store: Store) -> tuple[list[str], list[Column]]:
-    """The axes' keys of a sweep, and its own columns."""
-    with store.errors():
-        noted = read_json(store.note(HEADER) or '{"keys": [], "columns": []}', dict)
-        keys, columns = (list(noted[name]) for name in ("keys", "columns"))
-        if not all(isinstance(name, str) for name in (*keys, *columns)):
-            raise ValueError("the names of its columns are not texts")
-        return keys, [read_column(name) for name in columns]
-
-
 def header_notes(keys: Sequence[str], columns: Sequence[Column]) -> dict[str, str]:
     """What the table's columns are, to be noted with the designs.
 
-    Parameters
-    ----------
-    keys : of the designs; columns : in addition to those of every sweep.
+    Args:
+        columns: in addition to those of every sweep.
     """
     return {HEADER: json.dumps({"keys": list(keys), "columns": [column.name for column in columns]})}
 
 
-def names_of(keys: Sequence[str], columns: Sequence[Column]) -> list[str]:
-    """The names of all columns of a table; `keys` and `columns` as of `header_notes`."""
-    return [*keys, *STANDARD, *(column.name for column in columns)]
+class Sheet:
+    """The table of a store as it is now: the axes' keys, the standard columns, and those that the sweep names.
 
-
-def table_rows(store: Store, columns: Sequence[Column]) -> Iterator[list[Any]]:
-    """The rows of the finished designs, one by one: the axes' keys, the standard columns, and `columns`.
-
-    Parameters
-    ----------
-    store : of the sweep; columns : in addition to those of every sweep.
+    Args:
+        more: further columns.
     """
-    keys = header_of(store)[0]
-    for design in store.finished():
+
+    def __init__(self, store: Store, more: Sequence[str] = ()) -> None:
+        self._store = store
         with store.errors():
-            if len(design.keys) != len(keys):
-                raise ValueError(f"its design {design.position} has {len(design.keys)} values for {len(keys)} keys")
-        yield [*design.keys, *(design.row.get(name) for name in STANDARD), *(_cell(design, c) for c in columns)]
+            noted = read_json(store.note(HEADER) or '{"keys": [], "columns": []}', dict)
+            self.keys, columns = (list(noted[name]) for name in ("keys", "columns"))
+            if not all(isinstance(name, str) for name in (*self.keys, *columns)):
+                raise ValueError("the names of its columns are not texts")
+            self._columns = [read_column(name) for name in columns]
+        self._columns += [read_column(name) for name in more if name not in columns]
+        self.names = [*self.keys, *STANDARD, *(column.name for column in self._columns)]
+
+    def rows(self) -> Iterator[tuple[Finished, dict[str, Any]]]:
+        """The finished designs, one by one, and their cells by the names of columns."""
+        for design in self._store.finished():
+            with self._store.errors():
+                if len(design.keys) != len(self.keys):
+                    raise ValueError(
+                        f"its design {design.position} has {len(design.keys)} values for {len(self.keys)} keys"
+                    )
+            standard = [design.row.get(name) for name in STANDARD]
+            cells = [*design.keys, *standard, *(_cell(design, column) for column in self._columns)]
+            yield design, dict(zip(self.names, cells, strict=True))
 
 
 def _cell(design: Finished, column: Column) -> Any:
@@ -85,31 +85,27 @@ class Table:
     def write(self) -> None:
         """Write it now.
 
-        Raises
-        ------
-        OutputError : it cannot be written.
+        Raises:
+            OutputError: it cannot be written.
         """
-        keys, columns = header_of(self._store)
-        names = names_of(keys, columns)
-        write_csv(self._store.folder / CSV, names, table_rows(self._store, columns))
+        sheet = Sheet(self._store)
+        write_csv(self._store.folder / CSV, sheet.names, (cells for _, cells in sheet.rows()))
 
 
-def write_csv(file: Path, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a table.
+def write_csv(file: Path, names: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> None:
+    """Write a table in place of a file.
 
-    Parameters
-    ----------
-    file : which is replaced; names : of the columns; rows : of plain values.
+    Args:
+        rows: plain values by the names of columns.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises:
+        OutputError: it cannot be written.
     """
     with replaced(file) as part, part.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(names)
         for row in rows:
-            writer.writerow(map(_csv_cell, row))
+            writer.writerow(_csv_cell(row[name]) for name in names)
 
 
 def _csv_cell(value: Any) -> Any:
@@ -133,46 +129,29 @@ def in_short(value: Any) -> str:
 def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pyarrow.Table":
     """The table of a sweep, also of one that still runs; `.to_pandas()`, or `polars.from_arrow` of it.
 
-    Parameters
-    ----------
-    columns : further keys of result.json; nothing is computed again for them.
+    Args:
+        columns: further keys of result.json; nothing is computed again for them.
 
-    Returns
-    -------
-    A row for each finished design: the axes' keys, the columns of every sweep, those that it names, and `columns`.
-    Numbers are in SI, what is not known is null, lists and tables are JSON.
+    Returns:
+        A row for each finished design: the axes' keys, the columns of every sweep, those that it names, and `columns`.
+        Numbers are in SI, what is not known is null, lists and tables are JSON.
 
-    Raises
-    ------
-    InputError : pyarrow is not installed, or result.json has no such key. OutputError : there is no sweep.
+    Raises:
+        InputError: pyarrow is not installed, or result.json has no such key. OutputError : there is no sweep.
     """
     with Store(file_path("folder", folder), writing=False) as store:
-        keys, columns_of_sweep = header_of(store)
-        there = [column.name for column in columns_of_sweep]
-        asked = [*columns_of_sweep, *(read_column(name) for name in columns if name not in there)]
-        return arrow_table(names_of(keys, asked), table_rows(store, asked))
+        return _arrow_table(Sheet(store, columns))
 
 
-def arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Table":
-    """Rows as an Arrow table.
-
-    Parameters
-    ----------
-    names : of the columns; rows : of plain values.
-
-    Raises
-    ------
-    InputError : pyarrow is not installed.
-    """
+def _arrow_table(sheet: Sheet) -> "pyarrow.Table":
     try:
         import pyarrow
     except ImportError:
         raise InputError(
             'reading a sweep as a table needs the package pyarrow: pip install "rodshell[sweep]"'
         ) from None
-    table = list(rows)
-    cells = {name: [row[k] for row in table] for k, name in enumerate(names)}
-    return pyarrow.table({name: pyarrow.array(_alike(values)) for name, values in cells.items()})
+    rows = [cells for _, cells in sheet.rows()]
+    return pyarrow.table({name: pyarrow.array(_alike([cells[name] for cells in rows])) for name in sheet.names})
 
 
 def _alike(values: list[Any]) -> list[Any]:
@@ -188,14 +167,11 @@ def _alike(values: list[Any]) -> list[Any]:
 def write_parquet(store: Store) -> None:
     """Write table.parquet, if pyarrow is installed.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises:
+        OutputError: it cannot be written.
     """
     with suppress(ImportError):
         import pyarrow.parquet
 
-        keys, columns = header_of(store)
-        names = names_of(keys, columns)
         with replaced(store.folder / PARQUET) as part:
-            pyarrow.parquet.write_table(arrow_table(names, table_rows(store, columns)), part)
+            pyarrow.parquet.write_table(_arrow_table(Sheet(store)), part)

@@ -48,15 +48,12 @@ class Worker:
     def run(self, task: Task, time_limit: float | None, memory_limit: float | None) -> Reply:
         """Run a job, and again if its process dies; the reply of `worker.reply_to`, or what became of it.
 
-        Parameters
-        ----------
-        task : as of `worker.reply_to`.
-        time_limit : [s]; memory_limit : [B]; None: no limit.
+        Args:
+            time_limit, memory_limit: [s], [B]; None: no limit.
 
-        Raises
-        ------
-        EngineError : no process can be started, or it is of another version. OutputError : a form cannot be saved.
-        Stopped : by `stop`.
+        Raises:
+            EngineError: no process can be started, or it is of another version. OutputError : a form cannot be saved.
+            Stopped: by `stop`.
         """
         ended = []
         for _ in range(TRIES):
@@ -215,10 +212,5 @@ def _pass_on(process: "subprocess.Popen[str]", replies: "SimpleQueue[str | None]
 
 
 def lost(outcome: str, status: str, seconds: float = 0.0) -> Reply:
-    """The reply of a job that found no end.
-
-    Parameters
-    ----------
-    outcome : "stopped" or "crashed"; status : why, in a sentence; seconds : that it took [s].
-    """
+    """The reply of a job that was "stopped" or "crashed", with the sentence why, and the time that it took [s]."""
     return {"outcome": outcome, "row": {"status": status, "seconds": seconds}}

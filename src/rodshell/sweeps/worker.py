@@ -51,13 +51,7 @@ def _load_kernels() -> None:
 
 
 def reply_to(task: dict[str, Any]) -> dict[str, Any]:
-    """Run a job: {"outcome", "row"}; {"mismatch"} in a process of another version; {"unwritten"} for a form not saved.
-
-    Parameters
-    ----------
-    task : "case", its text; "until", the last stage; "archive", the folder for its files, or None; "version", of the
-        coordinator.
-    """
+    """Run a task of `Computation`: {"outcome", "row"}; {"mismatch"} of versions; {"unwritten"} for an unsaved form."""
     if task["version"] != program_version():
         return {"mismatch": program_version()}
     begun = process_time()

@@ -17,8 +17,8 @@ from rodshell.untrusted import limit, raised
 
 LONGEST = 60.0  # seconds that reading may take
 MEMORY = 3e9  # bytes that a reader may use
-QUOTED = 120  # characters of a reader's message
-BOUNDED = """
+_QUOTED = 120  # characters of a reader's message
+_BOUNDED = """
 import json, runpy, sys
 try:
     import resource
@@ -34,17 +34,11 @@ numpy.savez(sys.argv[3], **found)
 
 
 def read_apart(reader: Path, path: Path, data: bytes, format: str, **request: object) -> dict[str, Any]:
-    """What a reader finds in a file.
+    """What a reader finds in a file; messages call it by its `path` and `format`, and `request` is what the reader
+    needs.
 
-    Parameters
-    ----------
-    path : of the file, for messages.
-    format : as it is called in messages.
-    request : further values for the reader.
-
-    Raises
-    ------
-    InputError : the reader fails, or needs too long.
+    Raises:
+        InputError: the reader fails, or needs too long.
     """
     import numpy as np
 
@@ -52,7 +46,7 @@ def read_apart(reader: Path, path: Path, data: bytes, format: str, **request: ob
         copy, result = Path(folder, "file").with_suffix(path.suffix), Path(folder, "found.npz")
         copy.write_bytes(data)
         bounds = [str(int(limit(most))) for most in (MEMORY, LONGEST)]
-        program = [sys.executable, "-P", "-c", BOUNDED, str(reader)]
+        program = [sys.executable, "-P", "-c", _BOUNDED, str(reader)]
         program += [json.dumps({"path": str(copy), **request}), str(result), *bounds]
         one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}  # each reserves memory
         try:
@@ -79,5 +73,5 @@ def unreadable(path: Path, format: str, reason: Exception | None = None) -> Inpu
 
 def cause(reason: Exception) -> str:
     """The message of a reader's exception, on one short line."""
-    said = " ".join(str(reason).split())[:QUOTED]
+    said = " ".join(str(reason).split())[:_QUOTED]
     return f"{type(reason).__name__}: {said}" if said else type(reason).__name__

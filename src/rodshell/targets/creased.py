@@ -8,6 +8,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
+from rodshell.progress import Progress, silent
 from rodshell.targets.creases import KINK, NEAR
 from rodshell.targets.field_fitting import Fit
 from rodshell.targets.freeform import TIE, Freeform
@@ -26,11 +27,10 @@ DENSE = 0.04  # of the size: distance of the points by which the patches are fou
 class Creased(Freeform):
     """A mesh whose creases lie on seams; make one with `cut_at`.
 
-    Parameters
-    ----------
-    uncut : the target of the same mesh.
-    drawn, seams : the lines as they are given, and where they cut: along creases that are near.
-    pieces : by the sides of the seams on which they are, see `Patch`.
+    Args:
+        uncut: the target of the same mesh.
+        drawn, seams: the lines as they are given, and where they cut: along creases that are near.
+        pieces: by the sides of the seams on which they are, see `Patch`.
     """
 
     uncut: Freeform
@@ -154,17 +154,14 @@ class Creased(Freeform):
         return points[inside], areas[inside]
 
 
-def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
+def cut_at(target: Target, seams: Sequence[Seam], progress: Progress = silent) -> Target:
     """A target as seams cut it: where a mesh is creased along them, in smooth pieces that meet there.
 
-    Parameters
-    ----------
-    target : of any kind; one that was cut before is cut again.
-    seams : lines in plan; the creases near them are taken.
+    A target that was cut before is cut again. Creases near the seams are taken.
 
-    Raises
-    ------
-    InputError : the mesh is creased where there is no seam, or a piece between them is not smooth; names lines that do.
+    Raises:
+        InputError: the mesh is creased where there is no seam, or a piece between them is not smooth; names lines that
+            do.
     """
     drawn = tuple(seams)
     if isinstance(target, Creased):
@@ -187,20 +184,23 @@ def cut_at(target: Target, seams: Sequence[Seam]) -> Target:
         target.require_usable()
         return target
     bridged = [line is not None and not line.crests for line in lines]
-    made = _in_pieces(target, drawn, cut, bridged)
+    made = _in_pieces(target, drawn, cut, bridged, progress)
     for _ in range(ROUNDS * any(bridged)):
         cut = tuple(made.where_pieces_meet(k) if bridge else cut[k] for k, bridge in enumerate(bridged))
-        made = _in_pieces(target, drawn, cut, bridged)
+        made = _in_pieces(target, drawn, cut, bridged, progress)
     return made
 
 
-def _in_pieces(target: Freeform, drawn: tuple[Seam, ...], seams: tuple[Seam, ...], bridged: Sequence[bool]) -> Creased:
+def _in_pieces(
+    target: Freeform, drawn: tuple[Seam, ...], seams: tuple[Seam, ...], bridged: Sequence[bool], progress: Progress
+) -> Creased:
     whole, pieces = target.creases.mesh, dict[tuple[int, ...], Freeform]()
     for sides, mesh in target.creases.pieces(seams, bridged).items():
         found = smooth_piece(mesh, Neighbours.of(mesh, target.name), f"{target.name}, between its seams,")
         if not found.smooth:
             raise InputError(found.creased + target.along_creases)
         pieces[sides] = Freeform(surface=found.surface)
+        pieces[sides].fit(progress)
         pieces[sides].require_a_good_fit(target.name)
     given = {key: getattr(target, key) for key in ("base", "curves", "source", "repairs")}
     return Creased(surface=whole, whole=whole, uncut=target, drawn=drawn, seams=seams, pieces=pieces, **given)

@@ -17,7 +17,7 @@ from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import dot, unit
 from rodshell.targets.patch import Seam, nearest
 from rodshell.targets.rim import CORNER
-from rodshell.targets.trianglemesh import Neighbours, TriangleMesh, edge_counts
+from rodshell.targets.trianglemesh import Neighbours, TriangleMesh, chains
 
 KINK = radians(3.0)  # an edge that turns by less belongs to no crease
 RISE = 2.0  # times what the curvature on both sides explains: an edge that turns by more belongs to one
@@ -40,13 +40,7 @@ ON_SEAM = 1e-4  # vertices closer to a seam are on it
 
 
 class Creases:
-    """The creases of a mesh that are seen from above.
-
-    Parameters
-    ----------
-    mesh : with all faces oriented alike.
-    name : of the mesh, for messages.
-    """
+    """The creases of a mesh that are seen from above. All faces of the mesh are oriented alike."""
 
     def __init__(self, mesh: TriangleMesh, name: str) -> None:
         self.mesh, self.neighbours = mesh, Neighbours.of(mesh, name)
@@ -111,12 +105,8 @@ class Creases:
     def pieces(self, seams: Sequence[Seam], bridged: Sequence[bool]) -> dict[tuple[int, ...], TriangleMesh]:
         """The parts of the mesh by the sides of the seams on which they are; see `Patch`.
 
-        A face that a seam crosses is in both parts where the mesh is smooth; in neither where it bridges a crease.
-
-        Parameters
-        ----------
-        seams : the lines at which it is cut.
-        bridged : which of them run along creases that faces bridge.
+        A face that a seam crosses is in both parts where the mesh is smooth; in neither where it bridges a crease, as
+        along the `bridged` seams.
         """
         within = dict[tuple[int, int], Bools]()
         for k, (seam, bridge) in enumerate(zip(seams, bridged, strict=True)):
@@ -137,7 +127,7 @@ class Creases:
         edges = self.edges
         for seam in apart_from:
             edges = edges[np.abs(seam.distance(self.mesh.vertices[edges].mean(axis=1))) > NEAR * self.extent]
-        rows = [self.mesh.vertices[chain, :2] for chain in _chains(edges)]
+        rows = [self.mesh.vertices[chain, :2] for chain in chains(edges)]
         rows = _joined([x for x in rows if _length(x) > SHORT * self.extent], BRIDGED * self.extent)
         lines = [_simplified(x, ROUGH * self.extent) for x in rows]
         least = [max(LINKED * _length(x), LONG * self.extent) for x in rows]
@@ -156,9 +146,8 @@ class Creases:
 def _without_pinches(mesh: TriangleMesh) -> TriangleMesh:
     """The mesh without the faces at vertices in which two parts of it touch, as where a seam cuts faces off."""
     while True:
-        a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-        outer = edge_counts(a, b, len(mesh.vertices)) == 1
-        pinched: Bools = np.bincount(a[outer], minlength=len(mesh.vertices)) > 1
+        outer = mesh.sides.start[mesh.sides.shared == 1]
+        pinched: Bools = np.bincount(outer, minlength=len(mesh.vertices)) > 1
         if not pinched.any():
             return mesh
         mesh = mesh.only(np.asarray(~pinched[mesh.faces].any(axis=1)))
@@ -171,25 +160,6 @@ def _angle(a: Floats, b: Floats) -> Floats:
 
 def _length(line: Floats) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-
-
-def _chains(edges: Ints) -> list[Ints]:
-    """Vertices of the rows into which edges (e, 2) fall at vertices where other than two of them meet."""
-    at: dict[int, set[int]] = {}
-    for a, b in edges.tolist():
-        at.setdefault(a, set()).add(b)
-        at.setdefault(b, set()).add(a)
-    ends = {k for k in at if len(at[k]) != 2}
-    chains = list[Ints]()
-    for first in [*ends, *at]:  # rings, which have no end, last
-        while at[first]:
-            chain = [first, at[first].pop()]
-            at[chain[1]].remove(first)
-            while chain[-1] not in ends and at[chain[-1]]:
-                chain.append(at[chain[-1]].pop())
-                at[chain[-1]].remove(chain[-2])
-            chains.append(np.array(chain, dtype=np.intp))
-    return chains
 
 
 def _joined(lines: list[Floats], reach: float) -> list[Floats]:

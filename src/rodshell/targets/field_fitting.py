@@ -1,6 +1,8 @@
 """From a triangle mesh to its smooth field: least squares of its samples, continuation past an open rim."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from math import pi, sqrt
 
 import numpy as np
@@ -8,9 +10,11 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.kernels import njit
+from rodshell.progress import Progress, silent
 from rodshell.targets.samples import LONGEST, Samples, fill_openings, mesh_samples
 from rodshell.targets.smooth_field import TERMS, CellList, SmoothField
 from rodshell.targets.trianglemesh import TriangleMesh
+from rodshell.units import length_text
 
 # least squares
 FEWEST, MOST = 300, 8000  # cubics on a surface
@@ -43,11 +47,10 @@ def cubic_spacing(area: float, count: int) -> float:
 class Fit:
     """A smooth field that was fitted to a mesh.
 
-    Parameters
-    ----------
-    cubics : those of it that are on the surface (or fill an opening), which come first.
-    off : (n,) distance of each vertex of the mesh [m]; infinite where the field points elsewhere, or another sheet
-        crosses.
+    Args:
+        cubics: those of it that are on the surface (or fill an opening), which come first.
+        off: (n,) distance of each vertex of the mesh [m]; infinite where the field points elsewhere, or another sheet
+            crosses.
     """
 
     field: SmoothField
@@ -55,26 +58,26 @@ class Fit:
     off: Floats
 
 
-def fit_mesh(mesh: TriangleMesh, *, size: float) -> Fit:
+def fit_mesh(mesh: TriangleMesh, *, size: float, progress: Progress = silent) -> Fit:
     """Fit a field to a mesh, with as many cubics as its shape needs.
 
     As many as suit a mesh that is as fine everywhere; where a vertex is further off than `CLOSE`, twice as many each
     time, up to one for each vertex, as long as that helps: not where the mesh is rough, as no smooth surface follows
     noise. A mesh that is still not followed, such as one that is fine only where it curves, gets up to `MOST`.
 
-    Parameters
-    ----------
-    size : half of its largest extent [m].
+    Args:
+        size: half of its largest extent [m].
+        progress: called at each step of each fit.
     """
     area, count = float(mesh.areas.sum()), len(mesh.vertices)
     spacing = cubic_spacing(area, count)
-    best = _fit_at(mesh, spacing, size)
+    best = _fit_at(mesh, spacing, size, progress)
     while (largest := float(best.off.max())) > CLOSE * size:
         finest = sqrt(area / (MOST if largest > OFF * size else min(MOST, count)))
         if spacing <= finest:
             break
         spacing = max(spacing / sqrt(2), finest)
-        finer = _fit_at(mesh, spacing, size)
+        finer = _fit_at(mesh, spacing, size, progress)
         if finer.off.max() < GAIN * largest:
             best = finer
         elif largest <= OFF * size:
@@ -82,9 +85,13 @@ def fit_mesh(mesh: TriangleMesh, *, size: float) -> Fit:
     return best
 
 
-def _fit_at(mesh: TriangleMesh, spacing: float, size: float) -> Fit:
+def _fit_at(mesh: TriangleMesh, spacing: float, size: float, progress: Progress) -> Fit:
+    fitting = partial(progress, "preparing", f"fit of the mesh, cubics {length_text(spacing)} apart", 0.0)
+    fitting()
     samples = fill_openings(mesh, mesh_samples(mesh, spacing), spacing)
-    field, cubics = fit_field(samples, spacing, past=PAST * size, reach=size)
+    fitting()
+    field, cubics = fit_field(samples, spacing, past=PAST * size, reach=size, each_ring=fitting)
+    fitting()
     value, gradient, _ = field.implicit(mesh.vertices, second=False)
     slope = np.linalg.norm(gradient, axis=1)
     follows = (dot(gradient, mesh.normals) > ASKEW * slope) & np.isfinite(value)
@@ -104,18 +111,17 @@ def _crossed(mesh: TriangleMesh, samples: Samples, reach: float) -> Ints:
     return CellList.of(mesh.vertices, reach).nearest(samples.points[both])[1][:, 0]
 
 
-def fit_field(samples: Samples, spacing: float, *, past: float, reach: float) -> tuple[SmoothField, int]:
-    """Fit a smooth field to samples of a surface, by weighted least squares.
+def fit_field(
+    samples: Samples, spacing: float, *, past: float, reach: float, each_ring: Callable[[], None] = lambda: None
+) -> tuple[SmoothField, int]:
+    """A smooth field fitted to samples of a surface, by weighted least squares; and the number of its cubics that are
+    on the surface (or fill an opening), which come first.
 
-    Parameters
-    ----------
-    spacing : distance between cubics [m], see `cubic_spacing`.
-    past : how far the field is continued past an open rim [m].
-    reach : distance from the cubics up to which the field is defined [m].
-
-    Returns
-    -------
-    The field; and the number of its cubics that are on the surface (or fill an opening), which come first.
+    Args:
+        spacing: distance between cubics [m], see `cubic_spacing`.
+        past: how far the field is continued past an open rim [m].
+        reach: distance from the cubics up to which the field is defined [m].
+        each_ring: called before each ring of cubics past the rim.
     """
     points = CellList.of(samples.points, spacing)
     chosen = points.spread(spacing)
@@ -125,7 +131,7 @@ def fit_field(samples: Samples, spacing: float, *, past: float, reach: float) ->
     coefficients = np.empty((len(centres), TERMS))
     _fit(centres, frames, spacing, start, near, samples.points, samples.normals, samples.areas, coefficients)
     field = SmoothField(centres, frames, coefficients, spacing, reach)
-    return _continued(field, points, int(np.ceil(past / spacing))), len(centres)
+    return _continued(field, points, int(np.ceil(past / spacing)), each_ring), len(centres)
 
 
 def _frames(normals: Floats) -> Floats:
@@ -135,7 +141,7 @@ def _frames(normals: Floats) -> Floats:
     return np.stack([first, cross(normals, first), normals], axis=1)
 
 
-@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp"})
+@njit("f2 f3 f i1 i1 f2 f2 f1 f2", fastmath={"contract", "reassoc", "arcp"})
 def _fit(centres, frames, spacing, start, near, points, normals, areas, coefficients):  # type: ignore[no-untyped-def]
     """Weighted least squares of cubics over the tangent planes, (m, 10) in units of the spacing."""
     system, right, row = np.empty((TERMS, TERMS)), np.empty(TERMS), np.empty(TERMS)
@@ -187,7 +193,7 @@ def _along(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _continued(field: SmoothField, points: CellList, rings: int) -> SmoothField:
+def _continued(field: SmoothField, points: CellList, rings: int, each: Callable[[], None]) -> SmoothField:
     """Continue a field past the rim, ring by ring, with quadrics that keep the curvature of their neighbours.
 
     The first ring follows the cubics of the rim, so that curvature changes over one more spacing. Each ring is a mean
@@ -195,6 +201,7 @@ def _continued(field: SmoothField, points: CellList, rings: int) -> SmoothField:
     """
     front = np.arange(len(field.centres))
     for _ in range(rings):
+        each()
         sites = _proposals(field, front, points)
         if len(sites) == 0:
             break
@@ -250,7 +257,7 @@ def _local(site, centre, e, spacing):  # type: ignore[no-untyped-def]
     return _along(e[0], d) / spacing, _along(e[1], d) / spacing, _along(e[2], d)
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i2 f2 f3 f2 f f2 f2")
 def _means(sites, distance, index, centres, frames, coefficients, spacing, mean, normals):  # type: ignore[no-untyped-def]
     """Weighted means (n, 3) of the points above `sites` (n, 3) on the cubics nearby, and of their normals."""
     for n in range(len(sites)):
@@ -270,7 +277,7 @@ def _means(sites, distance, index, centres, frames, coefficients, spacing, mean,
                 normals[n, i] += weight[k] * (e[2, i] - (slope_a * e[0, i] + slope_b * e[1, i]) / spacing) / steep
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i2 f2 f3 f2 f f3 f2")
 def _curvatures(  # type: ignore[no-untyped-def]
     sites, distance, index, centres, frames, coefficients, spacing, turned, quadrics
 ):

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,9 +11,10 @@ from scipy.spatial import cKDTree
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.targets.creases import Creases
 from rodshell.targets.field_fitting import OFF, Fit, fit_mesh
-from rodshell.targets.rim import UPRIGHT, Rim, smooth_loop
+from rodshell.targets.rim import UPRIGHT, Given, Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Deviation, Gap, Implicit, Target
 from rodshell.targets.trianglemesh import FARTHEST, TriangleMesh, sound_mesh
@@ -22,9 +22,6 @@ from rodshell.targets.wall_below_rim import WalledSurface, walled_surface
 from rodshell.units import length_text
 from rodshell.untrusted import limit, raised
 from rodshell.validation import array, number
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
 
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 OTHER_UNIT = 8.0  # times as wide as the surface: such a boundary is drawn in another unit
@@ -41,16 +38,15 @@ class Freeform(Target):
 
     Two such targets are equal only if they are the same object.
 
-    Parameters
-    ----------
-    surface : one smooth piece, facing up.
-    base : z of a plane below which there is no shell [m], or None.
-    curves : closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
-    source : kind, file and options, as they are written in a case file.
-    repairs : what was changed in the mesh, in sentences.
-    whole : the mesh with what is beyond its creases; None: it has none.
-    creased : what is said of its creases.
-    usable : False: the whole is not a smooth surface, and must be cut along its creases by seams.
+    Args:
+        surface: one smooth piece, facing up.
+        base: z of a plane below which there is no shell [m], or None.
+        curves: closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
+        source: kind, file and options, as they are written in a case file.
+        repairs: what was changed in the mesh, in sentences.
+        whole: the mesh with what is beyond its creases; None: it has none.
+        creased: what is said of its creases.
+        usable: False: the whole is not a smooth surface, and must be cut along its creases by seams.
     """
 
     surface: TriangleMesh
@@ -72,28 +68,30 @@ class Freeform(Target):
         source: Mapping[str, object] | None = None,
         name: str = "the mesh",
         notes: tuple[str, ...] = (),
+        progress: Progress = silent,
     ) -> "Freeform":
         """Make a target of a mesh; the shell ends at the mesh's open boundary, at curves and at a base plane.
 
-        Parameters
-        ----------
-        vertices : (n, 3) [m].
-        faces : (m, 3) indices of the vertices of each triangle.
-        base : z of a plane below which there is no shell [m], or None.
-        curves : closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
-        source : kind, file and options, as they are written in a case file.
-        name : of the mesh, for messages.
-        notes : what was changed in the mesh before, in sentences.
+        Args:
+            vertices: (n, 3) [m].
+            faces: (m, 3) indices of the vertices of each triangle.
+            base: z of a plane below which there is no shell [m], or None.
+            curves: closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
+            source: kind, file and options, as they are written in a case file.
+            name: of the mesh, for messages.
+            notes: what was changed in the mesh before, in sentences.
+            progress: called at each step of the fit.
 
-        Raises
-        ------
-        InputError : an argument is of the wrong kind; the mesh is not a smooth surface; or it is closed, and neither a
-            base nor a curve says where the shell ends.
+        Raises:
+            InputError: an argument is of the wrong kind; the mesh is not a smooth surface; or it is closed, and neither
+                a base nor a curve says where the shell ends.
         """
+        require_progress(progress)
         vertices = array("vertices", vertices, np.float64, None, 3)
         faces = array("faces", faces, np.intp, None, 3)
         base = None if base is None else number("target base", base, "m")
         curves = tuple(array("a boundary curve", curve, np.float64, None, 3) for curve in curves)
+        progress("preparing", f"mesh of {len(faces)} triangles", 0.0)
         found = sound_mesh(vertices, faces, name)
         made = {"kind": "mesh", "vertices": len(vertices), "faces": len(faces)}
         target = Freeform(
@@ -105,6 +103,9 @@ class Freeform(Target):
                 raise InputError(target.creased)
             return target
         try:
+            target._require_curves(name)
+            target.fit(progress)
+            progress("preparing", "ends of the surface", 0.0)
             target._require_an_end(name)
             target.require_a_good_fit(name)
         except InputError as reason:
@@ -129,9 +130,8 @@ class Freeform(Target):
     def require_usable(self) -> None:
         """Refuse a mesh that no seams cut along its creases, where it is smooth nowhere else.
 
-        Raises
-        ------
-        InputError : names seams that would.
+        Raises:
+            InputError: names seams that would.
         """
         if not self.usable:
             raise InputError(self.creased + self.along_creases)
@@ -146,16 +146,14 @@ class Freeform(Target):
         ends, moved = self._open_ends
         words = [*self.repairs, self.creased + self.along_creases] if self.creased else list(self.repairs)
         names = ["the edge of the mesh"] * bool(ends) + ["the boundary that is drawn"]
-        offs = [rim.off if rim.off > TOLD * self.size and self._ends_at(rim) else 0.0 for rim in self.rims]
-        offs[-1:] = [max([off, *map(self._off, filter(self._is_in_space, self.curves))]) for off in offs[-1:]]
         words += [
-            f"the shell ends up to {length_text(off)} from {name}: on the smooth surface, in a smooth curve where six "
-            "or more of its points turn by little; give more points, or corners"
-            for name, off in zip(names, offs, strict=False)
-            if off > TOLD * self.size
+            f"the shell ends up to {length_text(rim.off)} from {name}: on the smooth surface, in a smooth curve where "
+            "six or more of its points turn by little; give more points, or corners"
+            for name, rim in zip(names, self.rims, strict=False)
+            if rim.off > TOLD * self.size and self._ends_at(rim)
         ]
-        if moved:
-            edges = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else f"{names[0]} is"
+        if jagged := np.count_nonzero(moved):
+            edges = f"{jagged} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else f"{names[0]} is"
             words.append(
                 f"{edges} jagged where faces are missing: the shell ends at a smooth curve, up to "
                 f"{length_text(max(moved))} from the vertices there; to end it elsewhere give target.boundary"
@@ -182,8 +180,13 @@ class Freeform(Target):
 
     @cached_property
     def _fitted(self) -> Fit:
+        return self.fit()
+
+    def fit(self, progress: Progress = silent) -> Fit:
+        """Fit its field now, which else is fitted when it is needed first; `progress` is called at each step."""
         self.require_usable()
-        return fit_mesh(self.surface, size=self._extent)
+        self.__dict__["_fitted"] = fitted = fit_mesh(self.surface, size=self._extent, progress=progress)
+        return fitted
 
     @property
     def field(self) -> SmoothField:
@@ -215,9 +218,11 @@ class Freeform(Target):
         """The rims of the open boundary and of the boundary curves, if there are any."""
         rims = []
         if self.surface.loops:
-            rims.append(self._rim(self._open_ends[0]))
+            ends, moved = self._open_ends
+            rims.append(self._rim(ends, ["surface" if far else "space" for far in moved]))
         if self.curves:
-            rims.append(self._rim([_turning(self._over(curve), k > 0) for k, curve in enumerate(self.curves)]))
+            over = [_turning(self._over(curve), k > 0) for k, curve in enumerate(self.curves)]
+            rims.append(self._rim(over, ["space" if self._is_in_space(curve) else "plan" for curve in self.curves]))
         return tuple(rims)
 
     def _ends_at(self, rim: Rim) -> bool:
@@ -226,18 +231,17 @@ class Freeform(Target):
 
     @cached_property
     def _open_ends(self) -> tuple[list[Floats], list[float]]:
-        """The loops (n, 3) of the open boundary; and how far those that were jagged were moved [m]."""
+        """The loops (n, 3) of the open boundary; and how far each was moved, where it was jagged [m]."""
         ends, moved = list[Floats](), list[float]()
         for loop in self.surface.loops:
             x = self.surface.vertices[loop]
             smooth = smooth_loop(x, self.surface.normals[loop])
             ends.append(x if smooth is None else smooth)
-            if smooth is not None:
-                moved.append(float(np.linalg.norm(self._settle(smooth) - x, axis=1).max()))
+            moved.append(0.0 if smooth is None else float(np.linalg.norm(self._settle(smooth) - x, axis=1).max()))
         return ends, moved
 
-    def _rim(self, loops: list[Floats]) -> Rim:
-        return Rim.of(loops, self._settle, lambda x: unit(self.level(x)[1]))
+    def _rim(self, loops: list[Floats], given: list[Given]) -> Rim:
+        return Rim.of(loops, self._settle, lambda x: unit(self.level(x)[1]), given)
 
     def _settle(self, x: Floats) -> Floats:
         """Points (n, 3) near the surface moved onto it: straight up or down, so that what is straight in plan stays so,
@@ -297,7 +301,6 @@ class Freeform(Target):
         return self._body.contact(x)
 
     def height_at(self, xy: Floats) -> Floats:
-        """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         z = self._heights_of_facets(xy)
         beside = np.flatnonzero(np.isnan(z) & np.isfinite(xy).all(axis=1))
@@ -306,7 +309,7 @@ class Freeform(Target):
         return np.where(np.abs(smooth - z) < 0.1 * self._extent, smooth, np.nan)
 
     @cached_property
-    def _facets_by_size(self) -> "list[tuple[cKDTree, Ints, float]]":
+    def _facets_by_size(self) -> list[tuple[cKDTree, Ints, float]]:
         """Trees of facets' centres in plan, one for each power of two of their widths; the facets; and that width."""
         plan = self.surface.vertices[self.surface.faces, :2]
         low, high = plan.min(axis=1), plan.max(axis=1)
@@ -399,7 +402,8 @@ class Freeform(Target):
         """Largest distance of a curve from the surface [m]."""
         return float(np.nan_to_num(np.abs(self.implicit(curve).value), nan=np.inf).max())
 
-    def _require_an_end(self, name: str) -> None:
+    def _require_curves(self, name: str) -> None:
+        """Refuse a surface without an end or with too many, and curves of too few points: known without the field."""
         ends = len(self.surface.loops) + len(self.curves)
         along = sum(map(len, (*self.surface.loops, *self.curves)))
         for count, most, what in ((ends, MOST_ENDS, "closed curves"), (along, MOST_ALONG, "points")):
@@ -420,6 +424,8 @@ class Freeform(Target):
                 f"{name} is closed: say where the shell ends, by a base plane between z = {x[:, 2].min():.4g} and "
                 f"{x[:, 2].max():.4g} m or by a boundary curve"
             )
+
+    def _require_an_end(self, name: str) -> None:
         for curve in self.curves:
             off = self._off(self._over(curve))
             if not off < ASIDE * self._extent:

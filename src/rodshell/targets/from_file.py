@@ -2,6 +2,7 @@
 
 import io
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import cos, radians
 from os import PathLike
@@ -10,9 +11,11 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import solveh_banded
+from scipy.sparse import diags_array, eye_array
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.progress import Progress, require_progress, silent
 from rodshell.targets.apart import cause
 from rodshell.targets.curve_files import read_curves
 from rodshell.targets.freeform import Freeform
@@ -20,20 +23,27 @@ from rodshell.targets.mesh_files import (
     IN_METRES,
     MESH_FILES,
     MOST_HEIGHTS,
+    STEP_FILES,
+    FileSurface,
     file_bytes,
     in_metres,
     read_mesh,
     require_few_heights,
     require_size,
 )
-from rodshell.targets.nurbs_files import RHINO_FILES, STEP_FILES, grid_triangles, read_3dm, read_step
+from rodshell.targets.nurbs import grid_triangles
+from rodshell.targets.nurbs_files import RHINO_FILES, read_3dm, read_step
 from rodshell.units import length_text, shown
 from rodshell.untrusted import read_text
 from rodshell.validation import brief, choice, file_path, instance, keep, number, numbers, positive
 
 File = str | PathLike[str]
 
-SURFACE_FILES = (*MESH_FILES, *RHINO_FILES, *STEP_FILES)
+_READERS: dict[str, tuple[str, Callable[[Path, str | None], FileSurface]]] = {  # and the kind of target
+    **dict.fromkeys(MESH_FILES, ("mesh", read_mesh)),
+    **dict.fromkeys(RHINO_FILES, ("nurbs", read_3dm)),
+    **dict.fromkeys(STEP_FILES, ("nurbs", read_step)),
+}
 TABLES = (".csv", ".txt")
 IMAGES = ("PNG", "PPM", "JPEG", "TIFF")  # whatever a file is called, others, such as EPS, are never opened
 GRID_FILES = (*TABLES, ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff")
@@ -52,22 +62,15 @@ MOST_MOVED = 1.0  # levels by which a height may be changed
 HALVINGS = 12
 
 
-def read_heights(path: Path, size: tuple[float, float], height: float | None) -> tuple[Floats, Ints, tuple[str, ...]]:
-    """Read heights on a lattice and mesh them; empty cells and "nan" are holes.
+def read_heights(path: Path, size: tuple[float, float], height: float | None) -> FileSurface:
+    """Read heights on a lattice and mesh them, in metres and centred on the origin; empty cells and "nan" are holes.
 
-    Parameters
-    ----------
-    path : a file of one of the kinds in `GRID_FILES`.
-    size : width along x and depth along y [m]; the file's first row is at the largest y, depth / 2.
-    height : of a table the factor of its numbers; of an image the height of white, black being 0 [m]; None for 1.
+    Args:
+        size: width along x and depth along y [m]; the file's first row is at the largest y, depth / 2.
+        height: of a table the factor of its numbers; of an image the height of white, black being 0 [m]; None for 1.
 
-    Returns
-    -------
-    Vertices (n, 3), centred on the origin [m], triangles (m, 3), and notes for the user, in sentences.
-
-    Raises
-    ------
-    InputError : the file is missing or damaged, or its numbers are not a lattice.
+    Raises:
+        InputError: the file is missing or damaged, or its numbers are not a lattice.
     """
     height = 1.0 if height is None else height
     notes: tuple[str, ...] = ()
@@ -89,7 +92,7 @@ def read_heights(path: Path, size: tuple[float, float], height: float | None) ->
     points = np.column_stack([across.ravel(), along.ravel(), height * z.ravel()])
     widths = np.ptp(points[known], axis=0) if known.any() else np.zeros(3)
     require_size(path, widths, 1.0, instead="give another size or height")
-    return points, faces[known[faces].all(axis=1)], notes
+    return FileSurface(points, faces[known[faces].all(axis=1)], notes)
 
 
 def read_table(path: Path, size: tuple[float, float]) -> tuple[Floats, Floats, Floats]:
@@ -98,18 +101,15 @@ def read_table(path: Path, size: tuple[float, float]) -> tuple[Floats, Floats, F
     Cells are separated by semicolons, tabs, commas or blanks; unless by commas, a comma is a decimal point. Empty cells
     are holes; between blanks, which leave no cell empty, "nan" is one.
 
-    Parameters
-    ----------
-    size : width and depth [m]. Rows of heights are at equal steps within it, the largest y first; points keep their
-        proportions and are scaled to it.
+    Args:
+        size: width and depth [m]. Rows of heights are at equal steps within it, the largest y first; points keep their
+            proportions and are scaled to it.
 
-    Returns
-    -------
-    Heights (rows, columns) in the file's unit, x of the columns and y of the rows, centred on the origin [m].
+    Returns:
+        Heights (rows, columns) in the file's unit, x of the columns and y of the rows, centred on the origin [m].
 
-    Raises
-    ------
-    InputError : the file is missing, is not a table of numbers, or its points are not a lattice.
+    Raises:
+        InputError: the file is missing, is not a table of numbers, or its points are not a lattice.
     """
     table = _numbers(path, _cells(path))
     if np.isinf(table).any():
@@ -203,15 +203,11 @@ def _is_coordinates(table: Floats) -> bool:
 
 
 def read_image(path: Path) -> tuple[Floats, float | None]:
-    """Read a grey image as heights; where it has few grey levels, its terraces are smoothed away within one level.
+    """Heights (rows, columns) of a grey image, black being 0 and white 1, and the step between grey levels where that
+    is coarse, or None: then terraces are smoothed away within one level.
 
-    Returns
-    -------
-    Heights (rows, columns), black being 0 and white 1; and the step between grey levels where that is coarse, or None.
-
-    Raises
-    ------
-    InputError : the file is missing or damaged, or has too many pixels (found before they are decoded).
+    Raises:
+        InputError: the file is missing or damaged, or has too many pixels (found before they are decoded).
     """
     from PIL import Image
 
@@ -238,14 +234,10 @@ def read_image(path: Path) -> tuple[Floats, float | None]:
 
 
 def smoothed(grey: Floats, step: float) -> Floats:
-    """Smooth an image by no more than the rounding to its levels explains.
+    """Heights (n, m), in multiples of `step`, smoothed by no more than the rounding to its levels explains.
 
-    A smoothing spline along both axes [Eilers and Marx 1996], which keeps planes. Its weight is the largest that
+    It is a smoothing spline along both axes [Eilers and Marx 1996], which keeps planes. Its weight is the largest that
     changes heights by the rms error of rounding, and none by more than a step.
-
-    Parameters
-    ----------
-    grey : (n, m) heights, in multiples of `step`.
     """
     low, high = -3.0, 8.0  # powers of ten; at the largest a bend of a hundred pixels is still followed
     best = grey
@@ -263,14 +255,9 @@ def smoothed(grey: Floats, step: float) -> Floats:
 def _splined(values: Floats, weight: float) -> Floats:
     """The z (n, m) that minimise |z - values|^2 + weight |second differences of z along the columns|^2."""
     count = len(values)
-    bands = np.zeros((3, count))  # of weight D^T D, D the second differences; the upper ones
-    for k, factor in enumerate((1.0, -2.0, 1.0)):
-        bands[2, k : count - 2 + k] += factor**2
-    bands[1, 1:-1] -= 2.0
-    bands[1, 2:] -= 2.0
-    bands[0, 2:] += 1.0
-    bands *= weight
-    bands[2] += 1.0
+    second = diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(count - 2, count))
+    system = eye_array(count) + weight * (second.T @ second)
+    bands = [np.append(np.zeros(k), system.diagonal(k)) for k in (2, 1, 0)]
     return np.asarray(solveh_banded(bands, values))
 
 
@@ -278,16 +265,14 @@ def _splined(values: Floats, weight: float) -> Floats:
 class Placement:
     """Where the surface of a file is placed: x -> scale turn(x) + move.
 
-    Parameters
-    ----------
-    up : axis of the file that points upwards, which becomes z before anything else; None: y of glTF, as its standard
-        says, and z of other files.
-    turn : angles about x, y and z, applied in that order [rad].
-    move : along x, y and z, applied last [m].
+    Args:
+        up: axis of the file that points upwards, which becomes z before anything else; None: y of glTF, as its standard
+            says, and z of other files.
+        turn: angles about x, y and z, applied in that order [rad].
+        move: along x, y and z, applied last [m].
 
-    Raises
-    ------
-    InputError : the scale is not positive, or a number is missing or not finite; another axis points upwards.
+    Raises:
+        InputError: the scale is not positive, or a number is missing or not finite; another axis points upwards.
     """
 
     up: Literal["z", "y"] | None = None
@@ -335,45 +320,38 @@ def surface_from(
     base: float | None = None,
     boundary: File | None = None,
     placement: Placement = UNMOVED,
+    progress: Progress = silent,
 ) -> Freeform:
     """Make a target of the surface in an OBJ, STL, PLY, OFF, glTF, 3dm or STEP file.
 
-    Parameters
-    ----------
-    unit : length of the file's unit [m]; None where the file states its unit.
-    name : object name, if the file has several (3dm: object or layer name, or number; STEP: name of a face, shell or
-        solid, or the number of a face).
-    base : z of a plane below which there is no shell [m], after placement; None for a surface that ends at its edge.
-    boundary : path of an OBJ, DXF or 3dm file with closed curves on the surface, in the same unit, unless a 3dm file
-        states its own, and placed with it: the longest bounds the shell, the others are openings.
-    placement : scales, turns and moves the surface.
+    Args:
+        unit: length of the file's unit [m]; None where the file states its unit.
+        name: object name, if the file has several (3dm: object or layer name, or number; STEP: name of a face, shell or
+            solid, or the number of a face). The untrimmed faces of a 3dm polysurface are joined.
+        base: z of a plane below which there is no shell [m], after placement; None for a surface that ends at its edge.
+        boundary: path of an OBJ, DXF or 3dm file with closed curves on the surface, in the same unit, unless a 3dm file
+            states its own, and placed with it: the longest bounds the shell, the others are openings.
+        placement: scales, turns and moves the surface.
+        progress: called before the file is read, and at each step of the fit.
 
-    Raises
-    ------
-    InputError : an argument or a file cannot be used; one sentence says why.
+    Raises:
+        InputError: an argument or a file cannot be used; one sentence says why.
     """
     path = file_path("file", file)
     if unit is not None:
         positive("unit", unit, "m")
-    _require_placing(name, base, placement)
-    curves: list[Floats] = []
-    notes: tuple[str, ...] = ()
-    if path.suffix.lower() in MESH_FILES:
-        kind, (vertices, faces, notes) = "mesh", read_mesh(path, unit, name)
-    elif path.suffix.lower() in RHINO_FILES:
-        kind, (vertices, faces, trims, stated) = "nurbs", read_3dm(path, name)
-        unit = stated if unit is None else unit
-        vertices = in_metres(vertices, faces, unit, path)
-        curves = [trim * (unit or 1.0) for trim in trims]
-    elif path.suffix.lower() in STEP_FILES:
-        if unit is not None:
-            raise InputError(f"{path}: STEP files state their unit: leave it out, or scale the target")
-        kind, (vertices, faces, curves) = "nurbs", read_step(path, name)
-        vertices = in_metres(vertices, faces, 1.0, path)
-    else:
-        raise InputError(f"{path} is not a surface file: use one of {', '.join(SURFACE_FILES)}")
-    source: dict[str, object] = {"kind": kind, "unit": unit, "object": name}
-    return _placed(path, vertices, faces, curves, unit or 1.0, base, boundary, placement, source, notes)
+    if name is not None:
+        instance("name", name, str, "text, the name of an object")
+    kind, read = _READERS.get(path.suffix.lower(), ("", None))
+    if read is None:
+        raise InputError(f"{path} is not a surface file: use one of {', '.join(_READERS)}")
+    if unit is not None and path.suffix.lower() in STEP_FILES:
+        raise InputError(f"{path}: STEP files state their unit: leave it out, or scale the target")
+
+    def found() -> FileSurface:
+        return in_metres(read(path, name), unit, path)
+
+    return _placed(path, found, base, boundary, placement, {"kind": kind, "object": name}, progress)
 
 
 def heights_from(
@@ -384,18 +362,17 @@ def heights_from(
     base: float | None = None,
     boundary: File | None = None,
     placement: Placement = UNMOVED,
+    progress: Progress = silent,
 ) -> Freeform:
     """Make a target of heights on a lattice: a CSV with a row of heights for each y, a CSV of points, or a grey image.
 
-    Parameters
-    ----------
-    size : width along x and depth along y [m], centred on the origin; the first row is at the largest y.
-    height : of a CSV the length of its unit [m], default 1; of an image the height of white [m], default 1.
-    base, boundary, placement : as in `surface_from`, with the boundary in metres.
+    Args:
+        size: width along x and depth along y [m], centred on the origin; the first row is at the largest y.
+        height: of a CSV the length of its unit [m], default 1; of an image the height of white [m], default 1.
+        base, boundary, placement, progress: as in `surface_from`, with the boundary in metres.
 
-    Raises
-    ------
-    InputError : an argument or a file cannot be used; one sentence says why.
+    Raises:
+        InputError: an argument or a file cannot be used; one sentence says why.
     """
     path = file_path("file", file)
     width, depth = numbers("size", size, "two lengths in m: width along x, depth along y", 2, "m")
@@ -403,52 +380,47 @@ def heights_from(
     positive("size", depth, "m")
     if height is not None:
         positive("height", height, "m")
-    _require_placing(None, base, placement)
     if path.suffix.lower() not in GRID_FILES:
         raise InputError(f"{path} is not a file of heights: use one of {', '.join(GRID_FILES)}")
-    vertices, faces, notes = read_heights(path, (width, depth), height)
     source: dict[str, object] = {"kind": "heights", "size": [width, depth], "height": height}
-    return _placed(path, vertices, faces, [], 1.0, base, boundary, placement, source, notes)
-
-
-def _require_placing(name: str | None, base: float | None, placement: Placement) -> None:
-    if name is not None:
-        instance("name", name, str, "text, the name of an object")
-    if base is not None:
-        number("target base", base, "m")
-    instance("placement", placement, Placement)
+    return _placed(
+        path, lambda: read_heights(path, (width, depth), height), base, boundary, placement, source, progress
+    )
 
 
 def _placed(
-    path: Path,
-    vertices: Floats,
-    faces: Ints,
-    curves: list[Floats],
-    unit: float,
-    base: float | None,
-    boundary: File | None,
-    placement: Placement,
-    source: dict[str, object],
-    notes: tuple[str, ...] = (),
-) -> Freeform:
+    path: Path, read: Callable[[], FileSurface], base: float | None, boundary: File | None, placement: Placement,
+    source: dict[str, object], progress: Progress,
+) -> Freeform:  # fmt: skip
+    """The target of the surface that is `read` from a file, with what a case says of its `source`."""
+    if base is not None:
+        number("target base", base, "m")
+    instance("placement", placement, Placement)
+    require_progress(progress)
+    progress("preparing", f"reading {shown(path.name)}", 0.0)
+    surface = read()
+    curves = list(surface.trims)
     if boundary is not None:
         drawn = file_path("boundary", boundary)
-        curves = curves + read_curves(drawn, unit)
+        curves += read_curves(drawn, surface.unit or 1.0)
         source["boundary"] = str(drawn.resolve())
-    source |= {"file": str(path.resolve()), "base": base, **placement.parameters()}
+    source |= {"unit": surface.unit, "file": str(path.resolve()), "base": base, **placement.parameters()}
     chosen = {key: value for key, value in source.items() if value is not None}
     usual: Literal["z", "y"] = "y" if path.suffix.lower() in IN_METRES else "z"
     turned = placement if placement.up is not None else replace(placement, up=usual)
     placed = tuple(turned(curve) for curve in curves)
     with np.errstate(over="ignore", invalid="ignore"):
-        vertices = turned(vertices)
-        if placement.up is None and _stands(vertices, faces):
+        vertices = turned(surface.vertices)
+        if placement.up is None and _stands(vertices, surface.faces):
             other = "z" if usual == "y" else "y"
             raise InputError(
                 f"{path} is steeper than {STEEP:.0f} degrees on average: does {other} point upwards in it? Then give "
                 f'target.up = "{other}" (--up {other}; in Python Placement(up="{other}")), and otherwise "{usual}"'
             )
-    return Freeform.of(vertices, faces, base=base, curves=placed, source=chosen, name=shown(path.name), notes=notes)
+    return Freeform.of(
+        vertices, surface.faces, base=base, curves=placed, source=chosen, name=shown(path.name), notes=surface.notes,
+        progress=progress,
+    )  # fmt: skip
 
 
 def _stands(vertices: Floats, faces: Ints) -> bool:

@@ -19,9 +19,8 @@ DAMAGED = (ValueError, TypeError, KeyError, AttributeError, IndexError, Recursio
 def gltf_counts(path: Path, data: bytes) -> dict[str, int]:
     """How many there are of the parts of a glTF file that cost time.
 
-    Raises
-    ------
-    InputError : it is not a glTF file, or announces more numbers than are read.
+    Raises:
+        InputError: it is not a glTF file, or announces more numbers than are read.
     """
     try:
         tree = _tree(path, data)
@@ -42,9 +41,8 @@ def gltf_counts(path: Path, data: bytes) -> dict[str, int]:
 def gltf_parts(path: Path, data: bytes) -> dict[str, bytes]:
     """The contents of the files that a .gltf file names as its buffers, by these names.
 
-    Raises
-    ------
-    InputError : it is not a glTF file; a name leads out of its folder; a file is missing or too large.
+    Raises:
+        InputError: it is not a glTF file; a name leads out of its folder; a file is missing or too large.
     """
     try:
         names = [str(part.get("uri", "data:")) for part in _tree(path, data).get("buffers", ())]

@@ -8,61 +8,52 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.jet import Jet, differences
 from rodshell.targets.rim import Disc, Rectangle
 
-Region = Disc | Rectangle
+_Region = Disc | Rectangle
 
 NUDGE = 1e-5  # of the size: a 0/0 leaves round-off of 1e-16 / (nudge size)^2 in curvature, Taylor hardly less
 DIFFERENCE = 2e-3  # of the size: step of the differences; truncation and round-off are both about 1e-10 in curvature
 
 ROWS, COLUMNS = 65, 193  # of the lattice of samples: about 3 mm apart on a target of 0.4 m
 STEEPEST = 1e3  # slope that counts as infinite (89.94 degrees)
-SHARPEST = 1e-2  # change of slope at a point that counts as a crease (0.6 degrees)
-SUSPECTS, HALVINGS = 64, 26  # pairs of neighbours searched for a crease, down to 1e-8 of their distance
-TIGHTEST = 1e-4  # of the size: a smaller radius of curvature counts as a crease
+_SHARPEST = 1e-2  # change of slope at a point that counts as a crease (0.6 degrees)
+_SUSPECTS, HALVINGS = 64, 26  # pairs of neighbours searched for a crease, down to 1e-8 of their distance
+_TIGHTEST = 1e-4  # of the size: a smaller radius of curvature counts as a crease
 BAND = 1.6  # half extents up to which the function is examined, as the net is marched past the edge
-TAME = 4.0  # slope up to which a formula is followed past the edge (76 degrees), or twice the steepest inside
-CLIMBERS = 500  # samples from which peaks are searched
+_TAME = 4.0  # slope up to which a formula is followed past the edge (76 degrees), or twice the steepest inside
+_CLIMBERS = 500  # samples from which peaks are searched
 
 
 @dataclass(frozen=True)
 class Heights:
     """z = function(x, y) and its derivatives.
 
-    Parameters
-    ----------
-    function : of x and y; takes jets where `exact`, otherwise only plain arrays.
-    size : half the larger width of its domain [m].
-    exact : whether derivatives are taken from jets; otherwise by differences.
-    trusted : where the function is evaluated as it is; None for everywhere. Outside, along every normal of the
-        region's edge, it is continued by its Taylor polynomial of second degree in that direction (in both directions
-        outside a corner of a rectangle). The continued surface has continuous curvature, and its derivatives are exact:
-        those of the polynomial's coefficients are taken from jets of jets.
+    Args:
+        function: of x and y; takes jets where `exact`, otherwise only plain arrays.
+        size: half the larger width of its domain [m].
+        exact: whether derivatives are taken from jets; otherwise by differences.
+        trusted: where the function is evaluated as it is; None for everywhere. Outside, along every normal of the
+            region's edge, it is continued by its Taylor polynomial of second degree in that direction (in both
+            directions outside a corner of a rectangle). The continued surface has continuous curvature, and its
+            derivatives are exact: those of the polynomial's coefficients are taken from jets of jets.
     """
 
     function: Callable[[Any, Any], Any]
     size: float
     exact: bool = True
-    trusted: Region | None = None
+    trusted: _Region | None = None
 
     def jet(self, x: Floats, y: Floats) -> Jet:
-        """Evaluate z with its first and second derivatives.
-
-        Parameters
-        ----------
-        x, y : (n,) points of the plan [m].
-
-        Returns
-        -------
-        A jet, whose parts are (n,), or single floats where they are constant.
-        """
+        """z with its first and second derivatives at points `x`, `y` (n,) of the plan [m]; parts that are constant are
+        floats."""
         with np.errstate(all="ignore"):
             if self.trusted is None:
                 return self._inside(x, y)
-            out = np.flatnonzero(self._beyond(self.trusted, x, y))
+            out = np.flatnonzero(relative_radius(self.trusted, x, y) > 1.0)
             if len(out) == 0:
                 return self._inside(x, y)
             inside = np.ones(len(x), dtype=bool)
@@ -95,14 +86,7 @@ class Heights:
         jet = self.function(*Jet.variables(x, y))
         return jet if isinstance(jet, Jet) else Jet(jet)
 
-    @staticmethod
-    def _beyond(trusted: Region, x: Floats, y: Floats) -> Bools:
-        a, b = trusted.half_extent
-        if isinstance(trusted, Disc):
-            return x * x + y * y > a * a
-        return (np.abs(x) > a) | (np.abs(y) > b)
-
-    def _outside(self, trusted: Region, x: Jet, y: Jet) -> Jet:
+    def _outside(self, trusted: _Region, x: Jet, y: Jet) -> Jet:
         a, b = trusted.half_extent
         if isinstance(trusted, Disc):
             inward = a / np.sqrt(x * x + y * y)
@@ -127,20 +111,14 @@ def _clamped(coordinate: Jet, limit: float) -> Jet:
 
 
 def _put(parts: Floats, where: Any, jet: Jet) -> None:
-    for row, part in zip(parts, (jet.value, jet.dx, jet.dy, jet.dxx, jet.dxy, jet.dyy), strict=True):
+    for row, part in zip(parts, jet.parts, strict=True):
         row[where] = part
 
 
-def sample(heights: Heights, domain: Region) -> Floats:
-    """Sample a height function on a lattice up to the domain's edge.
+def sample(heights: Heights, domain: _Region) -> Floats:
+    """(8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy on a lattice up to the domain's edge.
 
-    Parameters
-    ----------
-    domain : rows of the lattice of a disc are circles, from the centre to the edge.
-
-    Returns
-    -------
-    (8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy.
+    The rows of the lattice of a disc are circles, from the centre to the edge.
     """
     a, b = domain.half_extent
     if isinstance(domain, Disc):
@@ -151,17 +129,11 @@ def sample(heights: Heights, domain: Region) -> Floats:
     return _evaluated(heights, np.stack([x.ravel(), y.ravel()])).reshape(8, ROWS, COLUMNS)
 
 
-def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str) -> None:
+def require_smooth(heights: Heights, domain: _Region, samples: Floats, name: str) -> None:
     """Refuse a function without finite height, slope and curvature everywhere in the domain, or with steps or creases.
 
-    Parameters
-    ----------
-    samples : as `sample` returns them.
-    name : of the target, for the message.
-
-    Raises
-    ------
-    InputError : names the place and a remedy.
+    Raises:
+        InputError: names the place and a remedy.
     """
     _refuse(samples.reshape(8, -1), domain, name)
     if heights.exact:  # differences smooth a crease
@@ -173,8 +145,8 @@ def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str)
         apart = np.hypot(*(q[:2] - p[:2]))
         room = 1.0 + np.hypot(p[3], p[4]) + np.hypot(q[3], q[4])
         step = np.abs(q[2] - p[2]) > 10 * apart * room
-        crease = np.hypot(*(q[3:5] - p[3:5])) > SHARPEST * room
-        tip = _bend(tight) * heights.size > 1 / TIGHTEST
+        crease = np.hypot(*(q[3:5] - p[3:5])) > _SHARPEST * room
+        tip = _bend(tight) * heights.size > 1 / _TIGHTEST
         for at, bad, what in ((p, step, "a step"), (p, crease, "a crease"), (tight, tip, "a sharp point")):
             if bad.any():
                 x, y = _nearest_centre(at[:, bad], domain)
@@ -184,26 +156,17 @@ def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str)
                 )
 
 
-def trusted_region(heights: Heights, domain: Region, samples: Floats, name: str) -> Region | None:
-    """The largest region around the domain in which the function can be evaluated as it is.
+def trusted_region(heights: Heights, domain: _Region, samples: Floats, name: str) -> _Region | None:
+    """The largest region around the domain in which the function can be evaluated as it is; None for 1.6 times the
+    domain.
 
     There it is finite, and not steeper than slope 4 or twice its steepest inside.
 
-    Parameters
-    ----------
-    samples : as `sample` returns them.
-    name : of the target, for the message.
-
-    Returns
-    -------
-    None where that is all of 1.6 times the domain.
-
-    Raises
-    ------
-    InputError : a function without exact derivatives cannot be continued, and needs to be.
+    Raises:
+        InputError: a function without exact derivatives cannot be continued, and needs to be.
     """
     edge = _edge(domain)
-    limit = max(TAME, 2 * float(np.hypot(samples[3], samples[4]).max()))
+    limit = max(_TAME, 2 * float(np.hypot(samples[3], samples[4]).max()))
     growth = np.linspace(1.0, BAND, 61)
     for before, now in pairwise(growth):
         at = _evaluated(heights, now * edge)
@@ -217,20 +180,15 @@ def trusted_region(heights: Heights, domain: Region, samples: Floats, name: str)
     return None
 
 
-def climb(heights: Heights, domain: Region) -> Floats:
-    """Climb from many samples to local peaks.
-
-    Returns
-    -------
-    Points (n, 2) of the domain and its edge [m] without a higher point nearby; the highest is among them.
-    """
+def climb(heights: Heights, domain: _Region) -> Floats:
+    """Local peaks (n, 2) of the domain and its edge [m], climbed to from many samples; the highest is among them."""
     at = sample(heights, domain).reshape(8, -1)
     a, b = domain.half_extent
     pitch = max(a, b) * max(2 * np.pi / COLUMNS, 1 / ROWS)
     # a peak is at most this much higher than the lattice's points next to it
     hidden = 0.5 * np.abs(at[5:]).max() * pitch**2
     high = np.flatnonzero(at[2] >= at[2].max() - hidden)
-    xy = at[:2, [np.argmax(at[2]), *high[:: len(high) // CLIMBERS + 1]]].T
+    xy = at[:2, [np.argmax(at[2]), *high[:: len(high) // _CLIMBERS + 1]]].T
     for _ in range(60):  # Newton; where the peak is flat (x^4) it converges linearly
         _, _, _, zx, zy, zxx, zxy, zyy = _evaluated(heights, xy.T)
         bend, axes = np.linalg.eigh(np.moveaxis(np.array([[zxx, zxy], [zxy, zyy]]), 2, 0))
@@ -246,14 +204,14 @@ def climb(heights: Heights, domain: Region) -> Floats:
     return xy
 
 
-def grown(domain: Region, factor: float) -> Region:
+def grown(domain: _Region, factor: float) -> _Region:
     """The domain scaled by a factor."""
     if isinstance(domain, Disc):
         return replace(domain, radius=factor * domain.radius)
     return replace(domain, size=(factor * domain.size[0], factor * domain.size[1]))
 
 
-def relative_radius(domain: Region, x: Floats, y: Floats) -> Floats:
+def relative_radius(domain: _Region, x: Floats, y: Floats) -> Floats:
     """Relative distance from the centre of the domain: 0 there, 1 on the edge."""
     a, b = domain.half_extent
     if isinstance(domain, Disc):
@@ -264,11 +222,10 @@ def relative_radius(domain: Region, x: Floats, y: Floats) -> Floats:
 def _evaluated(heights: Heights, xy: Floats) -> Floats:
     """(8, n) x, y and all parts of the jet at points (2, n)."""
     jet = heights.jet(xy[0], xy[1])
-    parts = (jet.value, jet.dx, jet.dy, jet.dxx, jet.dxy, jet.dyy)
-    return np.stack([*xy, *(np.broadcast_to(np.asarray(part, dtype=float), xy[0].shape) for part in parts)])
+    return np.stack([*xy, *(np.broadcast_to(np.asarray(part, dtype=float), xy[0].shape) for part in jet.parts)])
 
 
-def _edge(domain: Region) -> Floats:
+def _edge(domain: _Region) -> Floats:
     a, b = domain.half_extent
     if isinstance(domain, Disc):
         angle = np.linspace(0.0, 2 * np.pi, 4 * ROWS)
@@ -278,7 +235,7 @@ def _edge(domain: Region) -> Floats:
     return np.hstack([across, np.negative(across), up, np.negative(up)])
 
 
-def _refuse(at: Floats, domain: Region, name: str) -> None:
+def _refuse(at: Floats, domain: _Region, name: str) -> None:
     flat = np.isfinite(at[2:5]).all(axis=0)
     slope = np.hypot(at[3], at[4])
     for bad, what in (
@@ -291,13 +248,13 @@ def _refuse(at: Floats, domain: Region, name: str) -> None:
             raise InputError(f"{name} has {what} at ({x:.4g}, {y:.4g}) m: use {_smaller(domain, x, y)}")
 
 
-def _nearest_centre(at: Floats, domain: Region) -> tuple[float, float]:
+def _nearest_centre(at: Floats, domain: _Region) -> tuple[float, float]:
     nearest = at[:2, int(np.argmin(relative_radius(domain, at[0], at[1])))]
     x, y = np.where(np.abs(nearest) < 1e-9 * max(domain.half_extent), 0.0, nearest)
     return float(x), float(y)
 
 
-def _smaller(domain: Region, x: float, y: float) -> str:
+def _smaller(domain: _Region, x: float, y: float) -> str:
     """Text that proposes a domain that ends before a point."""
     within = 0.95 * float(relative_radius(domain, np.array(x), np.array(y)))
     if within < 0.2:
@@ -315,7 +272,7 @@ def _close_in(heights: Heights, at: Floats) -> tuple[Floats, Floats]:
     """
     p = np.hstack([at[:, :-1].reshape(8, -1), at[:, :, :-1].reshape(8, -1)])
     q = np.hstack([at[:, 1:].reshape(8, -1), at[:, :, 1:].reshape(8, -1)])
-    worst = np.argsort(_misfit(p, q))[-SUSPECTS:]
+    worst = np.argsort(_misfit(p, q))[-_SUSPECTS:]
     p, q = p[:, worst], q[:, worst]
     for _ in range(HALVINGS):
         middle = _evaluated(heights, 0.5 * (p[:2] + q[:2]))
@@ -324,10 +281,10 @@ def _close_in(heights: Heights, at: Floats) -> tuple[Floats, Floats]:
     return p, q
 
 
-def _tighten(heights: Heights, domain: Region, at: Floats) -> Floats:
+def _tighten(heights: Heights, domain: _Region, at: Floats) -> Floats:
     """Points (8, k) of strongest curvature nearby: at a sharp point between the samples it grows."""
     a, b = domain.half_extent
-    at = at[:, np.argsort(_bend(at))[-SUSPECTS:]]
+    at = at[:, np.argsort(_bend(at))[-_SUSPECTS:]]
     step = np.array([[i, j] for i in (0, 1, -1) for j in (0, 1, -1)], dtype=float)
     reach = max(a, b) * max(2 * np.pi / COLUMNS, 1 / ROWS)
     while reach > 1e-6 * max(a, b):  # closer to a smooth 0/0 there is only round-off

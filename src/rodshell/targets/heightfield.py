@@ -25,7 +25,7 @@ from rodshell.targets.wall_below_rim import WalledTarget
 from rodshell.units import shown
 from rodshell.validation import instance
 
-FUNCTIONS: dict[str, Callable[[Any], Any]] = {
+_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "sqrt": np.sqrt,
     "exp": np.exp,
     "log": np.log,
@@ -40,15 +40,15 @@ FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "tanh": np.tanh,
     "abs": np.abs,
 }
-CONSTANTS = {"pi": pi, "e": e}
-OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+_CONSTANTS = {"pi": pi, "e": e}
+_OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-ALLOWED = "x, y, numbers, pi, e, + - * / ^, parentheses and " + ", ".join(FUNCTIONS)
+ALLOWED = "x, y, numbers, pi, e, + - * / ^, parentheses and " + ", ".join(_FUNCTIONS)
 
 FOREIGN = {"−": "-", "·": "*", "×": "*", "÷": "/", "²": "^2", "³": "^3", "=": "only the part after it"}
 LONGEST = 4000  # characters; Python's parser is safe with texts of this length
@@ -57,20 +57,19 @@ TIE = 1e-6  # of the size: peaks this close in height count as equally high
 SAME = 1e-3  # of the size: refined peaks this close are the same
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/^() ]|//|__")
 
-Slot = int
-Step = tuple[Callable[..., Any], Slot, Slot | None]
+_Slot = int
+Step = tuple[Callable[..., Any], _Slot, _Slot | None]
 
 
 @dataclass(frozen=True)
 class Formula:
     """z = f(x, y), callable with numbers, arrays or jets. Make one with `parse_formula`.
 
-    Parameters
-    ----------
-    text : the formula as it was written.
-    constants : numbers in slots 2, 3, ...; slots 0 and 1 are x and y.
-    steps : a straight-line program: functions of one or two earlier slots, whose results go into the next slots. Equal
-        parts of the formula are evaluated once.
+    Args:
+        text: the formula as it was written.
+        constants: numbers in slots 2, 3, ...; slots 0 and 1 are x and y.
+        steps: a straight-line program: functions of one or two earlier slots, whose results go into the next slots.
+            Equal parts of the formula are evaluated once.
     """
 
     text: str
@@ -90,13 +89,11 @@ class Formula:
 def parse_formula(text: str) -> Formula:
     """Read a formula in x and y without running any code.
 
-    Parameters
-    ----------
-    text : numbers, x, y, pi, e, + - * / ^ (or **), parentheses and `FUNCTIONS`.
+    Args:
+        text: numbers, x, y, pi, e, + - * / ^ (or **), parentheses and `_FUNCTIONS`.
 
-    Raises
-    ------
-    InputError : anything else; one sentence that names the wrong part and lists what is allowed.
+    Raises:
+        InputError: anything else; one sentence that names the wrong part and lists what is allowed.
     """
     if not isinstance(text, str):
         raise InputError(f"a formula must be text such as {shown('0.1 - 2*x^2 - y^2')}, not {shown(text)}")
@@ -136,7 +133,7 @@ class _Compiler:
             self._step(operator.pos, result)
         constants = dict.fromkeys(a for step in self.steps for a in step[1:] if isinstance(a, float))
         operands: list[_Operand] = ["x", "y", *constants, *self.steps.values()]
-        slot_of: dict[_Operand | None, Slot | None] = {None: None}
+        slot_of: dict[_Operand | None, _Slot | None] = {None: None}
         slot_of |= {operand: slot for slot, operand in enumerate(operands)}
         steps = tuple((function, slot_of[a] or 0, slot_of[b]) for function, a, b in self.steps)
         return Formula(self.text, tuple(constants), steps)
@@ -159,55 +156,47 @@ class _Compiler:
         done: dict[ast.expr, _Operand] = {}
         stack = [root]
         while stack:
-            waiting = [child for child in self._operands(stack[-1]) if child not in done]
+            function, parts = self._read(stack[-1])
+            waiting = [part for part in parts if part not in done]
             if waiting:
                 stack.extend(reversed(waiting))
             else:
                 node = stack.pop()
-                done[node] = self._operand(node, done)
+                done[node] = self._apply(node, function, [done[part] for part in parts]) if parts else function()
         return done[root]
 
-    def _operands(self, node: ast.expr) -> list[ast.expr]:
+    def _read(self, node: ast.expr) -> tuple[Callable[..., Any], list[ast.expr]]:
+        """The function of a node, and its operands; of a number or a name one without operands."""
         match node:
-            case ast.BinOp(left, op, right) if type(op) in OPERATORS:
-                return [left, right]
-            case ast.UnaryOp(ast.USub() | ast.UAdd(), inner):
-                return [inner]
-            case ast.Call(ast.Name(name), args, []) if name in FUNCTIONS:
+            case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
+                return _OPERATORS[type(op)], [left, right]
+            case ast.UnaryOp(ast.USub() | ast.UAdd() as op, inner):
+                return operator.neg if isinstance(op, ast.USub) else operator.pos, [inner]
+            case ast.Call(ast.Name(name), args, []) if name in _FUNCTIONS:
                 if len(args) != 1:
                     raise self._wrong(node, f"has {len(args)} values: write {name}(...) with one")
-                return args
-            case ast.Name(name) if name in FUNCTIONS:
+                return _FUNCTIONS[name], args
+            case ast.Name(name) if name in _FUNCTIONS:
                 raise self._wrong(node, f"has no value: write {name}(...)")
-            case ast.Name(name) if name in ("x", "y") or name in CONSTANTS:
-                return []
-            case ast.Constant(value) if type(value) in (int, float):
-                return []
+            case ast.Name(name) if name in ("x", "y") or name in _CONSTANTS:
+                return lambda: _CONSTANTS.get(name, name), []
+            case ast.Constant(int() | float() as value) if type(value) is not bool:
+                return lambda: self._finite(node, _number(value)), []
         raise _refusal(self.text, self._piece(node), _meant(node))
 
-    def _operand(self, node: ast.expr, done: dict[ast.expr, _Operand]) -> _Operand:
-        function: Callable[..., Any]
-        operands: tuple[_Operand, ...]
-        match node:
-            case ast.Name(name):
-                return CONSTANTS.get(name, name)
-            case ast.UnaryOp(ast.UAdd(), inner):
-                return done[inner]
-            case ast.Constant(int() | float() as value):
-                function, operands = float, (_number(value),)
-            case ast.UnaryOp(_, inner):
-                function, operands = operator.neg, (done[inner],)
-            case ast.BinOp(left, op, right):
-                function, operands = OPERATORS[type(op)], (done[left], done[right])
-                if function is operator.truediv and operands[1] == 0.0:
-                    raise self._wrong(node, "divides by zero: write a divisor other than 0")
-            case ast.Call(ast.Name(name), [inner]):
-                function, operands = FUNCTIONS[name], (done[inner],)
+    def _apply(self, node: ast.expr, function: Callable[..., Any], operands: list[_Operand]) -> _Operand:
+        """A step of the program, or a number where all operands are numbers."""
+        if function is operator.truediv and operands[1] == 0.0:
+            raise self._wrong(node, "divides by zero: write a divisor other than 0")
+        if function is operator.pos:
+            return operands[0]
         numbers = [np.float64(operand) for operand in operands if isinstance(operand, float)]
         if len(numbers) < len(operands):
             return self._step(function, *operands)
         with np.errstate(all="ignore"):
-            value = float(function(*numbers))
+            return self._finite(node, float(function(*numbers)))
+
+    def _finite(self, node: ast.expr, value: float) -> float:
         if not isfinite(value):
             raise self._wrong(node, "is not a finite number: change it")
         return value
@@ -235,7 +224,7 @@ def _meant(node: ast.expr) -> str | None:
     match node:
         case ast.Call(ast.Attribute(_, name) | ast.Name(name)) | ast.Attribute(_, name) | ast.Name(name):
             spelt = {"ln": "log"}.get(name, name.lower().replace("arc", "a"))
-            return next(iter(get_close_matches(spelt, ["x", "y", *CONSTANTS, *FUNCTIONS], n=1)), None)
+            return next(iter(get_close_matches(spelt, ["x", "y", *_CONSTANTS, *_FUNCTIONS], n=1)), None)
     return None
 
 
@@ -262,18 +251,16 @@ class HeightField(WalledTarget):
     4, or twice the steepest inside) within 1.6 times the domain, Taylor polynomials of second degree continue it, so
     that the curvature stays continuous.
 
-    Parameters
-    ----------
-    formula : in x and y [m], such as "0.1 - 2*x^2 - y^2"; see `parse_formula`.
-    function : instead of a formula: z(x, y) of arrays (n,) [m]. If it consists of arithmetic and numpy functions, its
-        derivatives are exact (`Jet`). Any other is differentiated by central differences of fourth order, is called up
-        to 1.61 times the domain and must be smooth there: creases in it are not detected.
-    domain : a disc or a rectangle, centred on the origin.
+    Args:
+        formula: in x and y [m], such as "0.1 - 2*x^2 - y^2"; see `parse_formula`.
+        function: instead of a formula: z(x, y) of arrays (n,) [m]. If it consists of arithmetic and numpy functions,
+            its derivatives are exact (`Jet`). Any other is differentiated by central differences of fourth order, is
+            called up to 1.61 times the domain and must be smooth there: creases in it are not detected.
+        domain: a disc or a rectangle, centred on the origin.
 
-    Raises
-    ------
-    InputError : not exactly one of formula and function; a formula that cannot be read; a height, slope or curvature in
-        the domain that is not finite; a step or a crease. The message says where, and names a remedy.
+    Raises:
+        InputError: not exactly one of formula and function; a formula that cannot be read; a height, slope or curvature
+            in the domain that is not finite; a step or a crease. The message says where, and names a remedy.
     """
 
     formula: str | None = None

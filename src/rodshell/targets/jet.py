@@ -1,6 +1,8 @@
 """Second-order forward differentiation: a value with its exact gradient and Hessian in two variables."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from numbers import Real
 from typing import Any, NoReturn
 
@@ -8,12 +10,13 @@ import numpy as np
 
 from rodshell.arrays import Floats
 
-Part = Any
+_Part = Any
 """A part of a jet: an array, a float where it is constant, or a jet."""
 
-LN2, LN10 = float(np.log(2.0)), float(np.log(10.0))
+LN2, _LN10 = float(np.log(2.0)), float(np.log(10.0))
 
 
+@dataclass(slots=True, eq=False, repr=False)
 class Jet:
     """A function of x and y at n points: value, gradient and Hessian through arithmetic and numpy functions.
 
@@ -21,26 +24,24 @@ class Jet:
     a single variable. Parts may be jets: a jet of jets has higher derivatives. Operations without a derivative here
     (comparisons, np.where, np.maximum, float()) are refused with a TypeError.
 
-    Parameters
-    ----------
-    value, dx, dy, dxx, dxy, dyy : (n,) arrays, floats or jets.
+    Args:
+        value, dx, dy, dxx, dxy, dyy: (n,) arrays, floats or jets.
     """
 
-    __slots__ = ("dx", "dxx", "dxy", "dy", "dyy", "value")
+    value: _Part
+    dx: _Part = 0.0
+    dy: _Part = 0.0
+    dxx: _Part = 0.0
+    dxy: _Part = 0.0
+    dyy: _Part = 0.0
 
-    def __init__(
-        self,
-        value: Part,
-        dx: Part = 0.0,
-        dy: Part = 0.0,
-        dxx: Part = 0.0,
-        dxy: Part = 0.0,
-        dyy: Part = 0.0,
-    ) -> None:
-        self.value, self.dx, self.dy, self.dxx, self.dxy, self.dyy = value, dx, dy, dxx, dxy, dyy
+    @property
+    def parts(self) -> tuple[_Part, ...]:
+        """Value, first and second derivatives, in the order of the arguments."""
+        return self.value, self.dx, self.dy, self.dxx, self.dxy, self.dyy
 
     @staticmethod
-    def variables(x: Part, y: Part) -> tuple["Jet", "Jet"]:
+    def variables(x: _Part, y: _Part) -> tuple["Jet", "Jet"]:
         """The variables `x` and `y` (n,) as jets."""
         return Jet(x, dx=1.0), Jet(y, dy=1.0)
 
@@ -73,7 +74,7 @@ class Jet:
         return _power(other, self)
 
     def __neg__(self) -> "Jet":
-        return Jet(-self.value, -self.dx, -self.dy, -self.dxx, -self.dxy, -self.dyy)
+        return Jet(*(-part for part in self.parts))
 
     def __pos__(self) -> "Jet":
         return self
@@ -82,7 +83,7 @@ class Jet:
         return _chain(self, np.abs(self.value), np.sign(_plain(self.value)), 0.0)
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        rule = RULES.get(ufunc)
+        rule = _RULES.get(ufunc)
         if rule is None or method != "__call__" or options:
             return NotImplemented
         return rule(*inputs)
@@ -99,7 +100,7 @@ class Jet:
     __hash__ = None  # type: ignore[assignment]
 
 
-def _times(a: Part, b: Part) -> Part:
+def _times(a: _Part, b: _Part) -> _Part:
     """a b, without arithmetic where a factor is a plain 0 or 1: a part that is zero everywhere stays so."""
     if a.__class__ is float:
         if a == 0.0:
@@ -114,7 +115,7 @@ def _times(a: Part, b: Part) -> Part:
     return a * b
 
 
-def _plus(a: Part, b: Part) -> Part:
+def _plus(a: _Part, b: _Part) -> _Part:
     if a.__class__ is float and a == 0.0:
         return b
     if b.__class__ is float and b == 0.0:
@@ -122,7 +123,7 @@ def _plus(a: Part, b: Part) -> Part:
     return a + b
 
 
-def _minus(a: Part, b: Part) -> Part:
+def _minus(a: _Part, b: _Part) -> _Part:
     if b.__class__ is float and b == 0.0:
         return a
     if a.__class__ is float and a == 0.0:
@@ -130,45 +131,29 @@ def _minus(a: Part, b: Part) -> Part:
     return a - b
 
 
-def _over(a: Part, b: Part) -> Part:
+def _over(a: _Part, b: _Part) -> _Part:
     return 0.0 if a.__class__ is float and a == 0.0 else a / b
 
 
-def _plain(part: Part) -> Any:
+def _plain(part: _Part) -> Any:
     """The array in a jet of jets."""
     while part.__class__ is Jet:
         part = part.value
     return part
 
 
+def _jet(a: Any) -> Jet:
+    return a if a.__class__ is Jet else Jet(a)
+
+
 def _add(a: Any, b: Any) -> Jet:
-    if b.__class__ is not Jet:
-        return Jet(a.value + b, a.dx, a.dy, a.dxx, a.dxy, a.dyy)
-    if a.__class__ is not Jet:
-        return Jet(a + b.value, b.dx, b.dy, b.dxx, b.dxy, b.dyy)
-    return Jet(
-        a.value + b.value,
-        _plus(a.dx, b.dx),
-        _plus(a.dy, b.dy),
-        _plus(a.dxx, b.dxx),
-        _plus(a.dxy, b.dxy),
-        _plus(a.dyy, b.dyy),
-    )
+    a, b = _jet(a), _jet(b)
+    return Jet(a.value + b.value, *map(_plus, a.parts[1:], b.parts[1:]))
 
 
 def _subtract(a: Any, b: Any) -> Jet:
-    if b.__class__ is not Jet:
-        return Jet(a.value - b, a.dx, a.dy, a.dxx, a.dxy, a.dyy)
-    if a.__class__ is not Jet:
-        return Jet(a - b.value, -b.dx, -b.dy, -b.dxx, -b.dxy, -b.dyy)
-    return Jet(
-        a.value - b.value,
-        _minus(a.dx, b.dx),
-        _minus(a.dy, b.dy),
-        _minus(a.dxx, b.dxx),
-        _minus(a.dxy, b.dxy),
-        _minus(a.dyy, b.dyy),
-    )
+    a, b = _jet(a), _jet(b)
+    return Jet(a.value - b.value, *map(_minus, a.parts[1:], b.parts[1:]))
 
 
 def _multiply(a: Any, b: Any) -> Jet:
@@ -176,7 +161,7 @@ def _multiply(a: Any, b: Any) -> Jet:
         a, b = b, a
     f, p, q = a.value, a.dx, a.dy
     if b.__class__ is not Jet:
-        return Jet(f * b, _times(p, b), _times(q, b), _times(a.dxx, b), _times(a.dxy, b), _times(a.dyy, b))
+        return Jet(f * b, *[_times(part, b) for part in a.parts[1:]])
     g, r, s = b.value, b.dx, b.dy
     return Jet(
         f * g,
@@ -189,9 +174,7 @@ def _multiply(a: Any, b: Any) -> Jet:
 
 
 def _divide(a: Any, b: Any) -> Jet:
-    if b.__class__ is not Jet:
-        return Jet(a.value / b, _over(a.dx, b), _over(a.dy, b), _over(a.dxx, b), _over(a.dxy, b), _over(a.dyy, b))
-    a = a if a.__class__ is Jet else Jet(a)
+    a, b = _jet(a), _jet(b)
     g, r, s = b.value, b.dx, b.dy
     f = a.value / g
     # differentiate f g = a
@@ -204,7 +187,7 @@ def _divide(a: Any, b: Any) -> Jet:
 
 def _power(a: Any, b: Any) -> Any:
     if b.__class__ is Jet:
-        return _exp(_multiply(_log(a) if a.__class__ is Jet else np.log(a), b))
+        return _smooth(np.exp, _multiply(np.log(a), b))
     u, c = a.value, b
     if isinstance(c, Real):
         c = float(c)
@@ -219,7 +202,7 @@ def _power(a: Any, b: Any) -> Any:
     return _chain(a, u**c, c * u ** (c - 1.0), c * (c - 1.0) * u ** (c - 2.0))
 
 
-def _chain(u: Jet, value: Part, d1: Part, d2: Part) -> Jet:
+def _chain(u: Jet, value: _Part, d1: _Part, d2: _Part) -> Jet:
     """f(u) from f, f' and f'' at u's value."""
     p, q = u.dx, u.dy
     dx, dy = _times(d1, p), _times(d1, q)
@@ -234,84 +217,33 @@ def _chain(u: Jet, value: Part, d1: Part, d2: Part) -> Jet:
     )
 
 
-def _exp(u: Jet) -> Jet:
-    f = np.exp(u.value)
-    return _chain(u, f, f, f)
+# f'(u, f) and f''(u, f, f') of smooth functions f(u)
+_DERIVATIVES: dict[np.ufunc, tuple[Callable[[_Part, _Part], _Part], Callable[[_Part, _Part, _Part], _Part]]] = {
+    np.exp: (lambda u, f: f, lambda u, f, d: d),
+    np.expm1: (lambda u, f: np.exp(u), lambda u, f, d: d),
+    np.log: (lambda u, f: 1.0 / u, lambda u, f, d: -(d * d)),
+    np.log1p: (lambda u, f: 1.0 / (1.0 + u), lambda u, f, d: -(d * d)),
+    np.sqrt: (lambda u, f: 0.5 / f, lambda u, f, d: -(d * d) / f),
+    np.sin: (lambda u, f: np.cos(u), lambda u, f, d: -f),
+    np.cos: (lambda u, f: -np.sin(u), lambda u, f, d: -f),
+    np.tan: (lambda u, f: 1.0 + f * f, lambda u, f, d: 2.0 * f * d),
+    np.arcsin: (lambda u, f: 1.0 / np.sqrt(1.0 - u * u), lambda u, f, d: u * d * d * d),
+    np.arccos: (lambda u, f: -1.0 / np.sqrt(1.0 - u * u), lambda u, f, d: u * d * d * d),
+    np.arctan: (lambda u, f: 1.0 / (1.0 + u * u), lambda u, f, d: -2.0 * u * d * d),
+    np.sinh: (lambda u, f: np.cosh(u), lambda u, f, d: f),
+    np.cosh: (lambda u, f: np.sinh(u), lambda u, f, d: f),
+    np.tanh: (lambda u, f: 1.0 - f * f, lambda u, f, d: -2.0 * f * d),
+}
 
 
-def _expm1(u: Jet) -> Jet:
-    d = np.exp(u.value)
-    return _chain(u, np.expm1(u.value), d, d)
+def _smooth(function: np.ufunc, u: Jet) -> Jet:
+    first, second = _DERIVATIVES[function]
+    f = function(u.value)
+    d = first(u.value, f)
+    return _chain(u, f, d, second(u.value, f, d))
 
 
-def _log(u: Jet) -> Jet:
-    d = 1.0 / u.value
-    return _chain(u, np.log(u.value), d, -(d * d))
-
-
-def _log1p(u: Jet) -> Jet:
-    d = 1.0 / (1.0 + u.value)
-    return _chain(u, np.log1p(u.value), d, -(d * d))
-
-
-def _sqrt(u: Jet) -> Jet:
-    f = np.sqrt(u.value)
-    d = 0.5 / f
-    return _chain(u, f, d, -(d * d) / f)
-
-
-def _sin(u: Jet) -> Jet:
-    f = np.sin(u.value)
-    return _chain(u, f, np.cos(u.value), -f)
-
-
-def _cos(u: Jet) -> Jet:
-    f = np.cos(u.value)
-    return _chain(u, f, -np.sin(u.value), -f)
-
-
-def _tan(u: Jet) -> Jet:
-    f = np.tan(u.value)
-    d = 1.0 + f * f
-    return _chain(u, f, d, 2.0 * f * d)
-
-
-def _arcsin(u: Jet) -> Jet:
-    d = 1.0 / np.sqrt(1.0 - u.value * u.value)
-    return _chain(u, np.arcsin(u.value), d, u.value * d * d * d)
-
-
-def _arccos(u: Jet) -> Jet:
-    d = -1.0 / np.sqrt(1.0 - u.value * u.value)
-    return _chain(u, np.arccos(u.value), d, u.value * d * d * d)
-
-
-def _arctan(u: Jet) -> Jet:
-    d = 1.0 / (1.0 + u.value * u.value)
-    return _chain(u, np.arctan(u.value), d, -2.0 * u.value * d * d)
-
-
-def _sinh(u: Jet) -> Jet:
-    f = np.sinh(u.value)
-    return _chain(u, f, np.cosh(u.value), f)
-
-
-def _cosh(u: Jet) -> Jet:
-    f = np.cosh(u.value)
-    return _chain(u, f, np.sinh(u.value), f)
-
-
-def _tanh(u: Jet) -> Jet:
-    f = np.tanh(u.value)
-    d = 1.0 - f * f
-    return _chain(u, f, d, -2.0 * f * d)
-
-
-def _hypot(a: Any, b: Any) -> Jet:
-    return _sqrt(_add(a * a, b * b))
-
-
-RULES: dict[np.ufunc, Callable[..., Any]] = {
+_RULES: dict[np.ufunc, Callable[..., Any]] = {
     np.add: _add,
     np.subtract: _subtract,
     np.multiply: _multiply,
@@ -324,36 +256,18 @@ RULES: dict[np.ufunc, Callable[..., Any]] = {
     np.fabs: Jet.__abs__,
     np.square: lambda u: _power(u, 2.0),
     np.reciprocal: lambda u: _divide(1.0, u),
-    np.sqrt: _sqrt,
-    np.hypot: _hypot,
-    np.exp: _exp,
-    np.exp2: lambda u: _exp(_multiply(u, LN2)),
-    np.expm1: _expm1,
-    np.log: _log,
-    np.log2: lambda u: _divide(_log(u), LN2),
-    np.log10: lambda u: _divide(_log(u), LN10),
-    np.log1p: _log1p,
-    np.sin: _sin,
-    np.cos: _cos,
-    np.tan: _tan,
-    np.arcsin: _arcsin,
-    np.arccos: _arccos,
-    np.arctan: _arctan,
-    np.sinh: _sinh,
-    np.cosh: _cosh,
-    np.tanh: _tanh,
+    np.hypot: lambda a, b: _smooth(np.sqrt, _add(a * a, b * b)),
+    np.exp2: lambda u: _smooth(np.exp, _multiply(u, LN2)),
+    np.log2: lambda u: _divide(_smooth(np.log, u), LN2),
+    np.log10: lambda u: _divide(_smooth(np.log, u), _LN10),
+    **{function: partial(_smooth, function) for function in _DERIVATIVES},
 }
 """The derivatives of numpy functions; any other function is refused."""
 
 
 def differences(function: Callable[[Any, Any], Any], x: Floats, y: Floats, step: float) -> Jet:
-    """Differentiate a function of plain arrays by central differences of fourth order.
-
-    Parameters
-    ----------
-    function : z(x, y) of arrays; it is called once with all 17 points of the stencil.
-    x, y : (n,) points.
-    """
+    """z(x, y), a function of plain arrays, and its derivatives at points `x`, `y` (n,), by central differences of
+    fourth order; it is called once with all 17 points of the stencil."""
     near, far = np.array([[1], [-1]]), np.array([[2], [-2]])
     zero = np.zeros((2, 1))
     corner = np.array([[1], [1], [-1], [-1]]), np.array([[1], [-1], [1], [-1]])

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from itertools import islice
 from os import PathLike
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from rodshell.targets.gltf import gltf_counts, gltf_parts
 from rodshell.targets.polygon_files import obj_content, off_content, ply_content
 from rodshell.targets.polygons import Polygons
 from rodshell.targets.trianglemesh import MOST_FACES, require_indices
-from rodshell.units import shown
+from rodshell.units import as_built, shown
 from rodshell.untrusted import limit, raised, read_bytes
 
 Content = TypeVar("Content")
@@ -25,8 +25,10 @@ Notes = tuple[str, ...]
 
 MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
 IN_METRES = (".glb", ".gltf")  # the standard of these formats fixes the unit
+STEP_FILES = (".step", ".stp")  # they state theirs, and are read in metres
 LARGEST_FILE = 300e6  # bytes
-SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a gridshell can have
+ANOTHER_UNIT = "give another unit"
+SMALLEST, LARGEST = 1e-6, 1e3  # m: extents that a gridshell can have, from micro-structures to roofs
 LOOSE = 0.03  # of the vertices of a file that belong to no face: more are reported
 HEAD = 4000  # bytes that hold the header
 MOST_HEIGHTS = MOST_FACES // 2
@@ -34,22 +36,32 @@ MOST_PARTS = 500  # nodes, solids, properties: readers need time for each pair o
 NAMES = 20  # of a file's objects that a message lists
 
 
-def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = None) -> tuple[Floats, Ints, Notes]:
-    """Read the surface in a mesh file.
+class FileSurface(NamedTuple):
+    """The surface that a file gives.
 
-    Parameters
-    ----------
-    path : an OBJ, STL, PLY, OFF or glTF file.
-    unit : length of the file's unit [m]; None only for a format that fixes it.
-    name : of an object or a group, if the file has several.
+    Args:
+        vertices: (n, 3) in the file's unit.
+        faces: (m, 3) triangles.
+        notes: for the user, in sentences.
+        trims: closed polylines (n, 3) at which it ends, in addition to its open boundary.
+        unit: length of the file's unit [m]; None where the file does not state it, or its format fixes it.
+    """
 
-    Returns
-    -------
-    Vertices (n, 3) [m], triangles (m, 3), and notes for the user, in sentences.
+    vertices: Floats
+    faces: Ints
+    notes: Notes = ()
+    trims: tuple[Floats, ...] = ()
+    unit: float | None = None
 
-    Raises
-    ------
-    InputError : the file is missing, damaged or truncated; it has no surface or no unit; its size is implausible.
+
+def read_mesh(path: str | PathLike[str], name: str | None = None) -> FileSurface:
+    """Read the surface in an OBJ, STL, PLY, OFF or glTF file.
+
+    Args:
+        name: of an object or a group, if the file has several.
+
+    Raises:
+        InputError: the file is missing, damaged or truncated; it has no surface.
     """
     path = Path(path)
     data = file_bytes(path)
@@ -63,7 +75,7 @@ def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = 
         notes = (
             f"{loose} of the {listed} vertices of {path.name} belong to no face: if it lacks any, export it again",
         )
-    return in_metres(vertices, faces, unit, path), faces, notes
+    return FileSurface(vertices, faces, notes)
 
 
 def require_few_heights(path: Path, rows: int, columns: int) -> None:
@@ -77,9 +89,8 @@ def require_few_heights(path: Path, rows: int, columns: int) -> None:
 def file_bytes(path: Path) -> bytes:
     """The content of a file.
 
-    Raises
-    ------
-    InputError : the file is missing, empty, a device or too large, or cannot be read.
+    Raises:
+        InputError: the file is missing, empty, a device or too large, or cannot be read.
     """
     data = read_bytes(path, LARGEST_FILE, smaller="reduce the mesh, as about 20,000 triangles are enough")
     if not data:
@@ -87,48 +98,44 @@ def file_bytes(path: Path) -> bytes:
     return data
 
 
-def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> Floats:
-    """Scale vertices to metres, and refuse a size that no gridshell has.
+def in_metres(surface: FileSurface, unit: float | None, path: Path) -> FileSurface:
+    """Scale a surface to metres, and refuse a size that no gridshell has; only vertices of faces count for it.
 
-    Parameters
-    ----------
-    vertices : (n, 3) in the file's unit.
-    faces : (m, 3); only vertices of faces count for the size.
-    unit : length of the file's unit [m]; None only for a format that fixes it.
-    path : of the file, for the message.
+    Args:
+        unit: length of the file's unit [m]; None for the one that the file states, or that its format fixes.
+        path: of the file, for the message.
 
-    Raises
-    ------
-    InputError : no unit, or a surface smaller than 1 mm or larger than 1 km.
+    Raises:
+        InputError: no unit, or a surface smaller than 1 um or larger than 1 km.
     """
-    used = vertices[np.unique(faces)] if len(faces) else vertices
-    extent = np.ptp(used, axis=0) if len(used) and np.isfinite(used).all() else np.full(3, np.nan)
-    if unit is None:
-        if path.suffix.lower() not in IN_METRES and np.isfinite(extent).all():  # else it is refused for that
-            raise InputError(
-                f"{path} does not state its unit (it is {_units(extent)} wide): give it, such as --unit mm (in Python "
-                "unit=0.001)"
-            )
-        unit = 1.0
-    require_size(path, extent, unit)
-    return vertices * unit
+    unit = surface.unit if unit is None else unit
+    used = surface.vertices[np.unique(surface.faces)]
+    extent = np.ptp(used, axis=0) if len(used) and np.isfinite(used).all() else np.full(3, np.nan)  # refused later
+    if unit is None and path.suffix.lower() not in (*IN_METRES, *STEP_FILES) and np.isfinite(extent).all():
+        raise InputError(
+            f"{path} does not state its unit (it is {_units(extent)} wide): give it, such as --unit mm (in Python "
+            "unit=0.001)"
+        )
+    scale = unit or 1.0
+    require_size(path, extent, scale)
+    trims = tuple(trim * scale for trim in surface.trims)
+    return surface._replace(vertices=surface.vertices * scale, trims=trims, unit=unit)
 
 
-def require_size(path: Path, extent: Floats, unit: float, *, instead: str = "give another unit") -> None:
+def require_size(path: Path, extent: Floats, unit: float, *, instead: str = ANOTHER_UNIT) -> None:
     """Refuse a size that no gridshell has; one that is not finite is left to other checks.
 
-    Parameters
-    ----------
-    path : of the file, for the message.
-    extent : (k,) widths along x, y and perhaps z in the file's unit.
-    unit : length of the file's unit [m].
+    Args:
+        extent: (k,) widths along x, y and perhaps z in the file's unit.
+        unit: length of the file's unit [m].
 
-    Raises
-    ------
-    InputError : smaller than 1 mm or larger than 1 km.
+    Raises:
+        InputError: smaller than 1 um or larger than 1 km.
     """
     largest = float(extent.max()) * unit
     if np.isfinite(largest) and largest > 0 and not SMALLEST <= largest <= LARGEST:
+        if instead == ANOTHER_UNIT and (likely := as_built(largest, unit)):
+            instead += f", such as {next(iter(likely))}"
         raise InputError(
             f"{path} is {largest:.3g} m wide in this unit ({_units(extent)}): {instead}, for {SMALLEST:g} to "
             f"{LARGEST:g} m"
@@ -233,16 +240,10 @@ _TRIANGLES = {".obj": _of_obj, ".off": _of_off, ".ply": _of_ply}
 
 
 def read_with(path: Path, format: str, reader: Callable[[], Content]) -> Content:
-    """What a reader finds; a damaged file can break it anywhere.
+    """What a reader of a `format`, as it is called in messages, finds; a damaged file can break it anywhere.
 
-    Parameters
-    ----------
-    path : of the file, for messages.
-    format : as it is called in messages.
-
-    Raises
-    ------
-    InputError : the reader fails.
+    Raises:
+        InputError: the reader fails.
     """
     try:
         with np.errstate(all="ignore"):  # values that are not finite are refused later, with their place

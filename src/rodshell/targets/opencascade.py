@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-ON_BORDER = 1e-6  # of the range of a parameter
+_ON_BORDER = 1e-6  # of the range of a parameter
 
 
 def read(path: str) -> list[tuple[Any, list[str]]]:
@@ -49,15 +49,9 @@ def parts(whole: Any, kind: Any) -> Iterator[Any]:
         explorer.Next()
 
 
-def points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
-    """Points (k, l, 3) of a surface on a lattice of its parameters [mm].
-
-    Parameters
-    ----------
-    grid : intervals each way, at least.
-    per_span : intervals for each span of the surface.
-    finest : intervals each way, at most.
-    """
+def _points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
+    """Points (k, l, 3) [mm] of a surface on a lattice of its parameters, with at least `grid` intervals each way,
+    `per_span` for each span of the surface, and at most `finest`."""
     from OCP.GeomAbs import GeomAbs_CN
 
     sides = []
@@ -82,7 +76,7 @@ def edges(face: Any) -> list[Any]:
     return [TopoDS.Edge(edge) for edge in parts(face, TopAbs_EDGE)]
 
 
-def is_untrimmed(face: Any, surface: Any) -> bool:
+def _is_untrimmed(face: Any, surface: Any) -> bool:
     """Whether all edges run along the bounds of the surface's parameters."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 
@@ -93,7 +87,7 @@ def is_untrimmed(face: Any, surface: Any) -> bool:
         t = np.linspace(curve.FirstParameter(), curve.LastParameter(), 9)
         uv = np.array([(p.X(), p.Y()) for p in map(curve.Value, t.tolist())])
         away = np.minimum(np.abs(uv - low), np.abs(uv - high))
-        if not (away.max(axis=0) <= ON_BORDER * (high - low)).any():
+        if not (away.max(axis=0) <= _ON_BORDER * (high - low)).any():
             return False
     return True
 
@@ -116,14 +110,12 @@ def trims_of(face: Any, along_edges: int) -> Any:
 def main(request: dict[str, Any]) -> dict[str, Any]:
     """The faces of a file, and the one that is wanted.
 
-    Parameters
-    ----------
-    request : `path`, `name` of a face, or None, and the resolution: `grid`, `per_span`, `finest`, `along_edges`.
+    Args:
+        request: `path`, `name` of a face, or None, and the resolution: `grid`, `per_span`, `finest`, `along_edges`.
 
-    Returns
-    -------
-    `names` (JSON, a list for each face) and, if one face matches, `points` (k, l, 3) of its surface and `trims`
-    (n, along_edges + 1, 3), the curves that bound it, in millimetres.
+    Returns:
+        `names` (JSON, a list for each face) and, if one face matches, `points` (k, l, 3) of its surface and `trims`
+        (n, along_edges + 1, 3), the curves that bound it, in millimetres.
     """
     from OCP.BRepAdaptor import BRepAdaptor_Surface
 
@@ -132,8 +124,8 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
     wanted = [face for k, (face, names) in enumerate(faces) if request["name"] in (None, str(k + 1), *names)]
     if len(wanted) == 1:
         surface = BRepAdaptor_Surface(wanted[0], True)
-        found["points"] = points_of(surface, request["grid"], request["per_span"], request["finest"])
+        found["points"] = _points_of(surface, request["grid"], request["per_span"], request["finest"])
         along = request["along_edges"]
-        untrimmed = is_untrimmed(wanted[0], surface)
+        untrimmed = _is_untrimmed(wanted[0], surface)
         found["trims"] = np.empty((0, along + 1, 3)) if untrimmed else trims_of(wanted[0], along)
     return found

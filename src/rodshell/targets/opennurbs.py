@@ -12,17 +12,16 @@ FEWEST = 8  # pieces of each span of a curve
 def main(request: dict[str, Any]) -> dict[str, Any]:
     """The surfaces of a file, and the one that is wanted; or its curves.
 
-    Parameters
-    ----------
-    request : `path`; `along_edges`, the pieces of each edge or curve; and `name` of an object or a layer, or None, or
-        `most`, curves.
+    Args:
+        request: `path`; `along_edges`, the pieces of each edge or curve; `most_joined`, faces of a polysurface; and
+            `name` of an object or a layer, or None, or `most`, curves.
 
-    Returns
-    -------
-    `unit`, by its name, `names` (JSON: object, layer and number of faces of each surface) and `others` (JSON: numbers
-    of meshes, SubDs and curves); nothing for another kind of file. If one surface with one face matches, also `degrees`
-    (2,), `knots_u` and `knots_v` without the first and the last, `controls` (m, n, 4) and `trims`
-    (k, along_edges + 1, 3), the curves that bound it.
+    Returns:
+        `unit`, by its name, `names` (JSON: object, layer and number of faces of each surface) and `others` (JSON:
+        numbers of meshes, SubDs and curves); nothing for another kind of file. If one surface matches, and has one face
+        or only untrimmed ones, also their number `surfaces`, of each `degrees0` (2,), `knots_u0` and `knots_v0` without
+        the first and the last and `controls0` (m, n, 4), and `trims` (k, along_edges + 1, 3), the curves that bound a
+        single one.
 
     Of curves `unit` and their `count`; if it is not above `most`, `points` and `ends` as `dxf_curves` returns them.
     """
@@ -33,34 +32,45 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
         return {}
     found: dict[str, Any] = {"unit": model.Settings.ModelUnitSystem.name}
     if "most" in request:
-        curves = curves_of(model)
+        curves = _curves_of(model)
         drawn = [divided(curve, request["along_edges"]) for curve in curves[: int(request["most"])]]
         ends = np.cumsum([0, *map(len, drawn)])
         return found | {"count": len(curves), "points": np.vstack([np.empty((0, 3)), *drawn]), "ends": ends}
-    surfaces = list(surfaces_of(model))
+    surfaces = list(_surfaces_of(model))
     found["names"] = json.dumps([names for *names, _ in surfaces])
-    found["others"] = json.dumps(numbers_of(model))
+    found["others"] = json.dumps(_numbers_of(model))
     wanted = [(shape, faces) for name, layer, faces, shape in surfaces if request["name"] in (None, name, layer)]
     number = request["name"] or ""
     if not wanted and number.isdecimal() and 0 < int(number) <= len(surfaces):
         *_, faces, shape = surfaces[int(number) - 1]
         wanted = [(shape, faces)]
-    if len(wanted) == 1 and wanted[0][1] == 1:
-        shape = wanted[0][0]
-        whole = shape if isinstance(shape, rhino3dm.Surface) else shape.Faces[0].UnderlyingSurface()
-        trims = [] if whole is shape or shape.IsSurface else trims_of(shape, request["along_edges"])
-        found |= nurbs_of(whole) | {"trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
+    if len(wanted) == 1:
+        shape, count = wanted[0]
+        faces = [shape] if isinstance(shape, rhino3dm.Surface) else [shape.Faces[k] for k in range(count)]
+        whole = [face if face is shape else face.UnderlyingSurface() for face in faces]
+        trims: list[Any] = []
+        if count == 1:
+            trims = [] if whole[0] is shape or shape.IsSurface else trims_of(shape, request["along_edges"])
+        elif count > request["most_joined"] or not all(face.DuplicateFace(False).IsSurface for face in faces):
+            return found
+        for k, surface in enumerate(whole):
+            values = _nurbs_of(surface)
+            if count > 1 and faces[k].OrientationIsReversed:
+                knots = values["knots_u"]
+                values |= {"knots_u": knots[0] + knots[-1] - knots[::-1], "controls": values["controls"][::-1]}
+            found |= {f"{key}{k}": value for key, value in values.items()}
+        found |= {"surfaces": count, "trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
     return found
 
 
-def curves_of(model: Any) -> list[Any]:
+def _curves_of(model: Any) -> list[Any]:
     """Every curve object."""
     import rhino3dm
 
     return [item.Geometry for item in model.Objects if isinstance(item.Geometry, rhino3dm.Curve)]
 
 
-def numbers_of(model: Any) -> list[int]:
+def _numbers_of(model: Any) -> list[int]:
     """How many meshes, SubDs and curves a file has."""
     import rhino3dm
 
@@ -68,7 +78,7 @@ def numbers_of(model: Any) -> list[int]:
     return [sum(isinstance(item.Geometry, kind) for item in model.Objects) for kind in kinds]
 
 
-def surfaces_of(model: Any) -> Any:
+def _surfaces_of(model: Any) -> Any:
     """Name, layer, number of faces and shape of every surface object."""
     import rhino3dm
 
@@ -81,7 +91,7 @@ def surfaces_of(model: Any) -> Any:
             yield attributes.Name, layers.get(attributes.LayerIndex, ""), len(getattr(shape, "Faces", "1")), shape
 
 
-def nurbs_of(surface: Any) -> dict[str, Any]:
+def _nurbs_of(surface: Any) -> dict[str, Any]:
     """Any surface as a NURBS."""
     form = surface.ToNurbsSurface()
     knots = [np.array(list(side), dtype=float) for side in (form.KnotsU, form.KnotsV)]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import unit
-from rodshell.targets.target import Gap, Implicit, Target
+from rodshell.targets.target import Implicit, Target
 from rodshell.validation import LARGEST, short
 
 ON_CREST = 1e-4  # of its length: points this close to a crease in plan are on it
@@ -22,10 +22,9 @@ class Seam:
 
     An open seam is prolonged straight past both ends. Seams with the same points are equal.
 
-    Parameters
-    ----------
-    points : (n, 2) [m].
-    crests : fine polylines (k, 3) on the parts of it that are creases [m].
+    Args:
+        points: (n, 2) [m].
+        crests: fine polylines (k, 3) on the parts of it that are creases [m].
     """
 
     points: Floats
@@ -33,15 +32,10 @@ class Seam:
 
     @staticmethod
     def of(points: ArrayLike) -> "Seam":
-        """Make a seam of points.
+        """Make a seam of points (n, 2), or (n, 3), whose z is ignored [m].
 
-        Parameters
-        ----------
-        points : (n, 2), or (n, 3), whose z is ignored [m].
-
-        Raises
-        ------
-        InputError : fewer than two different points, or one that is not finite.
+        Raises:
+            InputError: fewer than two different points, or one that is not finite.
         """
         try:
             given = np.asarray(points, dtype=float)
@@ -82,16 +76,7 @@ class Seam:
         return x
 
     def distance(self, x: Floats) -> Floats:
-        """Signed distance in plan, positive to the left of the seam's direction.
-
-        Parameters
-        ----------
-        x : (n, 2) or (n, 3) points [m].
-
-        Returns
-        -------
-        (n,) [m].
-        """
+        """Signed distance (n,) [m] of points `x` (n, 2 or 3) in plan, positive to the left of the seam's direction."""
         k, share, off = self._nearest(x)
         edge = np.diff(self._corners, axis=0)
         left = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
@@ -140,12 +125,11 @@ def nearest(line: Floats, x: Floats) -> tuple[Ints, Floats, Floats]:
 class Patch(Target):
     """A part of a target: the points on given sides of its seams.
 
-    Parameters
-    ----------
-    surface : the target that has the patch's surface, and continues it past a seam: the whole; or where that is creased
-        along a seam, the smooth piece of it on this side.
-    sides : for each seam 1 if the patch is on its left, -1 if it is on its right.
-    middle : x, y of a point well inside [m], the default of the anchor.
+    Args:
+        surface: the target that has the patch's surface, and continues it past a seam: the whole; or where that is
+            creased along a seam, the smooth piece of it on this side.
+        sides: for each seam 1 if the patch is on its left, -1 if it is on its right.
+        middle: x, y of a point well inside [m], the default of the anchor.
     """
 
     whole: Target
@@ -218,15 +202,3 @@ class Patch(Target):
 
     def height_at(self, xy: Floats) -> Floats:
         return self.surface.height_at(xy)
-
-    def retract(self, x: Floats, steps: int = 4) -> Floats:
-        return self.surface.retract(x, steps)
-
-    def on_surface(self, x: Floats) -> Gap:
-        return self.surface.on_surface(x)
-
-    def closest(self, x: Floats) -> Floats:
-        return self.surface.closest(x)
-
-    def gap(self, x: Floats) -> Gap:
-        return self.surface.gap(x)

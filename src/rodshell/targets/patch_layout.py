@@ -11,10 +11,9 @@ from rodshell.schema import checked
 class PatchLayout:
     """Settings of one patch that replace those of the layout; None: as in the layout.
 
-    Parameters
-    ----------
-    rotate : angle of family u against x at the anchor, seen from above [rad]; default: the layout's heading at
-        the target's summit, transported to the anchor.
+    Args:
+        rotate: angle of family u against x at the anchor, seen from above [rad]; default: the layout's heading at
+            the target's summit, transported to the anchor.
     """
 
     anchor: Annotated[Point | None, "point x,y where its axes cross; default: its middle"] = None

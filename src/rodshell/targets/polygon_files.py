@@ -49,10 +49,9 @@ class _Faces:
 class ObjContent(NamedTuple):
     """What is read of an OBJ file.
 
-    Parameters
-    ----------
-    lines : polylines, each the indices of its points.
-    named : for each name of an object or a group the runs of its faces, each by its first face and the one after it.
+    Args:
+        lines: polylines, each the indices of its points.
+        named: for each name of an object or a group the runs of its faces, each by its first face and the one after it.
     """
 
     polygons: Polygons

@@ -1,4 +1,4 @@
-"""Faces with any number of corners, split into triangles of the best shape."""
+"""Faces with any number of corners, split into triangles of the best shape, but along creases."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot
+from rodshell.targets.diagonals import along_creases
 from rodshell.targets.trianglemesh import require_indices
 from rodshell.untrusted import limit, raised
 
@@ -20,11 +21,10 @@ NEVER = 1e30  # the cost of a triangle that lies outside its face, or has no are
 class Polygons:
     """Faces with any number of corners.
 
-    Parameters
-    ----------
-    points : (n, 3).
-    corners : (k,) indices of the points around each face, one face after the other.
-    sizes : (m,) number of corners of each face.
+    Args:
+        points: (n, 3).
+        corners: (k,) indices of the points around each face, one face after the other.
+        sizes: (m,) number of corners of each face.
     """
 
     points: Floats
@@ -38,13 +38,11 @@ class Polygons:
     def triangles(self, name: str) -> Ints:
         """The faces as triangles (t, 3), in their order; those with fewer than three corners are left out.
 
-        Parameters
-        ----------
-        name : of the file, for the message.
+        A crease that crosses faces from corner to corner runs along their diagonals, not across them.
 
-        Raises
-        ------
-        InputError : a face has a corner that is not there; faces have so many corners that to split them takes minutes.
+        Raises:
+            InputError: a face has a corner that is not there; faces have so many corners that to split them takes
+                minutes.
         """
         require_indices(self.points, self.corners, name)
         work = float((self.sizes.astype(float) ** 3)[self.sizes > 4].sum())
@@ -61,7 +59,8 @@ class Polygons:
                 around = self.corners[first[some][:, None] + np.arange(count)]
                 parts.append(_split(self.points, around).reshape(-1, 3))
                 of.append(np.repeat(some, count - 2))
-        return np.vstack(parts)[np.argsort(np.concatenate(of), kind="stable")]
+        order = np.argsort(np.concatenate(of), kind="stable")
+        return along_creases(self.points, np.vstack(parts)[order], np.concatenate(of)[order])
 
 
 @np.errstate(all="ignore")  # points that are not finite are refused later, with their place

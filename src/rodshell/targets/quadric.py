@@ -1,7 +1,7 @@
 """The paper's targets [HQK Eqs 13a-c] and the spherical cap: quadrics over a base plane."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from math import sqrt
 
@@ -22,22 +22,19 @@ class _Quadric(WalledTarget):
 
     @property
     @abstractmethod
-    def weights(self) -> tuple[float, float, float]:
-        """The three w_k [1/m2]."""
+    def terms(self) -> tuple[tuple[float, float, float], float, float]:
+        """The three w_k [1/m2], the slope [1/m], and the scale [m], with which the gradient at the top has length 1."""
 
     @property
-    def slope(self) -> float:
-        """Of the term in z [1/m]."""
+    def base(self) -> float:
         return 0.0
-
-    @property
-    @abstractmethod
-    def scale(self) -> float:
-        """Scale [m], such that the gradient at the top has length 1."""
 
     @property
     def summit(self) -> tuple[float, float]:
         return 0.0, 0.0
+
+    def parameters(self) -> dict[str, object]:
+        return {"kind": self.name, **{field.name: getattr(self, field.name) for field in fields(self)}}
 
     def implicit(self, x: Floats) -> Implicit:
         return Implicit(*_implicit(x, *self._form))
@@ -49,17 +46,18 @@ class _Quadric(WalledTarget):
     @cached_property
     def _form(self) -> tuple[Floats, float, float]:
         """Weights and slope times the scale, and the scale; kept, as the march evaluates them thousands of times."""
-        return self.scale * np.array(self.weights), self.scale * self.slope, self.scale
+        weights, slope, scale = self.terms
+        return scale * np.array(weights), scale * slope, scale
 
     def height_at(self, xy: Floats) -> Floats:
-        w = self.weights
+        w, slope, _ = self.terms
         rest = 1.0 - w[0] * xy[:, 0] ** 2 - w[1] * xy[:, 1] ** 2
         if w[2] == 0.0:
-            return rest / self.slope
+            return rest / slope
         return np.sqrt(np.where(rest >= 0.0, rest, np.nan) / w[2])
 
 
-@njit()
+@njit("f2 f1 f f")
 def _level(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     value, gradient = np.empty(len(x)), np.empty((len(x), 3))
     for n in range(len(x)):
@@ -72,7 +70,7 @@ def _level(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     return value, gradient
 
 
-@njit()
+@njit("f2 f1 f f")
 def _implicit(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     value, gradient = _level(x, weights, slope, scale)
     hessian = np.zeros((len(x), 3, 3))
@@ -86,59 +84,42 @@ def _implicit(x, weights, slope, scale):  # type: ignore[no-untyped-def]
 class Hemisphere(_Quadric):
     """x^2 + y^2 + z^2 = radius^2, z >= 0 [HQK Eq 13a].
 
-    Parameters
-    ----------
-    radius : [m].
+    Args:
+        radius: [m].
 
-    Raises
-    ------
-    InputError : the radius is not a positive number.
+    Raises:
+        InputError: the radius is not a positive number.
     """
 
+    name = "hemisphere"
     radius: float
 
     def __post_init__(self) -> None:
         keep(self, positive, "m", "radius", what="target {}")
 
     @property
-    def name(self) -> str:
-        return "hemisphere"
-
-    @property
     def plan(self) -> Domain:
         return Disc(self.radius)
 
     @property
-    def base(self) -> float:
-        return 0.0
-
-    @property
-    def weights(self) -> tuple[float, float, float]:
+    def terms(self) -> tuple[tuple[float, float, float], float, float]:
         w = 1.0 / self.radius**2
-        return w, w, w
-
-    @property
-    def scale(self) -> float:
-        return self.radius / 2
-
-    def parameters(self) -> dict[str, object]:
-        return {"kind": "hemisphere", "radius": self.radius}
+        return (w, w, w), 0.0, self.radius / 2
 
 
 @dataclass(frozen=True)
 class Cap(Hemisphere):
     """The part of a sphere around the origin that lies above a base plane.
 
-    Parameters
-    ----------
-    radius : of the sphere [m].
-    base : z of the base plane [m]; default 0, which makes a hemisphere.
+    Args:
+        radius: of the sphere [m].
+        base: z of the base plane [m]; default 0, which makes a hemisphere.
 
-    Raises
-    ------
-    InputError : the radius is not a positive number, or the base plane does not cut the sphere.
+    Raises:
+        InputError: the radius is not a positive number, or the base plane does not cut the sphere.
     """
 
+    name = "cap"
     base: float = 0.0
 
     def __post_init__(self) -> None:
@@ -151,10 +132,6 @@ class Cap(Hemisphere):
             )
 
     @property
-    def name(self) -> str:
-        return "cap"
-
-    @property
     def plan(self) -> Domain:
         return Disc(sqrt(self.radius**2 - self.base**2))
 
@@ -163,24 +140,20 @@ class Cap(Hemisphere):
         """Half the width of the shell in plan [m]; that of the equator, where the cap reaches below it."""
         return self.radius if self.base < 0 else max(self.plan.half_extent)
 
-    def parameters(self) -> dict[str, object]:
-        return {"kind": "cap", "radius": self.radius, "base": self.base}
-
 
 @dataclass(frozen=True)
 class Paraboloid(_Quadric):
     """(x^2 + y^2) / radius^2 + z / height = 1, z >= 0 [HQK Eq 13b].
 
-    Parameters
-    ----------
-    radius : of the rim [m].
-    height : of the top above the rim [m].
+    Args:
+        radius: of the rim [m].
+        height: of the top above the rim [m].
 
-    Raises
-    ------
-    InputError : radius or height is not a positive number.
+    Raises:
+        InputError: radius or height is not a positive number.
     """
 
+    name = "paraboloid"
     radius: float
     height: float
 
@@ -188,47 +161,27 @@ class Paraboloid(_Quadric):
         keep(self, positive, "m", "radius", "height", what="target {}")
 
     @property
-    def name(self) -> str:
-        return "paraboloid"
-
-    @property
     def plan(self) -> Domain:
         return Disc(self.radius)
 
     @property
-    def base(self) -> float:
-        return 0.0
-
-    @property
-    def weights(self) -> tuple[float, float, float]:
+    def terms(self) -> tuple[tuple[float, float, float], float, float]:
         w = 1.0 / self.radius**2
-        return w, w, 0.0
-
-    @property
-    def slope(self) -> float:
-        return 1.0 / self.height
-
-    @property
-    def scale(self) -> float:
-        return self.height
-
-    def parameters(self) -> dict[str, object]:
-        return {"kind": "paraboloid", "radius": self.radius, "height": self.height}
+        return (w, w, 0.0), 1.0 / self.height, self.height
 
 
 @dataclass(frozen=True)
 class Ellipsoid(_Quadric):
     """(x/a)^2 + (y/b)^2 + (z/c)^2 = 1, z >= 0 [HQK Eq 13c].
 
-    Parameters
-    ----------
-    a, b, c : half-axes along x, y and z [m].
+    Args:
+        a, b, c: half-axes along x, y and z [m].
 
-    Raises
-    ------
-    InputError : a half-axis is not a positive number.
+    Raises:
+        InputError: a half-axis is not a positive number.
     """
 
+    name = "ellipsoid"
     a: float
     b: float
     c: float
@@ -237,24 +190,9 @@ class Ellipsoid(_Quadric):
         keep(self, positive, "m", *"abc", what="target {}")
 
     @property
-    def name(self) -> str:
-        return "ellipsoid"
-
-    @property
     def plan(self) -> Domain:
         return EllipseDomain(self.a, self.b)
 
     @property
-    def base(self) -> float:
-        return 0.0
-
-    @property
-    def weights(self) -> tuple[float, float, float]:
-        return 1.0 / self.a**2, 1.0 / self.b**2, 1.0 / self.c**2
-
-    @property
-    def scale(self) -> float:
-        return self.c / 2
-
-    def parameters(self) -> dict[str, object]:
-        return {"kind": "ellipsoid", "a": self.a, "b": self.b, "c": self.c}
+    def terms(self) -> tuple[tuple[float, float, float], float, float]:
+        return (1.0 / self.a**2, 1.0 / self.b**2, 1.0 / self.c**2), 0.0, self.c / 2

@@ -9,8 +9,8 @@ little, and alike (`Rim.of`). Jagged edges of meshes are smoothed.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
-from typing import Protocol
+from itertools import pairwise, zip_longest
+from typing import Literal, Protocol
 
 import numpy as np
 from scipy.sparse import coo_matrix, diags_array
@@ -39,6 +39,8 @@ MOST, RMS = (
 )  # edge lengths: moves of vertices, largest and rms; steps of a lattice deviate by 0.29 rms
 HALVINGS = 20
 
+Given = Literal["plan", "space", "surface"]  # where a loop is drawn
+
 
 class Domain(Protocol):
     """A region of the plan."""
@@ -46,46 +48,24 @@ class Domain(Protocol):
     @property
     def half_extent(self) -> tuple[float, float]:
         """Half the width along x and along y [m]."""
-        ...
 
     def holds(self, xy: Floats) -> Bools:
-        """Whether points of the plan are inside or on the edge.
-
-        Parameters
-        ----------
-        xy : (n, 2) points [m].
-
-        Returns
-        -------
-        (n,) booleans.
-        """
-        ...
+        """Whether (n,) points `xy` (n, 2) of the plan are inside or on the edge."""
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distance to the edge, negative inside.
-
-        Parameters
-        ----------
-        xy : (n, 2) points [m].
-
-        Returns
-        -------
-        Distance (n,) [m], its gradient (n, 2) [-] and its Hessian (n, 2, 2) [1/m].
-        """
-        ...
+        """Signed distance (n,) [m] of points `xy` (n, 2) to the edge, negative inside, its gradient (n, 2) and Hessian
+        (n, 2, 2) [1/m]."""
 
 
 @dataclass(frozen=True)
 class Disc:
     """A disc around the origin of the plan.
 
-    Parameters
-    ----------
-    radius : [m].
+    Args:
+        radius: [m].
 
-    Raises
-    ------
-    InputError : the radius is not a positive number.
+    Raises:
+        InputError: the radius is not a positive number.
     """
 
     radius: float
@@ -111,13 +91,11 @@ class Disc:
 class EllipseDomain:
     """The points with (x/a)^2 + (y/b)^2 <= 1.
 
-    Parameters
-    ----------
-    a, b : half-axes along x and y [m].
+    Args:
+        a, b: half-axes along x and y [m].
 
-    Raises
-    ------
-    InputError : a half-axis is not a positive number.
+    Raises:
+        InputError: a half-axis is not a positive number.
     """
 
     a: float
@@ -157,13 +135,11 @@ class EllipseDomain:
 class Rectangle:
     """A rectangle centred on the origin of the plan: |x| <= width/2 and |y| <= depth/2.
 
-    Parameters
-    ----------
-    size : width along x and depth along y [m].
+    Args:
+        size: width along x and depth along y [m].
 
-    Raises
-    ------
-    InputError : the size is not a pair of positive numbers.
+    Raises:
+        InputError: the size is not a pair of positive numbers.
     """
 
     size: tuple[float, float]
@@ -192,7 +168,7 @@ class Rectangle:
         return d, n * np.where(xy < 0, -1.0, 1.0), hessian * along[:, :, None] * along[:, None, :]
 
 
-@njit(error_model="numpy")
+@njit("f2 f1 f f1")
 def _find_roots(ap, shift, least, t):  # type: ignore[no-untyped-def]
     """Newton's method on  sum_k (a_k p_k / (t + shift_k))^2 = 1  for each row of ap, in place from below the root."""
     for n in range(len(t)):
@@ -212,12 +188,11 @@ def _find_roots(ap, shift, least, t):  # type: ignore[no-untyped-def]
 class Rim:
     """Closed polylines on a surface, fine enough to replace smooth curves; make one with `Rim.of`.
 
-    Parameters
-    ----------
-    points : (n, 3) points of all loops, one loop after the other [m].
-    inward : (n, 3) unit vectors in the surface, across the edge from each point to the next, towards the shell.
-    after : (n,) index of the next point of the loop.
-    off : largest distance from the loops as they are given, with straight sides, along the surface [m].
+    Args:
+        points: (n, 3) points of all loops, one loop after the other [m].
+        inward: (n, 3) unit vectors in the surface, across the edge from each point to the next, towards the shell.
+        after: (n,) index of the next point of the loop.
+        off: largest distance to the rim from the loops, each in the sense in which it is given [m].
     """
 
     points: Floats
@@ -226,28 +201,38 @@ class Rim:
     off: float = 0.0
 
     @staticmethod
-    def of(loops: Sequence[Floats], onto: Callable[[Floats], Floats], normal: Callable[[Floats], Floats]) -> "Rim":
+    def of(
+        loops: Sequence[Floats],
+        onto: Callable[[Floats], Floats],
+        normal: Callable[[Floats], Floats],
+        given: Sequence[Given] = (),
+    ) -> "Rim":
         """Refine loops into a rim, as they are drawn, with cubics where their points are those of a smooth curve.
 
         A point is a corner where the loop turns by more than 14 degrees, or curves three times as much as at both its
         neighbours. A straight side ends where the loop curves three times as much beyond as before, and turns as at the
         first of equal edges. Between corners and such ends six points or more are joined by cubics, and fewer by sides.
 
-        Parameters
-        ----------
-        loops : closed polylines (n, 3) with the shell on their left, seen from outside [m].
-        onto : moves points (n, 3) onto the surface.
-        normal : outward unit normals (n, 3) of the surface at points.
+        Args:
+            loops: closed polylines (n, 3) with the shell on their left, seen from outside [m].
+            onto: moves points (n, 3) onto the surface.
+            normal: outward unit normals (n, 3) of the surface at points.
+            given: of each loop, how `off` is measured: seen from above, from its points in space and from its sides on
+                the surface, or from these alone (default).
         """
-        points, drawn, after, count = list[Floats](), list[Floats](), list[Ints](), 0
-        for given in loops:
-            length = np.linalg.norm(np.roll(given, -1, axis=0) - given, axis=1)
-            loop = given[length > TOUCH * length.sum()]
+        points, laid, plan, after, count = list[Floats](), [np.empty((0, 3))], [np.empty((0, 3))], list[Ints](), 0
+        for all_points, sense in zip_longest(loops, given):
+            length = np.linalg.norm(np.roll(all_points, -1, axis=0) - all_points, axis=1)
+            loop = all_points[length > TOUCH * length.sum()]
             up = normal(onto(loop))
             upright = np.abs(up[:, 2:]) > UPRIGHT
             straight, smooth = _refined(loop, np.where(upright, np.copysign([0.0, 0.0, 1.0], up[:, 2:]), up))
             x = onto(smooth)
-            drawn.append(onto(straight[(straight != smooth).any(axis=1)]))
+            if sense == "plan":
+                plan.append(straight)
+            else:
+                laid.append(onto(straight[(straight != smooth).any(axis=1)]))
+                laid += [loop] if sense == "space" else []
             x = x[np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1) > 0]
             points.append(x)
             after.append(count + (np.arange(len(x)) + 1) % len(x))
@@ -255,7 +240,9 @@ class Rim:
         x, onward = np.vstack(points), np.concatenate(after)
         along = x[onward] - x
         rim = Rim(x, unit(cross(normal(x + 0.5 * along), along)), onward)
-        return replace(rim, off=float(np.abs(rim.distance(np.vstack(drawn))).max(initial=0.0)))
+        above = np.array([1.0, 1.0, 0.0])
+        seen = replace(rim, points=above * rim.points)._farthest(above * np.vstack(plan))
+        return replace(rim, off=max(seen, rim._farthest(np.vstack(laid))))
 
     def __repr__(self) -> str:
         return f"Rim({len(self.points)} points in {self.loops} loop{'s' * (self.loops != 1)})"
@@ -282,24 +269,21 @@ class Rim:
 
     def distance(self, x: Floats) -> Floats:
         """Signed distance (n,) [m] of points `x` (n, 3) near the surface to the nearest loop, positive inside."""
-        result = np.empty(len(x))
-        _distance(x, self.points, self.inward, self.after, self._before, *self._balls, result)
-        return result
+        edge, share = self.feet(x)
+        other = np.where(share <= 0.0, self._before[edge], np.where(share >= 1.0, self.after[edge], edge))
+        inward = self.inward[edge] + self.inward[other]  # at a corner the mean of both sides decides
+        return dot(x - self.at(edge, share), inward) / np.sqrt(dot(inward, inward))
 
     def feet(self, x: Floats) -> tuple[Ints, Floats]:
-        """The closest points of the rim, as `at` takes them.
-
-        Parameters
-        ----------
-        x : (n, 3) points [m].
-
-        Returns
-        -------
-        Index (n,) of the nearest edge, and the fraction (n,) of it before the closest point.
-        """
+        """The closest points of the rim to `x` (n, 3), as `at` takes them: the index (n,) of the nearest edge, and the
+        fraction (n,) of it before the closest point."""
         edge, share = np.empty(len(x), dtype=np.intp), np.empty(len(x))
         _feet(x, self.points, self.after, self._before, *self._balls, edge, share)
         return edge, share
+
+    def _farthest(self, x: Floats) -> float:
+        """The largest distance of points (n, 3) from the rim [m]."""
+        return float(np.linalg.norm(x - self.at(*self.feet(x)), axis=1).max(initial=0.0))
 
     def at(self, edge: Ints, share: Floats) -> Floats:
         """Points (n, 3) [m] on the edges (n,), at fractions `share` (n,) of their lengths."""
@@ -307,26 +291,7 @@ class Rim:
         return np.asarray(first + share[:, None] * (self.points[self.after[edge]] - first))
 
 
-@njit(error_model="numpy")
-def _distance(x, points, inward, after, before, start, centres, radii, result):  # type: ignore[no-untyped-def]
-    """Distances from the nearest edge; from the mean of both edges where a corner is nearest."""
-    edge = 0
-    for n in range(len(x)):
-        edge, along = _nearest(x, n, points, after, before, start, centres, radii, edge)
-        ex, ey, ez = _edge(points, edge, after[edge])
-        ix, iy, iz = inward[edge]
-        if along <= 0.0 or along >= 1.0:
-            other = before[edge] if along <= 0.0 else after[edge]
-            ix, iy, iz = ix + inward[other, 0], iy + inward[other, 1], iz + inward[other, 2]
-        ox, oy, oz = (
-            x[n, 0] - along * ex - points[edge, 0],
-            x[n, 1] - along * ey - points[edge, 1],
-            x[n, 2] - along * ez - points[edge, 2],
-        )
-        result[n] = (ox * ix + oy * iy + oz * iz) / np.sqrt(ix * ix + iy * iy + iz * iz)
-
-
-@njit(error_model="numpy")
+@njit("f2 f2 i1 i1 i1 f2 f1 i1 f1")
 def _feet(x, points, after, before, start, centres, radii, edges, shares):  # type: ignore[no-untyped-def]
     edge = 0
     for n in range(len(x)):
@@ -416,20 +381,15 @@ def _stops(turn: Floats, length: Floats) -> Bools:
 
 
 def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
-    """Smooth the jagged parts of a mesh's edge, such as missing faces leave.
+    """The loop (n, 3) with the jagged parts smoothed, such as missing faces leave; None if no part is jagged.
 
-    The result is a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink a circle. It is
-    the smoothest whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain.
-    Vertices outside of jagged parts do not move.
+    It is a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink a circle: the smoothest
+    whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain. Vertices
+    outside of jagged parts do not move.
 
-    Parameters
-    ----------
-    loop : (n, 3) closed polyline [m].
-    normals : (n, 3) of the surface there.
-
-    Returns
-    -------
-    (n, 3) the smoothed loop, or None if no part is jagged.
+    Args:
+        loop: (n, 3) closed polyline [m].
+        normals: (n, 3) of the surface there.
     """
     free = _jagged(loop, normals)
     if not free.any():

@@ -19,7 +19,7 @@ AT_ONCE = 1_000_000  # samples that are held before they are merged
 # openings
 STEEPEST = 0.35  # cosine between an opening's axis and the normals around it: beyond it no cap fits, as on a tube
 BAND = 0.6  # of the opening's radius: width of the band around it to which a cap is fitted
-CAP_POINTS = 1500  # most points to which a cap is fitted
+_CAP_POINTS = 1500  # most points to which a cap is fitted
 DEEP, WIDEST = 0.3, 0.5  # a door: least depth over its width, and largest width over the surface's extent
 PITCH = 0.5  # spacings between the samples of a cap
 
@@ -28,11 +28,10 @@ PITCH = 0.5  # spacings between the samples of a cap
 class Samples:
     """Points of a surface.
 
-    Parameters
-    ----------
-    points : (n, 3) [m].
-    normals : (n, 3) outward unit normals.
-    areas : (n,) area that each point represents [m2].
+    Args:
+        points: (n, 3) [m].
+        normals: (n, 3) outward unit normals.
+        areas: (n,) area that each point represents [m2].
     """
 
     points: Floats
@@ -44,17 +43,13 @@ _Parts = tuple[Floats, Floats, Floats]  # points, normals and areas
 
 
 def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
-    """Sample the smooth surface that a mesh represents, densely enough to fit cubics to.
+    """Sample the smooth surface that a mesh represents, densely enough to fit cubics to that are a `spacing` [m] apart.
 
     The samples are the vertices, and points on triangles that are large against the spacing or long and thin; where one
-    is narrower than samples are apart, those along its longest edge. Between
-    its vertices the surface is taken as a cubic that meets their normals [Vlachos et al. 2001, Curved PN triangles]: a
-    long triangle of a vault lies below the arch that it spans. Vertices of the rim come first, so that cubics are
-    placed there: beyond the rim there is nothing to fit to.
-
-    Parameters
-    ----------
-    spacing : distance between the cubics that will be fitted [m].
+    is narrower than samples are apart, those along its longest edge. Between its vertices the surface is taken as a
+    cubic that meets their normals [Vlachos et al. 2001, Curved PN triangles]: a long triangle of a vault lies below the
+    arch that it spans. Vertices of the rim come first, so that cubics are placed there: beyond the rim there is nothing
+    to fit to.
     """
     faces, corners = mesh.faces, mesh.vertices[mesh.faces]
     edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
@@ -115,10 +110,6 @@ def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Sampl
     The net continues there, although rods do not. Without a cap the surface would be continued into a door from three
     sides, and would meet itself there in a crease. A cap is the interpolant of |r|^3 through the surface around the
     opening: its bending energy is the smallest [Duchon 1977].
-
-    Parameters
-    ----------
-    spacing : distance between the cubics that will be fitted [m].
     """
     points, normals = [samples.points], [samples.normals]
     outer, *openings = [mesh.vertices[loop] for loop in mesh.loops] or [np.empty((0, 3))]
@@ -167,7 +158,7 @@ def _cap(rim: Floats, samples: Samples, spacing: float) -> tuple[Floats, Floats]
     around, facing = samples.points[near], samples.normals[near]
     if len(around) < 12 or dot(facing, axis).min() < STEEPEST:
         return None
-    chosen = np.unique(np.linspace(0, len(around) - 1, CAP_POINTS).astype(int))
+    chosen = np.unique(np.linspace(0, len(around) - 1, _CAP_POINTS).astype(int))
     first = unit(cross(axis, np.array([0.0, 1.0, 0.0]) if abs(axis[0]) > 0.7 else np.array([1.0, 0.0, 0.0])))
     plane = np.stack([first, cross(axis, first)])
     height = RBFInterpolator((around[chosen] - centre) @ plane.T, (around[chosen] - centre) @ axis, kernel="cubic")

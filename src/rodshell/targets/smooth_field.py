@@ -33,14 +33,13 @@ TERMS = 10  # of a cubic in two variables
 class CellList:
     """Points sorted into cells; make one with `CellList.of`.
 
-    Parameters
-    ----------
-    points : (n, 3) [m].
-    low : (3,) lower corner of the first cell [m].
-    shape : (3,) number of cells along each axis.
-    cell : width of a cell [m].
-    start : (cells + 1,) where the points of each cell begin in `order`; cells are counted with z fastest.
-    order : (n,) indices of the points, cell by cell.
+    Args:
+        points: (n, 3) [m].
+        low: (3,) lower corner of the first cell [m].
+        shape: (3,) number of cells along each axis.
+        cell: width of a cell [m].
+        start: (cells + 1,) where the points of each cell begin in `order`; cells are counted with z fastest.
+        order: (n,) indices of the points, cell by cell.
     """
 
     points: Floats
@@ -63,34 +62,17 @@ class CellList:
         return self.points, self.low, self.shape, self.cell, self.start, self.order
 
     def nearest(self, x: Floats, count: int = 1, limit: float = np.inf) -> tuple[Floats, Ints]:
-        """The nearest points, nearest first.
+        """Distances (n, count) [m] and indices (n, count) of the points nearest to `x` (n, 3), nearest first.
 
-        Parameters
-        ----------
-        x : (n, 3) points whose neighbours are wanted [m].
-        limit : neighbours further away need not be found; their distance is then infinite [m].
-
-        Returns
-        -------
-        Distances (n, count) [m] and indices (n, count).
+        Those further away than the `limit` [m] need not be found; their distance is then infinite.
         """
         distance, index = np.full(len(x) * count, np.inf), np.zeros(len(x) * count, dtype=np.intp)
         _nearest(x, *self._lattice, count, limit, distance, index)
         return np.sqrt(distance).reshape(-1, count), index.reshape(-1, count)
 
     def within(self, x: Floats, radius: float, *, ordered: bool = False) -> tuple[Ints, Ints, Floats]:
-        """All points within a radius.
-
-        Parameters
-        ----------
-        x : (m, 3) points whose neighbours are wanted [m].
-        radius : [m].
-        ordered : whether the nearest come first.
-
-        Returns
-        -------
-        Where the list of each point begins (m + 1,), the lists one after the other (k,), and the distances (k,) [m].
-        """
+        """All points within a radius [m] of each of `x` (m, 3), if `ordered` the nearest first: where the list of each
+        begins (m + 1,), the lists one after the other (k,), and the distances (k,) [m]."""
         most = _most_within(x, *self._lattice, radius)
         begin, near, away = np.zeros(len(x) + 1, dtype=np.intp), np.empty(most, dtype=np.intp), np.empty(most)
         _within(x, *self._lattice, radius, ordered, begin, near, away)
@@ -103,7 +85,7 @@ class CellList:
         return np.flatnonzero(free)
 
 
-@njit()
+@njit("f2 f")
 def _lattice_over(points, cell):  # type: ignore[no-untyped-def]
     """Corner, number of cells each way, and their width, for a lattice that holds all points."""
     low, high = points[0].copy(), points[0].copy()
@@ -117,7 +99,7 @@ def _lattice_over(points, cell):  # type: ignore[no-untyped-def]
         cell *= 1.3
 
 
-@njit()
+@njit("f2 f1 i1 f")
 def _sorted(points, low, shape, cell):  # type: ignore[no-untyped-def]
     """Sort points into their cells, by counting."""
     cells = np.zeros(len(points), dtype=np.intp)
@@ -163,7 +145,7 @@ def _keep(distance, index, first, last, d, c):  # type: ignore[no-untyped-def]
     distance[k], index[k] = d, c
 
 
-@njit()
+@njit("f2 f2 f1 i1 f i1 i1 i f f1 i1")
 def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, index):  # type: ignore[no-untyped-def]
     """Squares of distances. A neighbour is final once it is nearer than the cells that were not searched."""
     for n in range(len(x)):
@@ -191,7 +173,7 @@ def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, 
                     _keep(distance, index, first, last, d, c)
 
 
-@njit()
+@njit("f2 f2 f1 i1 f i1 i1 f")
 def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ignore[no-untyped-def]
     """An upper bound of the entries of all lists together."""
     count, reach = 0, int(np.ceil(radius / cell))
@@ -204,7 +186,7 @@ def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ig
     return count
 
 
-@njit()
+@njit("f2 f2 f1 i1 f i1 i1 f b i1 i1 f1")
 def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, near, away):  # type: ignore[no-untyped-def]
     """List the neighbours one after the other; each list begins at `begin` (n + 1,)."""
     reach = int(np.ceil(radius / cell))
@@ -222,7 +204,7 @@ def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, n
         begin[n + 1] = last
 
 
-@njit()
+@njit("f2 f1 i1 f i1 i1 f b1")
 def _thin(points, low, shape, cell, start, order, distance, free):  # type: ignore[no-untyped-def]
     """Each point that is still free removes the later ones that are too close to it."""
     reach = int(np.ceil(distance / cell))
@@ -242,13 +224,13 @@ def _thin(points, low, shape, cell, start, order, distance, free):  # type: igno
 class SmoothField:
     """A smooth implicit function F, blended from cubics over tangent planes.
 
-    Parameters
-    ----------
-    centres : (m, 3) points of the surface, about `spacing` apart [m].
-    frames : (m, 3, 3) whose rows are two tangents and the outward normal.
-    coefficients : (m, 10) of 1, a, b, a^2, ab, b^2, a^3, a^2 b, a b^2, b^3 in a = xi / spacing, b = eta / spacing [m].
-    spacing : between centres [m].
-    reach : F is NaN further than this from every centre [m].
+    Args:
+        centres: (m, 3) points of the surface, about `spacing` apart [m].
+        frames: (m, 3, 3) whose rows are two tangents and the outward normal.
+        coefficients: (m, 10) of 1, a, b, a^2, ab, b^2, a^3, a^2 b, a b^2, b^3 in a = xi / spacing, b = eta / spacing
+            [m].
+        spacing: between centres [m].
+        reach: F is NaN further than this from every centre [m].
     """
 
     centres: Floats
@@ -285,13 +267,7 @@ class SmoothField:
         return distance[:, 0], index[:, 0]
 
     def implicit(self, x: Floats, *, second: bool = True) -> Implicit:
-        """Evaluate F and its derivatives.
-
-        Parameters
-        ----------
-        x : (n, 3) points [m].
-        second : whether second derivatives are wanted; without them the Hessian is empty.
-        """
+        """F and its derivatives at points `x` (n, 3) [m]; without the `second` ones the Hessian is empty."""
         distance, nearest = self.nearest(x)
         value, gradient, hessian = np.empty(len(x)), np.empty((len(x), 3)), np.empty((len(x) if second else 0, 3, 3))
         width2 = (WIDTH * self.spacing) ** 2
@@ -308,7 +284,7 @@ _DXX, _DXY, _DXZ, _DYY, _DYZ, _DZZ, _HXX, _HXY, _HXZ, _HYY, _HYZ, _HZZ = range(1
 _ALL = 25 * LANES
 
 
-@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit("f2 f1 i1 f i1 i1 f1 f2 f b f1 f2 f3", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _blend(  # type: ignore[no-untyped-def]
     x, distance, nearest, radius, start, near, away, packed, width2, second, value, gradient, hessian
 ):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.targets.nurbs import grid_triangles
 from rodshell.targets.target import Target
 
 CELLS = 56  # along the longer side of the plan
@@ -16,10 +17,9 @@ def surface_mesh(target: Target, around: Floats, *, cells: int = CELLS) -> tuple
     It is made for pictures: the surface is sampled on a square mesh, whose triangles are cut at the end of the shell.
     What lies under an overhang is left out.
 
-    Parameters
-    ----------
-    around : (k, 3) points of a shell on the target [m].
-    cells : of the mesh along the longer side of the plan.
+    Args:
+        around: (k, 3) points of a shell on the target [m].
+        cells: of the mesh along the longer side of the plan.
     """
     low, high = around[:, :2].min(axis=0), around[:, :2].max(axis=0)
     step = float((high - low).max()) * (1 + 2 * BEYOND) / cells
@@ -28,9 +28,7 @@ def surface_mesh(target: Target, around: Floats, *, cells: int = CELLS) -> tuple
     x, y = (corner[k] + step * np.arange(counts[k] + 1) for k in range(2))
     plan = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     points, inside = _lifted(target, plan)
-    nodes = np.arange(len(plan)).reshape(len(x), len(y))
-    a, b, c, d = (part.ravel() for part in (nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]))
-    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    faces = grid_triangles(len(x), len(y))
     count = inside[faces].sum(axis=1)
     cut, crossings = _cut(faces[(count == 1) | (count == 2)], inside, len(points))
     if len(crossings):

@@ -18,17 +18,16 @@ OF_PLAN = {"height_at", "lift"}  # methods of points of the plan, and of points 
 OF_SPACE = {"implicit", "level", "margin", "covers", "retract", "on_surface", "outside", "contact"}
 OF_SPACE |= {"closest", "distance", "gap"}
 NO_FORCES = np.empty((0, 3))
-NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
+_NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
 
 
 class Implicit(NamedTuple):
     """An implicit function F at n points; F > 0 outside, and |grad F| is of order 1.
 
-    Parameters
-    ----------
-    value : (n,) F [m].
-    gradient : (n, 3) [-].
-    hessian : (n, 3, 3) [1/m].
+    Args:
+        value: (n,) F [m].
+        gradient: (n, 3) [-].
+        hessian: (n, 3, 3) [1/m].
     """
 
     value: Floats
@@ -39,11 +38,10 @@ class Implicit(NamedTuple):
 class Gap(NamedTuple):
     """Signed distance of n points to a surface.
 
-    Parameters
-    ----------
-    distance : (n,) positive outside [m].
-    normal : (n, 3) its gradient, the outward unit normal.
-    hessian : (n, 3, 3) [1/m]; on the surface the shape operator: 1/R in every tangent direction of a sphere.
+    Args:
+        distance: (n,) positive outside [m].
+        normal: (n, 3) its gradient, the outward unit normal.
+        hessian: (n, 3, 3) [1/m]; on the surface the shape operator: 1/R in every tangent direction of a sphere.
     """
 
     distance: Floats
@@ -52,12 +50,8 @@ class Gap(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """Distance of a surface from the vertices of the mesh that it was fitted to.
-
-    Parameters
-    ----------
-    max, rms : the largest, and the root of the mean square [m].
-    """
+    """Distance of a surface from the vertices of the mesh that it was fitted to [m]: the largest, and the root of the
+    mean square."""
 
     max: float
     rms: float
@@ -126,12 +120,7 @@ class Target(ABC):
 
     @abstractmethod
     def implicit(self, x: Floats) -> Implicit:
-        """Evaluate the implicit function, also past the end.
-
-        Parameters
-        ----------
-        x : (n, 3) points [m].
-        """
+        """Evaluate the implicit function at points `x` (n, 3) [m], also past the end."""
 
     def level(self, x: Floats) -> tuple[Floats, Floats]:
         """F (n,) [m] and its gradient (n, 3) at the points `x` (n, 3) [m], without second derivatives."""
@@ -140,16 +129,7 @@ class Target(ABC):
 
     @abstractmethod
     def height_at(self, xy: Floats) -> Floats:
-        """Height of the surface over points of the plan; that of the uppermost part where there are several.
-
-        Parameters
-        ----------
-        xy : (n, 2) points of the plan [m].
-
-        Returns
-        -------
-        (n,) z [m]; NaN where there is no surface.
-        """
+        """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
 
     @property
     @abstractmethod
@@ -162,33 +142,20 @@ class Target(ABC):
 
     @abstractmethod
     def margin(self, x: Floats) -> Floats:
-        """Distance to the end, positive inside; the shell is cut where it is 0.
-
-        Parameters
-        ----------
-        x : (n, 3) points on or near the surface [m].
-
-        Returns
-        -------
-        (n,) [m].
-        """
+        """Distance (n,) [m] of points `x` (n, 3) on or near the surface to the end, positive inside; 0 where the shell
+        is cut."""
 
     def covers(self, x: Floats) -> Bools:
         """Whether a net can start at the points `x` (n, 3) of the surface: inside the end, or in a filled opening."""
         return self.margin(x) > 0
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
-        """Move points onto the surface along its gradient, which for small gaps leads near the closest points.
-
-        Parameters
-        ----------
-        x : (n, 3) points [m].
-        steps : of Newton's method, at most.
-        """
+        """Move points `x` (n, 3) [m] onto the surface along its gradient, by at most as many steps of Newton's method;
+        for small gaps this leads near the closest points."""
         x = np.ascontiguousarray(x)
         for _ in range(steps):
             x, furthest = along_gradient(x, *self.level(x))
-            if furthest <= NEARLY * self.size:
+            if furthest <= _NEARLY * self.size:
                 break
         return x
 
@@ -212,7 +179,7 @@ class Target(ABC):
             y, gradient, left = self.retract(x, 1), np.empty_like(x), np.arange(len(x))
             for _ in range(12):
                 length = self._newton_to_closest(x, y, gradient, left, longest=0.3 * self.size)
-                left = left[~(length <= NEARLY * self.size)]
+                left = left[~(length <= _NEARLY * self.size)]
                 if len(left) == 0:
                     return y, gradient
             y[left] = self._descend_to_closest(x[left])
@@ -268,32 +235,19 @@ class Target(ABC):
         return np.zeros(len(x), dtype=bool)
 
     def contact(self, x: Floats) -> Gap:
-        """Signed distance to the body on which a grid falls: the surface and a wall below its rim.
+        """Signed distance of points `x` (n, 3) [m] to the body on which a grid falls: the surface and a wall below its
+        rim.
 
-        Parameters
-        ----------
-        x : (n, 3) points [m].
-
-        Raises
-        ------
-        InputError : this target has no such body.
+        Raises:
+            InputError: this target has no such body.
         """
         raise InputError(f'a grid cannot fall on a target of kind "{self.name}": use drape method "bound"')
 
     def lift(self, xy: Floats) -> Floats:
-        """Lift points of the plan onto the surface.
+        """Points (n, 3) [m] of the surface over the points `xy` (n, 2) of the plan [m].
 
-        Parameters
-        ----------
-        xy : (n, 2) points of the plan [m].
-
-        Returns
-        -------
-        (n, 3) points of the surface [m].
-
-        Raises
-        ------
-        InputError : there is no surface over a point.
+        Raises:
+            InputError: there is no surface over a point.
         """
         z = self.height_at(xy)
         if not np.isfinite(z).all():
@@ -305,19 +259,10 @@ class Target(ABC):
 Target._check_points()
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+@njit("f3 f1")  # type: ignore[untyped-decorator, unused-ignore]
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
-    """Hessians of the distance at points away from a surface, S (I + d S)^-1.
-
-    Parameters
-    ----------
-    shape : (n, 3, 3) shape operators S at the closest points [1/m].
-    distance : (n,) signed distances d of the points [m].
-
-    Returns
-    -------
-    (n, 3, 3) [1/m].
-    """
+    """Hessians (n, 3, 3) [1/m] of the distance at points away from a surface, S (I + d S)^-1, from the shape operators
+    S (n, 3, 3) at the closest points [1/m] and the signed distances d (n,) [m]."""
     result, a, adjugate = np.empty_like(shape), np.empty((3, 3)), np.empty((3, 3))
     for m in range(len(shape)):
         for i in range(3):
@@ -337,22 +282,21 @@ def offset_shape(shape: Floats, distance: Floats) -> Floats:
     return result
 
 
-@njit(error_model="numpy")
+@njit("f2 f2 i1 f1 f2 f3 f1 f f2 f1")
 def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, slope, length):  # type: ignore[no-untyped-def]
     """One step of Newton towards the closest points: y + t F'(y) = x, F(y) = 0.
 
     Across the tangent plane the step leads to F = 0; within it, it solves B step = x - y, B = (1 + damping) + t F''.
     At a centre of curvature B is singular within the plane, and the step has no part there.
 
-    Parameters
-    ----------
-    x, y : (n, 3) points, and estimates of the points closest to them, which are moved [m].
-    rows : (m,) of the points that are moved.
-    value, gradient, hessian : (m,), (m, 3), (m, 3, 3) F there, see `Implicit`.
-    damping : (m,) 0 for Newton's step, larger for shorter steps.
-    longest : longer steps are shortened [m].
-    slope : (n, 3) output in these rows, F' before the step.
-    length : (m,) output, of Newton's step [m]; infinite where the distance is not convex.
+    Args:
+        x, y: (n, 3) points, and estimates of the points closest to them, which are moved [m].
+        rows: (m,) of the points that are moved.
+        value, gradient, hessian: (m,), (m, 3), (m, 3, 3) F there, see `Implicit`.
+        damping: (m,) 0 for Newton's step, larger for shorter steps.
+        longest: longer steps are shortened [m].
+        slope: (n, 3) output in these rows, F' before the step.
+        length: (m,) output, of Newton's step [m]; infinite where the distance is not convex.
     """
     for m in range(len(rows)):
         row, gx, gy, gz = rows[m], gradient[m, 0], gradient[m, 1], gradient[m, 2]
@@ -389,15 +333,9 @@ def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, sl
         y[row, 2] += shortened * (out * nz + along_p * pz + along_q * qz)
 
 
-@njit(error_model="numpy")
+@njit("f2 f1 f2")
 def along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
-    """One step of Newton from points x (n, 3) to F = 0 along the gradient, and the largest |F| before it.
-
-    Parameters
-    ----------
-    x : (n, 3) [m].
-    value, gradient : (n,), (n, 3) F there, see `Implicit`.
-    """
+    """One step of Newton from points x (n, 3) [m] to F = 0 along the gradient, and the largest |F| before it."""
     result, furthest = np.empty((len(x), 3)), 0.0
     for m in range(len(x)):
         gx, gy, gz = gradient[m, 0], gradient[m, 1], gradient[m, 2]
@@ -416,15 +354,14 @@ def _times(h, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(error_model="numpy")
+@njit("f2 f3 f2 f2 f3")
 def shape_operators(gradient, hessian, forces, normal, shape):  # type: ignore[no-untyped-def]
     """Unit normals n, and shape operators P F'' P / |F'| with P = 1 - n n.
 
-    Parameters
-    ----------
-    gradient, hessian : (m, 3), (m, 3, 3) of F at points of the surface.
-    forces : (m, 3) by whose normal components the operators are multiplied [N]; empty: they are not.
-    normal, shape : (m, 3), (m, 3, 3) output.
+    Args:
+        gradient, hessian: (m, 3), (m, 3, 3) of F at points of the surface.
+        forces: (m, 3) by whose normal components the operators are multiplied [N]; empty: they are not.
+        normal, shape: (m, 3), (m, 3, 3) output.
     """
     for m in range(len(gradient)):
         gx, gy, gz = gradient[m]

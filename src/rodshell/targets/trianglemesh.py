@@ -22,14 +22,35 @@ MOST_FACES = 3_000_000
 FARTHEST = 1e9  # m: coordinates that are still known to a micrometre
 
 
+class Sides(NamedTuple):
+    """The sides of triangles, of which the side 3 t + k runs from corner k of triangle t to the next: (3 t,) its ends,
+    which edge it is, in the order of the vertices, and how many triangles share that."""
+
+    start: Ints
+    end: Ints
+    edge: Ints
+    shared: Ints
+
+    @staticmethod
+    def of(triangles: Ints) -> "Sides":
+        start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+        _, edge = unique_rows(np.column_stack([np.minimum(start, end), np.maximum(start, end)]).astype(np.int64))
+        return Sides(start, end, edge, np.bincount(edge)[edge])
+
+    @property
+    def twins(self) -> Ints:
+        """(e, 2) the two sides of each edge between two triangles."""
+        order = np.argsort(self.edge, kind="stable")
+        return np.asarray(order[self.shared[order] == 2].reshape(-1, 2))
+
+
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
     """A mesh of triangles; make one with `sound_mesh`.
 
-    Parameters
-    ----------
-    vertices : (n, 3) [m].
-    faces : (m, 3) indices of vertices, in counter-clockwise order seen from outside.
+    Args:
+        vertices: (n, 3) [m].
+        faces: (m, 3) indices of vertices, in counter-clockwise order seen from outside.
     """
 
     vertices: Floats
@@ -37,6 +58,10 @@ class TriangleMesh:
 
     def __repr__(self) -> str:
         return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
+
+    @cached_property
+    def sides(self) -> Sides:
+        return Sides.of(self.faces)
 
     @cached_property
     def doubled(self) -> Floats:
@@ -75,8 +100,8 @@ class TriangleMesh:
         slivers turn a normal far away, it stays what it was.
         """
         given, rim = normals.copy(), np.zeros(len(self.vertices), dtype=bool)
-        a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
-        rim[a[edge_counts(a, b, len(rim)) == 1]] = True
+        a, b, _, shared = self.sides
+        rim[a[shared == 1]] = True
         here, there = np.append(a, b), np.append(b, a)
         here, there = here[rim[here]], there[rim[here]]
         if not len(here):
@@ -100,9 +125,8 @@ class TriangleMesh:
     @cached_property
     def loops(self) -> list[Ints]:
         """The open boundary: vertices of each closed loop, the longest first; the surface is on their left."""
-        a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
-        count = edge_counts(a, b, len(self.vertices))
-        after = dict(zip(a[count == 1].tolist(), b[count == 1].tolist(), strict=True))
+        a, b, _, shared = self.sides
+        after = dict(zip(a[shared == 1].tolist(), b[shared == 1].tolist(), strict=True))
         loops = list[Ints]()
         while after:
             first, here = after.popitem()
@@ -123,18 +147,7 @@ class TriangleMesh:
         first, kind = unique_rows(ends.astype(np.int64))
         low, high = self.vertices[ends[first].T]
         points = low + ((z - low[:, 2]) / (high[:, 2] - low[:, 2]))[:, None] * (high - low)
-        neighbours: list[list[int]] = [[] for _ in points]
-        for first_end, second_end in kind.reshape(-1, 2).tolist():
-            neighbours[first_end].append(second_end)
-            neighbours[second_end].append(first_end)
-        loops, left = list[Floats](), set(range(len(points)))
-        while left:
-            loop = [left.pop()]
-            while onward := [k for k in neighbours[loop[-1]] if k in left]:
-                loop.append(onward[0])
-                left.remove(onward[0])
-            loops.append(points[loop])
-        return loops
+        return [points[chain[:-1]] for chain in chains(kind.reshape(-1, 2))]
 
     def length(self, loop: Ints) -> float:
         """Length of a closed loop of vertices [m]."""
@@ -150,13 +163,12 @@ class TriangleMesh:
 class SoundMesh(NamedTuple):
     """A mesh that was checked and repaired.
 
-    Parameters
-    ----------
-    surface : the smooth piece of it that covers most of the plan, facing up; the whole where there is none.
-    repairs : what was changed, in sentences.
-    whole : all of it between and beyond its creases, oriented alike.
-    creased : what is said of its creases; "" where it has none.
-    smooth : whether the surface has no crease within.
+    Args:
+        surface: the smooth piece of it that covers most of the plan, facing up; the whole where there is none.
+        repairs: what was changed, in sentences.
+        whole: all of it between and beyond its creases, oriented alike.
+        creased: what is said of its creases; "" where it has none.
+        smooth: whether the surface has no crease within.
     """
 
     surface: TriangleMesh
@@ -167,20 +179,13 @@ class SoundMesh(NamedTuple):
 
 
 def sound_mesh(vertices: Floats, faces: Ints, name: str) -> SoundMesh:
-    """Check and repair a mesh.
+    """Check and repair a mesh: vertices (n, 3) [m] and faces (m, 3).
 
     Normals may point to either side. Creases end the surface: of a half ball with its floor, or of a shell with a
     thickness, the piece that covers most of the plan is taken.
 
-    Parameters
-    ----------
-    vertices : (n, 3) [m].
-    faces : (m, 3) indices of vertices.
-    name : of the mesh, for messages.
-
-    Raises
-    ------
-    InputError : the mesh is empty, not finite, not manifold, one-sided or in several pieces; names the place.
+    Raises:
+        InputError: the mesh is empty, not finite, not manifold, one-sided or in several pieces; names the place.
     """
     _require_numbers(vertices, faces, name)
     mesh, repairs = _main_piece(_welded(vertices, faces, name), name)
@@ -238,10 +243,9 @@ def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
 
 def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]:
     """The mesh without stray objects: faces that no edge connects to the rest."""
-    a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    first, edge = unique_rows(np.column_stack([np.minimum(a, b), np.maximum(a, b)]).astype(np.int64))
-    count = len(mesh.faces)
-    graph = coo_matrix((np.ones(len(a)), (np.arange(len(a)) // 3, count + edge)), (count + len(first),) * 2)
+    count, edge = len(mesh.faces), mesh.sides.edge
+    nodes = np.arange(len(edge)) // 3, count + edge
+    graph = coo_matrix((np.ones(len(edge)), nodes), (count + int(edge.max()) + 1,) * 2)
     pieces = connected_components(graph, directed=False)[1][:count]
     shares = np.bincount(pieces, mesh.areas) / mesh.areas.sum()
     if len(shares) == 1:
@@ -258,16 +262,7 @@ def _main_piece(mesh: TriangleMesh, name: str) -> tuple[TriangleMesh, list[str]]
 
 
 def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
-    """Find equal rows.
-
-    Parameters
-    ----------
-    rows : (n, k) integers from 0 on.
-
-    Returns
-    -------
-    Index (m,) of the first row of each kind; and the kind (n,) of each row.
-    """
+    """Of rows (n, k) of integers from 0 on: the index (m,) of the first of each kind, and the kind (n,) of each."""
     key, kinds = np.zeros(len(rows), dtype=np.int64), 1
     for column in rows.T:
         more = int(column.max(initial=0)) + 1
@@ -279,22 +274,34 @@ def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
     return first, kind.reshape(-1)
 
 
-def edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
-    """Number (k,) of faces at each edge between the vertices a and b."""
-    key = np.minimum(a, b).astype(np.int64) * vertices + np.maximum(a, b)
-    _, kind, count = np.unique(key, return_inverse=True, return_counts=True)
-    return np.asarray(count[kind.reshape(-1)], dtype=np.intp)
+def chains(edges: Ints) -> list[Ints]:
+    """Vertices of the rows into which edges (e, 2) fall at vertices where other than two of them meet; the
+    last of a ring is its first."""
+    at: dict[int, set[int]] = {}
+    for a, b in edges.tolist():
+        at.setdefault(a, set()).add(b)
+        at.setdefault(b, set()).add(a)
+    ends = {k for k in at if len(at[k]) != 2}
+    found = list[Ints]()
+    for first in [*ends, *at]:  # rings, which have no end, last
+        while at[first]:
+            chain = [first, at[first].pop()]
+            at[chain[1]].remove(first)
+            while chain[-1] not in ends and at[chain[-1]]:
+                chain.append(at[chain[-1]].pop())
+                at[chain[-1]].remove(chain[-2])
+            found.append(np.array(chain, dtype=np.intp))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
     """Neighbouring faces.
 
-    Parameters
-    ----------
-    faces : (e, 2) pairs of faces that share an edge.
-    edges : (e, 2) vertices of that edge.
-    against : (e,) whether both faces run along it in the same direction, and so face opposite sides.
+    Args:
+        faces: (e, 2) pairs of faces that share an edge.
+        edges: (e, 2) vertices of that edge.
+        against: (e,) whether both faces run along it in the same direction, and so face opposite sides.
     """
 
     faces: Ints
@@ -303,25 +310,21 @@ class Neighbours:
 
     @staticmethod
     def of(mesh: TriangleMesh, name: str) -> "Neighbours":
-        a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-        low, high = np.minimum(a, b), np.maximum(a, b)
-        order = np.lexsort((high, low))
-        same = (np.diff(low[order]) == 0) & (np.diff(high[order]) == 0)
-        if (same[:-1] & same[1:]).any():
-            k = order[np.flatnonzero(same[:-1] & same[1:])[0]]
+        a, b, edge, shared = mesh.sides
+        if (shared > 2).any():
+            k = int(np.argmin(np.where(shared > 2, edge, len(edge))))
             raise InputError(
                 f"{name} is not manifold: three faces or more share the edge near {place(mesh, a[k])}: remove one"
             )
-        first, second = order[:-1][same], order[1:][same]
-        rim = np.ones(len(a), dtype=bool)
-        rim[first] = rim[second] = False
+        twins, rim = mesh.sides.twins, shared == 1
         ends = np.bincount(np.concatenate([a[rim], b[rim]]), minlength=len(mesh.vertices))
         if (ends > 2).any():
             where = place(mesh, int(np.argmax(ends)))
             raise InputError(
                 f"{name} is not manifold: two parts of it touch in the single point {where}: add or remove a face there"
             )
-        return Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
+        first, second = twins.T
+        return Neighbours(twins // 3, np.column_stack([a, b])[first], a[first] == a[second])
 
     def pieces(self, keep: Bools, faces: int) -> Ints:
         """Index (m,) of the piece of each face, where only the edges `keep` (e,) connect faces."""

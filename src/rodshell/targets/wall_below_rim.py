@@ -45,18 +45,15 @@ class WalledTarget(Target):
         return max(self.plan.half_extent)
 
     def margin(self, x: Floats) -> Floats:
-        """Distance (n,) of the points `x` (n, 3) to the end, positive inside [m]."""
         if self.base is not None:
             return x[:, 2] - self.base
         return -self.plan.distance(x[:, :2])[0]
 
     def outside(self, x: Floats) -> Bools:
-        """(n,) whether signs alone show that the points `x` (n, 3) [m] are outside the body."""
         over, past_rim = self.level(x)[0] > 0, ~self.plan.holds(x[:, :2])
         return over | past_rim if self.base is None else np.where(x[:, 2] < self.base, past_rim, over)
 
     def contact(self, x: Floats) -> Gap:
-        """Signed distance of the points `x` (n, 3) [m] to the body: the surface, and the wall below its rim."""
         y = self.closest(x)
         _, n, shape = self.on_surface(y)
         distance = np.einsum("ij,ij->i", x - y, n)
@@ -109,12 +106,7 @@ class WalledTarget(Target):
 
 @dataclass(frozen=True, eq=False)
 class RimPlan:
-    """The region of the plan within a rim, a `Domain`.
-
-    Parameters
-    ----------
-    rim : of one loop, counter-clockwise seen from above.
-    """
+    """The region of the plan within a rim of one loop, which is counter-clockwise seen from above; a `Domain`."""
 
     rim: Rim
 
@@ -144,7 +136,6 @@ class RimPlan:
         return np.asarray(self.distance(xy)[0] <= 0.0)
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distance (n,) of the points `xy` (n, 2) [m], negative inside; its gradient and Hessian."""
         edge, share = self._feet(xy)
         at_start, at_end, sharp = self._normals
         foot = self._flat.at(edge, share)[:, :2]
@@ -173,10 +164,9 @@ class RimPlan:
 class WalledSurface(WalledTarget):
     """A mesh's smooth surface as a contact body; make one with `walled_surface`.
 
-    Parameters
-    ----------
-    rim_plan : the region of the plan within its rim.
-    level_edge : z of the rim where it is level [m], or None.
+    Args:
+        rim_plan: the region of the plan within its rim.
+        level_edge: z of the rim where it is level [m], or None.
     """
 
     surface: Target
@@ -231,15 +221,12 @@ def walled_surface(
 ) -> WalledSurface:
     """The contact body of a mesh's surface that has one edge.
 
-    Parameters
-    ----------
-    mesh : the mesh to which its field was fitted.
-    rims : the open boundary and the boundary curves, if there are any.
-    section : the rim that a plane at a height z [m] cuts out of the surface.
+    Args:
+        rims: the open boundary and the boundary curves, if there are any.
+        section: the rim that a plane at a height z [m] cuts out of the surface.
 
-    Raises
-    ------
-    InputError : it has openings or several edges, or overhangs its edge.
+    Raises:
+        InputError: it has openings or several edges, or overhangs its edge.
     """
     instead = 'use drape method "bound"'
     if surface.base is not None:

@@ -1,14 +1,19 @@
 """The drawing set: each drawing laid out once, at 1:1 for DXF and SVG, all of them on sheets for the PDF."""
 
+from collections.abc import Iterator
+from functools import partial
+
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.figures.checks import OTHER_SHAPES
 from rodshell.output.drawing import TEXT, Drawing
 from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan, per_sheet, strips_drawing
 from rodshell.output.drawings.sheets import (
     SCALES,
     Compose,
     Layout,
+    Paper,
     Sheet,
     bound,
     laid_out,
@@ -21,22 +26,16 @@ from rodshell.output.drawings.shell import (
     bracing_drawing,
     elevations_drawing,
     erection_drawing,
-    rod_curves,
+    final_curves,
     supports_drawing,
 )
-from rodshell.output.schedules import (
-    bracing_table,
-    joints_table,
-    rods_table,
-    seams_table,
-    sections_table,
-    stock_table,
-    supports_table,
-)
+from rodshell.output.grid import lies_flat, supported
+from rodshell.output.schedules import SCHEDULES
 from rodshell.output.settings import PAPERS
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
-from rodshell.results.strength_used import ENDS
+from rodshell.results.states import DRAPED, POPPED
+from rodshell.rods.supports import clamped_among, finals_first
 
 __all__ = ["drawing_set", "sheet_set"]
 
@@ -49,63 +48,62 @@ def drawing_set(archive: Archive) -> dict[str, Drawing]:
     plan = flat_plan(archive)
     block = title_block(archive, plan.summary)
     drawings = {name: layout.detail for name, layout in _layouts(archive).items()}
-    first = {"plan": drawings.pop("plan"), "strips": strips_drawing(plan, plan.text)}
+    first = {"plan": drawings.pop("plan")} if "plan" in drawings else {}
+    first["strips"] = strips_drawing(plan, plan.text)
     return {name: with_title(drawing, block) for name, drawing in (first | drawings).items()}
 
 
-def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
+def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
     """All sheets in mm of paper, and the paper's size."""
-    results, plan, paper = archive.results, flat_plan(archive), _paper(archive)
-    layouts, checked = dict(_layouts(archive)), _checked(results)
-    sheets = [*layouts.pop("plan").sheets(paper), *_strips(plan, paper)]
+    plan, paper, layouts = flat_plan(archive), _paper(archive), dict(_layouts(archive))
+    checked = _checked(archive.results)
+    about = {"supports": _held(archive), "bracing": checked, "rods": checked}
+
+    def schedule(name: str) -> Iterator[Sheet]:
+        found = SCHEDULES[name]
+        return table(found.title + about.get(name, ""), found.brief(archive), paper)
+
+    first = layouts.pop("plan").sheets(paper) if "plan" in layouts else ()
+    sheets = [*first, *_strips(plan, paper)]
     for name, layout in layouts.items():
         sheets += layout.sheets(paper)
-        if name == "supports":
-            sheets += table(f"Supports{_held(archive)}", supports_table(archive, brief=True), paper)
-        elif name == "bracing":
-            sheets += table(f"Bracing{checked}", bracing_table(archive, brief=True), paper)
-    sheets += table(f"Rods{checked}", rods_table(archive, brief=True), paper)
-    sheets += table("Joints", joints_table(archive, brief=True), paper)
-    if any(rod.stiffness for rod in results.rods):
-        sheets += table("Sections along the rods", sections_table(archive), paper)
-    if results.seams:
-        sheets += table("Seams", seams_table(archive), paper)
-    if results.fabrication and results.fabrication.stock:
-        sheets += table("Stock", stock_table(archive), paper)
+        if name in SCHEDULES:
+            sheets += schedule(name)
+    for name in ("rods", "joints", "sections", "seams", "stock"):
+        if SCHEDULES[name].known(archive):
+            sheets += schedule(name)
     return bound(sheets, title_block(archive, plan.summary), paper), paper
 
 
 def _held(archive: Archive) -> str:
     """With which ends the final shape is; directions in the table of supports are those of the draped shell."""
-    if archive.final == "popped_clamped":
-        return ", clamped ends (directions held)"
-    directions = "; directions as on the target" if archive.results.end_tangents else ""
-    return f", pinned ends (free to turn{directions})" if archive.final == "popped_pinned" else ""
+    final = archive.final or DRAPED
+    if final == DRAPED:
+        return ""
+    turns = archive.results.end_tangents and not clamped_among([final.removeprefix(POPPED)])
+    return f", {supported(final, *(['directions as on the target'] if turns else []))}"
 
 
 def _checked(results: Results) -> str:
     """With which ends the final shape is that the bending of rods and the lengths of the bracing are of."""
     shapes = results.bending.shapes() if results.bending else {}
-    return next((f", final shape with {ends} ends" for ends in ENDS if ends in shapes), "")
+    return next((f", final shape with {ends} ends" for ends in finals_first(shapes) if ends not in OTHER_SHAPES), "")
 
 
 @made_once
 def _layouts(archive: Archive) -> dict[str, Layout]:
     """Every drawing but the strips, which are cut into sheets between two rods."""
     plan, paper = flat_plan(archive), _paper(archive)
-
-    def of_the_plan(text: float) -> Drawing:
-        return flat_drawing(plan, text)
-
     extent = np.ptp(np.concatenate([plan.cuts.reshape(-1, 2), *plan.footprint]), axis=0)
-    layouts = {"plan": laid_out(of_the_plan, extent, paper, plan.text, true_size=True)}
+    layouts = dict[str, Layout]()
+    if lies_flat(archive):
+        layouts["plan"] = laid_out(partial(flat_drawing, plan), extent, paper, plan.text, true_size=True)
     for name, (compose, extent) in _of_the_shell(archive, plan).items():
         layouts[name] = laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
     return layouts
 
 
-def _paper(archive: Archive) -> tuple[float, float]:
-    """Width and height of a sheet [mm]."""
+def _paper(archive: Archive) -> Paper:
     style = archive.results.drawings
     return PAPERS[style.paper if style else "A3"]
 
@@ -114,20 +112,20 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, 
     """Drawings that need a shape in space, and what each takes at least without its texts (2,) [mm]."""
     if archive.final is None or "rod_nodes" not in archive.states:
         return {}
-    width, depth, height = np.ptp(np.concatenate(rod_curves(archive, archive.states[archive.final])), axis=0)
+    width, depth, height = np.ptp(np.concatenate(final_curves(archive)), axis=0)
     above, both_sides = np.array([width, depth]), np.array([max(width, depth), 2 * height])
     makers: dict[str, tuple[Compose, Floats]] = {
-        "supports": (lambda text: supports_drawing(archive, plan, text), above),
-        "elevations": (lambda text: elevations_drawing(archive, text), both_sides),
+        "supports": (partial(supports_drawing, archive, plan), above),
+        "elevations": (partial(elevations_drawing, archive), both_sides),
     }
     if archive.results.fabrication and archive.results.fabrication.bracing:
-        makers["bracing"] = (lambda text: bracing_drawing(archive, text), above)
+        makers["bracing"] = (partial(bracing_drawing, archive), above)
     if "history" in archive.states and archive.results.deployment:
-        makers["erection"] = (lambda text: erection_drawing(archive, text), above)
+        makers["erection"] = (partial(erection_drawing, archive), above)
     return makers
 
 
-def _strips(plan: FlatPlan, paper: tuple[float, float]) -> list[Sheet]:
+def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
     """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
     low, high = room(paper)
     width, height = high - low

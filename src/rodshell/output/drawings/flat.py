@@ -1,7 +1,7 @@
 """Drawings for the workshop: the flat plan of both families as cut, and a strip for each rod.
 
 The plan has rods, joints, labels, the footprint, and the diagonals by which the grid is set out. On a strip all
-distances start at one end, so that errors do not add up.
+distances start at one end, so that errors do not add up. `text` is the usual size of a drawing's texts [mm at 1:1].
 """
 
 from collections.abc import Sequence
@@ -10,31 +10,38 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Bools, Floats
 from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
-from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
-from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
-from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, spread, take
+from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
+from rodshell.output.grid import GridJoint, GridRod, family_numbers, joints_of, opens, outlines_of, rods_of
+from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, segments, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
 from rodshell.results.archive import made_once
 from rodshell.results.laths import laths_text
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
-FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
-FLAT_TITLE = "Flat plan"
+_FLAT_TITLE = "Flat plan"
 ROD = 0.18  # width of a rod's line, in text sizes
 LARGEST = 0.85  # size of a joint's id at most, in text sizes
 GAP = 0.06  # from an id to a rod, in text sizes
 CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
-STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
-STRIPS_LEGEND = (
+_STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
+_STRIPS_LEGEND = (
     "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice; "
     "S2: of the second lath.",
     "Open triangle: support. Arrow: the section's size there [mm], or from there on the number of laths (L).",
 )
+# On a strip, in text sizes: points, whether the line is closed, its width.
+_SIGNS = {
+    "splice": (((0.0, -0.5), (0.0, 0.5)), False, 0.2),
+    "section": (((-0.25, -0.5), (0.0, 0.0), (0.25, -0.5)), False, 0.07),
+    "support": (((0.0, 0.0), (-0.4, -0.7), (0.4, -0.7)), True, 0.07),
+}
 TALL = 15.0  # text sizes from strip to strip
 
 
@@ -42,24 +49,24 @@ TALL = 15.0  # text sizes from strip to strip
 class FlatPlan:
     """The content of the flat plan.
 
-    Parameters
-    ----------
-    rods, joints : as in the result [m].
-    lines : (r, 2, 2) start and end of each rod on the footprint [mm].
-    cuts : (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
-    marks : (c, 2) the joints, in the order of `joints` [mm].
-    footprint : closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
-    boundary : closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if they
-        are not known.
-    rounding : how finely lengths are shown.
-    laths : how much lies on the rods, in words; "" where nothing does.
+    Args:
+        rods, joints: as in the result [m].
+        lines: (r, 2, 2) start and end of each rod on the footprint [mm].
+        cuts: (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
+        courses: (k, 2) of each rod along it, from cut to cut [mm].
+        marks: (c, 2) the joints, in the order of `joints` [mm].
+        footprint: closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
+        boundary: closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if
+            they are not known.
+        rounding: how finely lengths are shown.
+        laths: how much lies on the rods, in words; "" where nothing does.
     """
 
-    name: str
     rods: list[GridRod]
     joints: list[GridJoint]
     lines: Floats
     cuts: Floats
+    courses: list[Floats]
     marks: Floats
     footprint: list[Floats]
     boundary: list[Floats]
@@ -91,9 +98,24 @@ class FlatPlan:
         return [f"{joint.id}: {where}" for joint, where in zip(self.joints, said, strict=True)]
 
     @cached_property
-    def across(self) -> list[tuple[Floats, Floats]]:
-        """Its `diagonals`."""
-        return diagonals(self)
+    def diagonals(self) -> list[tuple[Floats, Floats]]:
+        """The two of each grid's largest rectangle with a joint at every crossing: by them it is set out square.
+
+        No diagonal runs over an opening; grids that do not touch each other, as patches with seams, have two each.
+        """
+        found = []
+        for patch in _patches(self):
+            x, y = (np.unique(np.round([_offset(self.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
+            met = np.zeros((len(y), len(x)), dtype=bool)
+            for u, v in patch:
+                row, column = (int(np.abs(at - _offset(self.rods[k])).argmin()) for at, k in ((y, u), (x, v)))
+                met[row, column] = True
+            best = _largest_full(met, x, y)
+            if best is not None:
+                left, right, low, high = (1e3 * value for value in best)
+                found.append((np.array([left, low]), np.array([right, high])))
+                found.append((np.array([left, high]), np.array([right, low])))
+        return found
 
     @cached_property
     def text(self) -> float:
@@ -124,13 +146,14 @@ def flat_plan(archive: Archive) -> FlatPlan:
     rods = rods_of(archive)
     joints = joints_of(rods)
     lines = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
-    cuts = np.array([[rod.point(-rod.allowance), rod.point(rod.length + rod.allowance)] for rod in rods])
+    courses = [1e3 * rod.as_cut for rod in rods]
+    cuts = np.array([course[[0, -1]] for course in courses]).reshape(-1, 2, 2)
     marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
     footprint = np.array(archive.results.footprint or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
     boundary = np.array(archive.results.boundary, dtype=float).reshape(-1, 3)
     loops = outlines_of(rods)
     return FlatPlan(
-        archive.name, rods, joints, 1e3 * lines, 1e3 * cuts.reshape(-1, 2, 2), 1e3 * marks,
+        rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks,
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
         rounding_of(archive.results), laths_text(archive.results),
@@ -138,31 +161,27 @@ def flat_plan(archive: Archive) -> FlatPlan:
 
 
 def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
-    """The flat plan [mm], its rods labelled in the size `text` [mm].
-
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
-    """
+    """The flat plan [mm], its rods labelled in the size `text` [mm]."""
     pencil = Pencil()
     for outline in plan.footprint:
         pencil.line(outline, "BOUNDARY-FLAT", closed=True)
     for outline in plan.boundary:
         pencil.line(outline, "BOUNDARY-FINAL", closed=True)
     _rods(pencil, plan, text)
-    lines, across = np.concatenate([plan.cuts, *map(closed_segments, plan.footprint)]), plan.across
+    lines = np.concatenate([segments(plan.courses), *map(closed_segments, plan.footprint)])
     _labels(pencil, plan, text, lines)
-    room = _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
-    for a, b in across:
+    room = _joints(pencil, plan, text, lines, np.array(plan.diagonals).reshape(-1, 2, 2))
+    for a, b in plan.diagonals:
         _dimension(pencil, plan, a, b, text, room)
     _axes(pencil, plan, text)
-    return pencil.done("plan", FLAT_TITLE, text)
+    return pencil.done("plan", _FLAT_TITLE, text)
 
 
 def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     """Each rod as cut; a dot at the cut end from which its joints are measured, a tick where it is held."""
-    for rod, cut, line in zip(plan.rods, plan.cuts, plan.lines, strict=True):
-        pen = Pen(FAMILY.get(rod.family, INK), ROD * text)
+    families = family_numbers(rod.family for rod in plan.rods)
+    for rod, cut, line, family in zip(plan.rods, plan.courses, plan.lines, families, strict=True):
+        pen = Pen(FAMILIES[family % len(FAMILIES)], ROD * text)
         pencil.line(cut, "CUT", pen=pen, name=rod.id, note=f"{rod.id}: {plan.rounding.mm(rod.cut_length)} mm")
         pencil.mark(cut[0], min(0.2 * text, 0.08 * plan.spacing), "DIM", pen=Pen(INK, 0.0, fill=INK))
         if rod.allowance > 0:
@@ -224,40 +243,16 @@ def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
     pencil.leave_out(len(set(names) - named), len(names), "names of rods")
 
 
-def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
-    """The two diagonals of each grid's largest rectangle with a joint at every crossing: by them it is set out square.
-
-    No diagonal runs over an opening; grids that do not touch each other, as patches with seams, have two each.
-    """
-    found = []
-    for patch in _patches(plan):
-        x, y = (np.unique(np.round([_offset(plan.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
-        met = np.zeros((len(y), len(x)), dtype=bool)
-        for u, v in patch:
-            row, column = (int(np.abs(offsets - _offset(plan.rods[k])).argmin()) for offsets, k in ((y, u), (x, v)))
-            met[row, column] = True
-        best = _largest_full(met, x, y)
-        if best is not None:
-            left, right, low, high = (1e3 * value for value in best)
-            found.append((np.array([left, low]), np.array([right, high])))
-            found.append((np.array([left, high]), np.array([right, low])))
-    return found
-
-
 def _offset(rod: GridRod) -> float:
     return rod.record.offset or 0.0
 
 
 def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
-    """The rods u and v of each joint of two families, grid by grid."""
-    pairs = [joint.rods for joint in plan.joints if [plan.rods[k].family for k in joint.rods] == ["u", "v"]]
+    """The rods along x and y of each joint of such two, grid by grid."""
+    pairs = [joint.rods for joint in plan.joints if [plan.rods[k].axis for k in joint.rods] == [0, 1]]
     first, second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-    patch = np.arange(len(plan.rods))  # each rod is of the patch of the first one that it leads to
-    while (patch[first] != patch[second]).any():
-        low = np.minimum(patch[first], patch[second])
-        np.minimum.at(patch, first, low)
-        np.minimum.at(patch, second, low)
-    patch = patch[first]
+    met = coo_array((np.ones(len(pairs)), (first, second)), shape=2 * (len(plan.rods),))
+    patch = connected_components(met)[1][first]
     return [[pair for pair, k in zip(pairs, patch, strict=True) if k == name] for name in dict.fromkeys(patch)]
 
 
@@ -296,48 +291,39 @@ def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     low, high = corners.min(axis=0) - text, corners.max(axis=0) + text
     frame = [low, (high[0], low[1]), high, (low[0], high[1])]
     pencil.line(frame, "DIM", closed=True)
-    for axis, name in enumerate("xy"):
-        out = np.array([0.0, -1.0]) if axis == 0 else np.array([-1.0, 0.0])
-        ticks = nice_ticks(low[axis], high[axis] - 2 * text, 8)
-        for value in ticks:
-            foot = np.array([value, low[1]]) if axis == 0 else np.array([low[0], value])
-            pencil.line([foot, foot - 0.4 * text * out], "DIM")
-            shift = np.array([0.0, -1.1 * text]) if axis == 0 else np.array([-0.4 * text, -0.3 * text])
-            anchor = "middle" if axis == 0 else "end"
-            pencil.write(f"{value:g}", foot + shift, 0.8 * text, "DIM", anchor=anchor)
-        end = np.array([high[0], low[1] - 1.1 * text]) if axis == 0 else np.array([low[0] - 0.4 * text, high[1] - text])
-        pencil.write(name, end, 0.8 * text, "DIM", anchor="end")
+    side_ticks(pencil, low, high, text, 8, names="xy")
+
+
+def side_ticks(pencil: Pencil, low: Floats, high: Floats, text: float, count: int, *, names: str = "") -> None:
+    """Ticks [mm] within the lower and the left side of a box, `count` at most, and the names of the axes at their
+    ends."""
+    for axis, (inwards, off, anchor) in enumerate((((0, 1), (0, -1.1), "middle"), ((1, 0), (-0.4, -0.3), "end"))):
+        for value in nice_ticks(low[axis], high[axis] - (2 * text if names else 0), count):
+            foot = np.where(np.arange(2) == axis, value, low)
+            pencil.line([foot, foot + 0.4 * text * np.array(inwards)], "DIM")
+            pencil.write(f"{value:g}", foot + text * np.array(off), 0.8 * text, "DIM", anchor=anchor)
+        if names:
+            end = (high[0], low[1] - 1.1 * text) if axis == 0 else (low[0] - 0.4 * text, high[1] - text)
+            pencil.write(names[axis], end, 0.8 * text, "DIM", anchor="end")
 
 
 # Strips
 
 
 def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None = None) -> Drawing:
-    """The strips of some rods (default: all) one below the other [mm], all starting at x = 0.
-
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
-    rods : those to be drawn; default: all.
-    """
+    """The strips of some rods (default: all) one below the other [mm], all starting at x = 0."""
     pencil = Pencil()
     layer = {rod.id: rod.record.layer for rod in plan.rods}
     chosen = plan.rods if rods is None else rods
     for k, rod in enumerate(chosen):
         _strip(pencil, rod, -k * TALL * text, text, layer, plan.rounding.mm)
-    for row, line in enumerate(STRIPS_LEGEND):
+    for row, line in enumerate(_STRIPS_LEGEND):
         pencil.write(line, (0.0, -len(chosen) * TALL * text + (9.0 - 1.4 * row) * text), text, "DIM")
-    return pencil.done("strips", STRIPS_TITLE, text)
+    return pencil.done("strips", _STRIPS_TITLE, text)
 
 
 def per_sheet(height: float, text: float) -> int:
-    """How many strips find room in a height [mm].
-
-    Parameters
-    ----------
-    height : of the room on a sheet [mm].
-    text : size of the texts [mm].
-    """
+    """How many strips find room in a height [mm], with texts of a size [mm]."""
     return max(int((height / text - 3) // TALL), 1)
 
 
@@ -351,7 +337,7 @@ def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str,
     pencil.write("   ".join(filter(None, words)), (0.0, y - 2.2 * text), 1.1 * text, "LABEL", bold=True)
     joints = ((1e3 * rod.from_cut_end(at), other, "joint") for other, at in rod.joints)
     along = rod.record.stiffness
-    first, last = _end_sizes(along) if along is not None else ("", "")
+    first, last = map(_size, (along.sizes[0], along.sizes[-1])) if along and along.sizes else ("", "")
     stops = [(0.0, first, ""), *joints, (cut, last, "")]
     stops += [(1e3 * rod.from_cut_end(at), "S", "splice") for at in rod.record.splices]
     if along is not None:
@@ -375,11 +361,6 @@ def _section_marks(along: Stiffness) -> list[tuple[float, str]]:
     return [(at, _size(size)) for at, size in zip(along.at[1:-1], along.sizes[1:-1], strict=False)]
 
 
-def _end_sizes(along: Stiffness) -> tuple[str, str]:
-    """The same at both ends."""
-    return (_size(along.sizes[0]), _size(along.sizes[-1])) if along.sizes else ("", "")
-
-
 def _size(metres: float) -> str:
     return f"\N{EMPTY SET}{1e3 * metres:.3g}"
 
@@ -397,11 +378,8 @@ def _stop(
         here, other = rod.record.layer, layer.get(name)
         below = here is not None and other is not None and other > here
         pencil.mark((at, y), 0.35 * text, "MARK", pen=Pen("#b3372c", 0.07 * text, fill="#b3372c" if below else PAPER))
-    elif kind == "splice":
-        pencil.line([(at, y - 0.5 * text), (at, y + 0.5 * text)], "MARK", pen=Pen(INK, 0.2 * text))
-    elif kind == "section":
-        corners = [(at - 0.25 * text, y - 0.5 * text), (at, y), (at + 0.25 * text, y - 0.5 * text)]
-        pencil.line(corners, "MARK", pen=Pen(INK, 0.07 * text))
-    elif kind == "support":
-        corners = [(at, y), (at - 0.4 * text, y - 0.7 * text), (at + 0.4 * text, y - 0.7 * text)]
-        pencil.line(corners, "MARK", closed=True, pen=Pen(INK, 0.07 * text))
+    elif kind in _SIGNS:
+        points, closed, width = _SIGNS[kind]
+        pencil.line(
+            [(at + u * text, y + v * text) for u, v in points], "MARK", closed=closed, pen=Pen(INK, width * text)
+        )

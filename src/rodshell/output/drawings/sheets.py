@@ -5,9 +5,9 @@ verdict on the shell where that is not good.
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 from itertools import product
 from math import ceil
 from textwrap import wrap
@@ -15,11 +15,11 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.figures.form import Joint, Material, RodType, Section
+from rodshell.figures.form import Material, RodType
 from rodshell.figures.records import json_text
 from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
-from rodshell.output.labels import Label, Room, nearby, take, thin
+from rodshell.output.labels import Label, Room, closed_segments, nearby, segments, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash
@@ -28,32 +28,32 @@ from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, rounding_of, stress
 
 NOTE = "Design aid, not code compliance"
-NOT_GIVEN = "not given"
+_NOT_GIVEN = "not given"
 MORE = " (more: report.html)"  # after a verdict that is shortened or has several reasons
 WARNING = "#b3372c"
 COLUMNS = 4  # of entries, side by side
 BAR = 60.0  # length of the scale bar [mm], about
 TRUE_SIZE = ", 1:1"  # after the title of a drawing in a separate file
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
+Paper = tuple[float, float]  # width and height of a sheet [mm]
 
 SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 250, 300, 400, 500, 1000, 2000, 5000)
 FINE = SMALL * TEXT  # of tables and of the title block: capitals of 1.9 mm, the least on a sheet
 MARGIN, BLOCK = 10.0, 34.0  # around the frame; height of the title block
 ROW = 1.45 * FINE  # from line to line of the title block
-LEADING = 1.9 * FINE  # from line to line of a table
+_LEADING = 1.9 * FINE  # from line to line of a table
 OVERLAP = 10.0  # mm of paper that a sheet shows beyond its match lines
-MOST_TILES = 12  # sheets that the parts of one drawing may take
+_MOST_TILES = 12  # sheets that the parts of one drawing may take
 
 
 @dataclass(frozen=True)
 class TitleBlock:
     """What every drawing of a set says.
 
-    Parameters
-    ----------
-    entries : what it is called and what it is: project, author, date, section, material, ...
-    summary : the cut list in one line.
-    verdict : level and first reason of a verdict that is not good, with `MORE` where there are others; else "".
+    Args:
+        entries: what it is called and what it is: project, author, date, section, material, ...
+        summary: the cut list in one line.
+        verdict: level and first reason of a verdict that is not good, with `MORE` where there are others; else "".
     """
 
     name: str
@@ -74,27 +74,22 @@ class TitleBlock:
 
 
 def title_block(archive: Archive, summary: str) -> TitleBlock:
-    """The title block of an archive.
-
-    Parameters
-    ----------
-    summary : the cut list in one line.
-    """
+    """The title block of an archive, with the cut list in one line as its `summary`."""
     results = archive.results
     given, rod = results.drawings or Drawings(), results.rod or RodType()
     kept = results.plain()
     source = archive.case_toml or json_text({key: kept.get(key) for key in ("rods", "boundary")})
     entries = (
-        ("Project", given.project or NOT_GIVEN),
-        ("Drawn by", given.author or NOT_GIVEN),
-        ("Date", given.date or today().isoformat()),
+        ("Project", given.project or _NOT_GIVEN),
+        ("Drawn by", given.author or _NOT_GIVEN),
+        ("Date", given.date or (source_date() or datetime.now(UTC)).date().isoformat()),
         ("Revision", given.revision or "-"),
-        ("Section", _section(rod.section) or NOT_GIVEN),
-        ("Material", _material(rod.material) or NOT_GIVEN),
-        ("Joints", _joint(results.joint)),
+        ("Section", _in_words(case_rows(rod.section)) or _NOT_GIVEN),
+        ("Material", _material(rod.material) or _NOT_GIVEN),
+        ("Joints", _in_words(joint_rows(results.joint)) or "ball"),
         ("Rods", f"{len(results.rods)}"),
         ("Units", f"mm, shown to {rounding_of(results).words}"),
-        ("Tolerance", NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
+        ("Tolerance", _NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
         ("Input", input_hash(source, archive.inputs)),
         ("Made by", f"rodshell {results.version_rodshell or '(version unknown)'}"),
     )
@@ -111,14 +106,9 @@ def source_date() -> datetime | None:
         return None
 
 
-def today() -> date:
-    """The date of writing in UTC, or that of `source_date`."""
-    return (source_date() or datetime.now(UTC)).date()
-
-
-def _section(section: Section | None) -> str:
+def _in_words(rows: Iterable[tuple[str, str]]) -> str:
     """ "circle, radius 1 mm"."""
-    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in case_rows(section))
+    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in rows)
 
 
 def _material(material: Material | None) -> str:
@@ -133,18 +123,8 @@ def _material(material: Material | None) -> str:
     return ", ".join(words)
 
 
-def _joint(joint: Joint | None) -> str:
-    """ "pin, eccentricity 42 mm"; without a word about them, joints are balls, free to turn."""
-    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in joint_rows(joint)) or "ball"
-
-
 def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
-    """The drawing with its title block and a scale bar below: for a sheet without a frame.
-
-    Parameters
-    ----------
-    block : entries and notes of the title block.
-    """
+    """The drawing with its title block and a scale bar below: for a sheet without a frame."""
     (left, bottom), (right, _) = drawing.box()
     size, pencil = drawing.text, Pencil()
     y = bottom - 2.6 * size
@@ -160,21 +140,14 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
         lines.append(block.verdict_within(max(right - left, max(map(len, lines)) * LETTER * size), size))
         pencil.write(lines[-1], (left, y - 1.5 * len(lines) * size), size, "TITLE", bold=True, colour=WARNING)
     end = left + max(right - left, 0.25 * (right - left) + 4 * size)
-    scale_bar(pencil, end, y - (1.5 * len(lines) + 2) * size, 0.25 * (right - left), size, 1.0)
+    _scale_bar(pencil, end, y - (1.5 * len(lines) + 2) * size, 0.25 * (right - left), size, 1.0)
     return drawing + pencil.done("", "", size)
 
 
-def write_entries(
+def _write_entries(
     pencil: Pencil, block: TitleBlock, left: float, y: float, width: float, size: float, line: float
 ) -> float:
-    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line.
-
-    Parameters
-    ----------
-    left, y : baseline of the first entry [mm].
-    width : of all columns [mm].
-    size : of the texts; line : from baseline to baseline [mm].
-    """
+    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line."""
     step = width / COLUMNS
     for k, (label, value) in enumerate(block.entries):
         x, down = left + step * (k % COLUMNS), y - line * (k // COLUMNS)
@@ -185,40 +158,22 @@ def write_entries(
 
 
 def shortened(text: str, width: float, size: float) -> str:
-    """A text that takes at most a width [mm] in a size; what is cut off is shown by dots.
-
-    Parameters
-    ----------
-    width : that is available [mm]; size : of the text [mm].
-    """
+    """A text that takes at most a width [mm] in a size [mm]; what is cut off is shown by dots."""
     letters = int(width / (LETTER * size))
     return text if len(text) <= letters else text[: letters - 1].rstrip() + "\N{HORIZONTAL ELLIPSIS}"
 
 
-def bar_length(longest: float, scale: float) -> float:
-    """The round length of a scale bar [mm of the sheet].
-
-    Parameters
-    ----------
-    longest, scale : as of `scale_bar`.
-    """
+def _bar_length(longest: float, scale: float) -> float:
+    """The round length of a scale bar, in mm of a sheet at 1:`scale` as `longest`."""
     return nice_step(scale * longest, 2) * 2 / scale
 
 
-def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
-    """A bar of a round length of at most about `longest` [mm of the sheet], ending at `right`, at 1:`scale`.
-
-    Parameters
-    ----------
-    right, y : lower right corner [mm of the sheet].
-    longest : of the bar [mm of the sheet].
-    text : size of its numbers [mm of the sheet].
-    scale : lengths of the object over those of the sheet.
-    """
-    length = bar_length(longest, scale)
+def _scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
+    """A bar of a round length of at most about `longest`, ending at `right`; all in mm of a sheet at 1:`scale`."""
+    length = _bar_length(longest, scale)
     for k in range(4):
         x = right - length + k * length / 4
-        corners = np.array([[x, y], [x + length / 4, y], [x + length / 4, y + 0.4 * text], [x, y + 0.4 * text]])
+        corners = _corners(np.array([x, y]), np.array([x + length / 4, y + 0.4 * text]))
         pencil.line(corners, "TITLE", closed=True, pen=Pen(INK, 0.06 * text, fill=INK if k % 2 == 0 else PAPER))
     pencil.write("0", (right - length, y - text), 0.8 * text, "TITLE", anchor="middle")
     pencil.write(f"{scale * length:g} mm", (right, y - text), 0.8 * text, "TITLE", anchor="end")
@@ -236,13 +191,8 @@ class Sheet:
     scale: float
 
 
-def room(paper: tuple[float, float]) -> tuple[Floats, Floats]:
-    """Lower left and upper right corner of what a sheet has for its drawing [mm].
-
-    Parameters
-    ----------
-    paper : width and height of a sheet [mm].
-    """
+def room(paper: Paper) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of what a sheet has for its drawing [mm]."""
     return np.array([MARGIN + 4, MARGIN + BLOCK + 4]), np.array(paper) - MARGIN - 4
 
 
@@ -250,11 +200,10 @@ def room(paper: tuple[float, float]) -> tuple[Floats, Floats]:
 class Layout:
     """A drawing, laid out as few times as it takes: DXF and SVG show it at 1:1, sheets of paper from the same texts.
 
-    Parameters
-    ----------
-    whole : as its one sheet shows it; scale : of that sheet.
-    detail : with smaller texts where the sheet has no room for all, else the same; for files at 1:1.
-    parts : what the parts on several sheets are cut from; None: there are none.
+    Args:
+        whole: as its one sheet shows it; scale : of that sheet.
+        detail: with smaller texts where the sheet has no room for all, else the same; for files at 1:1.
+        parts: what the parts on several sheets are cut from; None: there are none.
     """
 
     whole: Drawing
@@ -263,7 +212,7 @@ class Layout:
     parts: Drawing | None
     scale_of_parts: float
 
-    def sheets(self, paper: tuple[float, float]) -> Iterator[Sheet]:
+    def sheets(self, paper: Paper) -> Iterator[Sheet]:
         """The whole on one sheet of a paper [mm], in the middle, and its parts."""
         low, high = room(paper)
         bottom, top = self.whole.box()
@@ -273,20 +222,16 @@ class Layout:
             yield from tiled(self.parts, paper, self.scale_of_parts)
 
 
-def laid_out(
-    compose: Compose, extent: Floats, paper: tuple[float, float], finest: float, *, true_size: bool = False
-) -> Layout:
+def laid_out(compose: Compose, extent: Floats, paper: Paper, finest: float, *, true_size: bool = False) -> Layout:
     """A drawing, laid out for one sheet and, where that leaves something out, in detail.
 
     The parts are at the smallest scale that shows all, or the largest there is.
 
-    Parameters
-    ----------
-    compose : makes the drawing for a text size [mm at 1:1].
-    extent : (2,) at least what the drawing takes without texts [mm].
-    paper : width and height of a sheet [mm].
-    finest : size of the texts with which a file at 1:1 shows all that it can [mm].
-    true_size : the parts are at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
+    Args:
+        compose: makes the drawing for a text size [mm at 1:1].
+        extent: (2,) at least what the drawing takes without texts [mm].
+        finest: size of the texts with which a file at 1:1 shows all that it can [mm].
+        true_size: the parts are at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
     """
     whole, scale = fitted(compose, extent, paper)
     detail, parts, of_parts = whole, None, 1.0
@@ -307,13 +252,8 @@ def laid_out(
     return Layout(whole, scale, detail, parts, of_parts)
 
 
-def fitted(compose: Compose, extent: Floats, paper: tuple[float, float]) -> tuple[Drawing, float]:
-    """A drawing with the texts of a sheet, and the largest standard scale at which one sheet has room for it.
-
-    Parameters
-    ----------
-    compose, extent, paper : as of `laid_out`.
-    """
+def fitted(compose: Compose, extent: Floats, paper: Paper) -> tuple[Drawing, float]:
+    """A drawing with the texts of a sheet, and the largest standard scale at which one sheet has room for it."""
     low, high = room(paper)
     for scale in SCALES:
         if np.any(extent / scale > high - low) and scale != SCALES[-1]:
@@ -331,31 +271,25 @@ def _size(drawing: Drawing) -> Floats:
     return np.asarray(high - low)
 
 
-def _tiles(extent: Floats, paper: tuple[float, float]) -> Ints:
+def _tiles(extent: Floats, paper: Paper) -> Ints:
     """Sheets (2,) across and down that an extent (2,) of a drawing takes [mm of paper]."""
     low, high = room(paper)
     return np.maximum(np.ceil(extent / (high - low - 2 * OVERLAP)), 1).astype(np.intp)
 
 
-def _fits_on(extent: Floats, paper: tuple[float, float]) -> bool:
+def _fits_on(extent: Floats, paper: Paper) -> bool:
     """Whether an extent (2,) of a drawing [mm of paper] takes no more sheets than it may."""
-    return bool(_tiles(extent, paper).prod() <= MOST_TILES)
+    return bool(_tiles(extent, paper).prod() <= _MOST_TILES)
 
 
-def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
-    """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where that is one or too many.
-
-    Parameters
-    ----------
-    drawing : at 1:1 [mm].
-    paper : width and height of a sheet [mm].
-    scale : lengths of the object over those of the sheet.
-    """
+def tiled(drawing: Drawing, paper: Paper, scale: float = 1) -> Iterator[Sheet]:
+    """A drawing, at 1:1, over as many sheets at 1:`scale` as it takes, with match lines; nothing where that is one or
+    too many."""
     low, high = room(paper)
     drawing = drawing.placed(1 / scale, np.zeros(2))
     bottom, top = drawing.box()
     size, count = high - low - 2 * OVERLAP, _tiles(top - bottom, paper)
-    if not 1 < count.prod() <= MOST_TILES:
+    if not 1 < count.prod() <= _MOST_TILES:
         return
     origin = 0.5 * (bottom + top) - 0.5 * count * size  # the tiles' common corner
     for row in range(count[1]):
@@ -371,24 +305,18 @@ def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Ite
             )
 
 
-def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sheet]:
-    """A table over as many sheets as it takes, in as many columns side by side as fit.
-
-    Parameters
-    ----------
-    content : names of the columns, and rows of cells.
-    paper : width and height of a sheet [mm].
-    """
-    (columns, rows), (low, high) = content, room(paper)
-    if not columns:
+def table(title: str, content: Table, paper: Paper) -> Iterator[Sheet]:
+    """A table over as many sheets as it takes, in as many columns side by side as fit."""
+    if not content:
         return
-    cells = [max((len(row[k]) for row in rows), default=0) for k in range(len(columns))]
-    heads = [_wrapped(*head(column), width) for column, width in zip(columns, cells, strict=True)]
+    (low, high), rows = room(paper), list(zip(*content.values(), strict=True))
+    cells = [max(map(len, column), default=0) for column in content.values()]
+    heads = [_wrapped(*head(name), width) for name, width in zip(content, cells, strict=True)]
     widths = [max(width, *map(len, words)) for width, words in zip(cells, heads, strict=True)]
     steps = FINE * (LETTER * np.array(widths) + 1.2)
     width = float(steps.sum()) + 2 * FINE
     abreast = max(int((high[0] - low[0] + 2 * FINE) // width), 1)
-    tall = int((high[1] - low[1]) // LEADING) - max(map(len, heads)) - 1
+    tall = int((high[1] - low[1]) // _LEADING) - max(map(len, heads)) - 1
     per_sheet = tall * abreast
     pages = max(ceil(len(rows) / per_sheet), 1)
     for page in range(pages):
@@ -405,13 +333,8 @@ def _wrapped(words: str, unit: str, width: int) -> list[str]:
     return wrap(words, max(width, 8), break_long_words=False) + ([f"[{unit}]"] if unit else [])
 
 
-def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: tuple[float, float]) -> list[Drawing]:
-    """The sheets with frames and title blocks, numbered.
-
-    Parameters
-    ----------
-    paper : width and height of a sheet [mm].
-    """
+def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: Paper) -> list[Drawing]:
+    """The sheets with frames and title blocks, numbered."""
     return [
         replace(
             _frame(block, sheet, k, len(sheets), paper) + sheet.content,
@@ -430,7 +353,7 @@ def _block(
     numeric = [all(_number(row[k]) or not row[k] for row in rows) for k in range(len(heads))]
     lines = zip(*([""] * (deep - len(words)) + list(words) for words in heads), strict=True)
     for k, cells in enumerate((*lines, *rows), start=1):
-        y = top - k * LEADING
+        y = top - k * _LEADING
         for j, cell in enumerate(cells):
             x, anchor = (edges[j + 1] - 1.2 * FINE, "end") if numeric[j] else (edges[j], "start")
             if cell:
@@ -443,21 +366,19 @@ def _number(cell: str) -> bool:
     return cell[-1:].isdigit() and cell[:1] in "-.0123456789"
 
 
-def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tuple[float, float]) -> Drawing:
+def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: Paper) -> Drawing:
     """Border and title block."""
-    pencil, (width, height) = Pencil(), paper
-    pencil.line(
-        [(MARGIN, MARGIN), (width - MARGIN, MARGIN), (width - MARGIN, height - MARGIN), (MARGIN, height - MARGIN)],
-        "TITLE", closed=True, pen=Pen(INK, 0.35),
-    )  # fmt: skip
+    pencil, width = Pencil(), paper[0]
+    border = _corners(np.full(2, MARGIN), np.array(paper) - MARGIN)
+    pencil.line(border, "TITLE", closed=True, pen=Pen(INK, 0.35))
     top = MARGIN + BLOCK
     pencil.line([(MARGIN, top), (width - MARGIN, top)], "TITLE", pen=Pen(INK, 0.35))
     left, right, y = MARGIN + 4, width - MARGIN - 4, top - 6.5
     title = shortened(f"{block.name}: {sheet.title}", right - left - 80, 5.0)
     pencil.write(title, (left, y), 5.0, "TITLE", bold=True)
     pencil.write(f"Sheet {number} of {count}", (right, y), TEXT, "TITLE", anchor="end")
-    y = write_entries(pencil, block, left, y - 5.9, right - left, FINE, ROW)
-    room = right - left - (bar_length(BAR, sheet.scale) + 3 * TEXT if sheet.scale else 0.0)
+    y = _write_entries(pencil, block, left, y - 5.9, right - left, FINE, ROW)
+    room = right - left - (_bar_length(BAR, sheet.scale) + 3 * TEXT if sheet.scale else 0.0)
     for k, line in enumerate(block.notes(sheet.content)):
         written = shortened(line, room, FINE)
         pencil.write(written, (left, y - 0.3 - ROW * k), FINE, "TITLE", colour=SOFT if k == 0 else WARNING)
@@ -468,7 +389,7 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
         )
     if sheet.scale:
         pencil.write(f"Scale 1:{sheet.scale:g}", (right - 38, top - 7.0), TEXT, "TITLE", anchor="end")
-        scale_bar(pencil, right, MARGIN + 5.2, BAR, TEXT, sheet.scale)
+        _scale_bar(pencil, right, MARGIN + 5.2, BAR, TEXT, sheet.scale)
     return pencil.done("", "", TEXT)
 
 
@@ -485,23 +406,17 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         box = text.box()
         if not within(box, low, high):
             free.take(box)
-    drawn = _segments([path.points for path in part.paths if not within(path.points, low, high)])
+    drawn = segments(path.points for path in part.paths if not within(path.points, low, high))
     pen = Pen(WARNING, 0.25, (6.0, 1.5, 1.0, 1.5))
-    sides: tuple[tuple[bool, tuple[int, int], list[Floats], tuple[float, float], float], ...] = (
-        (bool(row > 0), (row - 1, column), [np.array([low[0], high[1]]), high], (0.0, 1.5), 0.0),
-        (bool(row < count[1] - 1), (row + 1, column), [low, np.array([high[0], low[1]])], (0.0, -1.5 - TEXT), 0.0),
-        (bool(column > 0), (row, column - 1), [low, np.array([low[0], high[1]])], (-1.5, 0.0), np.pi / 2),
-        (
-            bool(column < count[0] - 1),
-            (row, column + 1),
-            [np.array([high[0], low[1]]), high],
-            (1.5 + TEXT, 0.0),
-            np.pi / 2,
-        ),
+    corners = _corners(low, high)
+    sides = (
+        ((row - 1, column), corners[[3, 2]], (0.0, 1.5), 0.0),
+        ((row + 1, column), corners[[0, 1]], (0.0, -1.5 - TEXT), 0.0),
+        ((row, column - 1), corners[[0, 3]], (-1.5, 0.0), np.pi / 2),
+        ((row, column + 1), corners[[1, 2]], (1.5 + TEXT, 0.0), np.pi / 2),
     )
-    for there, neighbour, line, off, angle in sides:
-        if not there:
-            continue
+    shared = [side for side in sides if 0 <= side[0][0] < count[1] and 0 <= side[0][1] < count[0]]
+    for neighbour, line, off, angle in shared:
         pencil.line(line, "TITLE", pen=pen)
         along, up = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         words = f"match line to part {_part(*neighbour)}"
@@ -523,36 +438,33 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
             take(aside, TEXT, free)
             pencil.line(aside.leader(TEXT), "TITLE", pen=Pen(WARNING, 0.18))
             pencil.texts.append(aside.written(TEXT)._replace(layer="TITLE", colour=pen.colour))
-    pencil.leave_out(missing, sum(there for there, *_ in sides), "names of match lines")
+    pencil.leave_out(missing, len(shared), "names of match lines")
     return pencil.done("", "", TEXT)
 
 
+def _corners(low: Floats, high: Floats) -> Floats:
+    """(4, 2) the corners of a rectangle, counterclockwise from its lower left one."""
+    return np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+
+
 def _led_aside(
-    words: str, line: Sequence[Floats], part: Drawing, names: Sequence[Text], low: Floats, high: Floats
+    words: str, line: Floats, part: Drawing, names: Sequence[Text], low: Floats, high: Floats
 ) -> Label | None:
     """The name of a match line next to it, with a line to it, within a sheet from `low` to `high` (2,): clear of all
     texts, and of drawn lines too where there is room for that. None: there is no free place."""
     taken = Room(20.0)
     for text in (*part.texts, *names):
         taken.take(text.box())
-    (left, bottom), (right, top) = low, high
-    for a, b in (((left, bottom), (right, bottom)), ((left, top), (right, top)), ((left, bottom), (left, top)),
-                 ((right, bottom), (right, top))):  # fmt: skip
-        taken.take(thin(np.array([a, b]), 0.1))
+    for side in closed_segments(_corners(low, high)):
+        taken.take(thin(side, 0.1))
     inwards = 0.5 * (low + high) - 0.5 * (line[0] + line[1])
     shares = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9])
-    drawn = _segments([path.points for path in part.paths])
+    drawn = segments(path.points for path in part.paths)
     for lines, share in product((drawn, drawn[:0]), shares):
         label = nearby(words, line[0] + share * (line[1] - line[0]), inwards, TEXT, taken, lines)
         if label is not None and within(label.box(TEXT), low, high):
             return label
     return None
-
-
-def _segments(lines: Sequence[Floats]) -> Floats:
-    """(m, 2, 2) the straight pieces of polylines (k, 2)."""
-    ends = [points[:-1] for points in lines], [points[1:] for points in lines]
-    return np.stack([np.concatenate([np.empty((0, 2)), *points]) for points in ends], axis=1)
 
 
 def _part(row: int, column: int) -> str:

@@ -1,4 +1,7 @@
-"""Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection."""
+"""Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection.
+
+`text` is the usual size of a drawing's texts [mm at 1:1].
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
@@ -24,34 +27,35 @@ from rodshell.output.drawing import (
     Text,
     corners,
 )
-from rodshell.output.drawings.flat import FlatPlan
-from rodshell.output.grid import joint_places, outlines_of, rods_of
-from rodshell.output.labels import Room, callouts, closed_segments, outward, upright
+from rodshell.output.drawings.flat import FlatPlan, side_ticks
+from rodshell.output.grid import end_nodes, joint_places, meshed_rods, outlines_of
+from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
 from rodshell.results.verdict import unknown_below
-from rodshell.results.wording import Rounding, nice_ticks, rounding_of, whole_percent
+from rodshell.results.wording import Rounding, rounding_of, whole_percent
 
-SUPPORTS_LEGEND = (
+_SUPPORTS_LEGEND = (
     "Red: where each rod ends and how it continues. A thin line leads to its name: rod.0 its start, rod.1 its end.",
     "Blue: straight lines from rod end to rod end{seams}; the edge itself may run outside them.",
 )
 RADIUS, TICK = 0.3, 0.8  # radius of a support's mark, and how far its rod's direction is drawn, in text sizes
-NUMBER_SIZES = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
-NARROW = 40  # letters in a line below the paths of the rod ends
+_NUMBER_SIZES = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
+_NARROW = 40  # letters in a line below the paths of the rod ends
 SAME = 0.01  # mm: lines as near as this to each other are drawn once
 CLEAR = 0.2  # of its size, between a number and the middle of its cell
 SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, and its baseline off it in its sizes
 
 
 def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
-    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m].
+    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m]."""
+    return [1e3 * positions[rod.nodes] for rod in meshed_rods(archive)]
 
-    Parameters
-    ----------
-    positions : (n, 3) nodes of a state [m].
-    """
-    return [1e3 * positions[rod.nodes] for rod in rods_of(archive) if len(rod.nodes) > 1]
+
+def final_curves(archive: Archive) -> list[Floats]:
+    """The same in the final shape, which there has to be."""
+    assert archive.final is not None
+    return rod_curves(archive, archive.states[archive.final])
 
 
 def _stopped(archive: Archive) -> str:
@@ -61,26 +65,20 @@ def _stopped(archive: Archive) -> str:
 
 
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
-    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions.
-
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
-    """
-    pencil, final = Pencil(), archive.final
-    assert final is not None
-    curves = rod_curves(archive, archive.states[final])
+    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions."""
+    pencil, curves = Pencil(), final_curves(archive)
     heights = np.concatenate(curves)[:, 2]
     tall, rounding = float(np.ptp(heights)) + 10 * text, rounding_of(archive.results)
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
         flat = [np.column_stack([curve[:, axis], curve[:, 2] - heights.min() + k * tall]) for curve in curves]
         pen = Pen(INK, 0.08 * text)
-        for curve in apart(map(thinned, flat)):
+        for curve in apart(map(_thinned, flat)):
             pencil.line(curve, "CUT", pen=pen)
         cloud = np.concatenate(flat)
         low, high = bounds(cloud)
-        _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, rounding)
-        _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, rounding)
+        below, beside = low - (0.0, 1.5 * text), low - (1.5 * text, 0.0)
+        _span(pencil, below, np.array([high[0], below[1]]), text, rounding)
+        _span(pencil, beside, np.array([beside[0], high[1]]), text, rounding)
         pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
         pencil.write(words, (low[0], low[1] - 5 * text), 1.2 * text, "LABEL", bold=True)
     return pencil.done("elevations", f"Elevations{_stopped(archive)}", text)
@@ -90,18 +88,13 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     """Paths of the rod ends from flat to their supports, seen from above, and the shell's side at each stage.
 
     A line through all ends shows where they are at each stage; a ring where they end.
-
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
     """
     pencil, history = Pencil(), archive.states["history"]
     assert archive.results.deployment is not None
     stages, mm = archive.results.deployment.stages, rounding_of(archive.results).mm
     pen = Pen(INK, 0.04 * text)
-    drawn = [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
-    ends = np.concatenate([rod.nodes[[0, -1]] for rod in drawn])
-    ways, thin = 1e3 * history[:, ends, :2], Pen(SOFT, 0.05 * text)
+    drawn = meshed_rods(archive)
+    ways, thin = 1e3 * history[:, end_nodes(drawn), :2], Pen(SOFT, 0.05 * text)
     loops = [loop for loop in outlines_of(drawn) if len(loop) > 1]
     for stage, loop in product(ways[:-1], loops):
         pencil.line(stage[loop], "DIM", closed=True, pen=thin)
@@ -111,7 +104,7 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     low, high = bounds(ways.reshape(-1, 2))
     pencil.write("Paths of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
     pencil.write("Closed lines: the ends at each stage", (low[0], low[1] - 4.8 * text), text, "LABEL")
-    for k, line in enumerate(wrap(_not_known(archive.results), NARROW)):
+    for k, line in enumerate(wrap(_not_known(archive.results), _NARROW)):
         pencil.write(line, (low[0], low[1] - (6.6 + 1.4 * k) * text), text, "LABEL", bold=True, colour="#b3372c")
     left, top = high[0] + 8 * text, high[1]
     for k, (stage, positions) in enumerate(zip(stages, history, strict=True)):
@@ -121,7 +114,7 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
         cloud = np.concatenate(curves)
         tall = float(np.ptp(cloud[:, 1]))
         shift = np.array([left - low[0], top - tall - cloud[:, 1].min()])
-        for curve in apart(map(thinned, curves)):
+        for curve in apart(map(_thinned, curves)):
             pencil.line(curve + shift, "CUT", pen=pen)
         words = f"{k}: deployment {100 * stage.share:.0f} %, {mm(stage.height)} mm high"
         pencil.write(words, (left, top - tall - 1.8 * text), text, "LABEL")
@@ -146,89 +139,51 @@ def _not_known(results: Results) -> str:
     return " ".join(said)
 
 
-def thinned(curve: Floats) -> Floats:
-    """A curve by about every third of its nodes, its ends kept.
-
-    Parameters
-    ----------
-    curve : (k, 2 or 3) nodes.
-    """
+def _thinned(curve: Floats) -> Floats:
+    """A curve by about every third of its nodes, its ends kept."""
     return np.asarray(curve[[*range(0, len(curve) - 1, 3), len(curve) - 1]])
 
 
 def apart(curves: Iterable[Floats]) -> list[Floats]:
-    """Each curve once: in an elevation a rod covers its mirror image.
-
-    Parameters
-    ----------
-    curves : (k, 2) points of each [mm].
-    """
+    """Each curve (k, 2) [mm] once: in an elevation a rod covers its mirror image."""
     return list({(np.rint(curve / SAME) + 0.0).tobytes(): curve for curve in curves}.values())
 
 
-def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
-    """The rods of the final shape, pale.
-
-    Parameters
-    ----------
-    archive : a result with a final shape.
-    text : size of the drawing's texts [mm], by which the line width is chosen.
-    """
-    assert archive.final is not None
-    for curve in rod_curves(archive, archive.states[archive.final]):
-        pencil.line(thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
+def _seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
+    """The rods of the final shape, pale."""
+    for curve in final_curves(archive):
+        pencil.line(_thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
 
 
-def _span(
-    pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float, rounding: Rounding
-) -> None:
+def _span(pencil: Pencil, start: Floats, end: Floats, text: float, rounding: Rounding) -> None:
     """A dimension line with its length [mm] next to it."""
-    start, end = np.array(a), np.array(b)
-    along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    length = float(np.linalg.norm(end - start))
+    along = (end - start) / max(length, 1e-9)
     across = 0.4 * text * np.array([-along[1], along[0]])
     pencil.line([start, end], "DIM")
-    for place_ in (start, end):
-        pencil.line([place_ - across, place_ + across], "DIM")
+    for tip in (start, end):
+        pencil.line([tip - across, tip + across], "DIM")
     angle = float(np.arctan2(along[1], along[0]))
     side = 0.5 * text * np.array([-along[1], along[0]]) if angle else np.array([0.0, -1.4 * text])
     pencil.write(rounding.mm(1e-3 * length), 0.5 * (start + end) + side, text, "DIM", anchor="middle", angle=angle)
 
 
 def axes(pencil: Pencil, text: float) -> None:
-    """Ticks of x and y [mm] along two sides of all that is there.
-
-    Parameters
-    ----------
-    pencil : draws them, around what it has drawn so far.
-    text : size of the drawing's texts [mm].
-    """
+    """Ticks of x and y [mm] along two sides of all that is there."""
     low, high = pencil.done("", "", text).box()
     low, high = low - text, high + text
     pencil.line([(low[0], high[1]), low, (high[0], low[1])], "DIM")
-    for value in nice_ticks(low[0], high[0], 6):
-        pencil.line([(value, low[1]), (value, low[1] + 0.4 * text)], "DIM")
-        pencil.write(f"{value:g}", (value, low[1] - 1.1 * text), 0.8 * text, "DIM", anchor="middle")
-    for value in nice_ticks(low[1], high[1], 6):
-        pencil.line([(low[0], value), (low[0] + 0.4 * text, value)], "DIM")
-        pencil.write(f"{value:g}", (low[0] - 0.4 * text, value - 0.3 * text), 0.8 * text, "DIM", anchor="end")
+    side_ticks(pencil, low, high, text, 6)
 
 
 # Supports
 
 
 def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
-    """Where every rod end goes, seen from above, with the direction in which its rod arrives there.
-
-    Parameters
-    ----------
-    plan : the flat plan of the archive.
-    text : usual size of the texts [mm at 1:1].
-    """
-    pencil, final = Pencil(), archive.final
-    assert final is not None
-    seen_from_above(pencil, archive, text)
-    drawn = [rod for rod in plan.rods if len(rod.nodes) > 1]
-    curves = [curve[:, :2] for curve in rod_curves(archive, archive.states[final])]
+    """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
+    pencil, drawn = Pencil(), meshed_rods(archive)
+    _seen_from_above(pencil, archive, text)
+    curves = [curve[:, :2] for curve in final_curves(archive)]
     ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
     arrives = np.array([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).reshape(-1, 2)
     arrives /= np.maximum(np.linalg.norm(arrives, axis=1), 1e-9)[:, None]
@@ -238,7 +193,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
         pencil.mark(end, RADIUS * text, "MARK", note=name)
         pencil.line([end, end + TICK * text * way], "MARK", pen=tick)
         room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
-    lines = np.concatenate([_segments(thinned(thinned(curve))) for curve in curves])  # what names keep clear of
+    lines = segments(_thinned(_thinned(curve)) for curve in curves)  # what names keep clear of
     alone = ~np.isin(names, list(_sewn(archive)))
     for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
@@ -259,7 +214,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     _meetings(pencil, archive, text, room)
     axes(pencil, text)
     low, _ = pencil.done("", "", text).box()
-    for k, line in enumerate(SUPPORTS_LEGEND, start=1):
+    for k, line in enumerate(_SUPPORTS_LEGEND, start=1):
         written = line.format(seams="" if alone.all() else ", and seams")
         pencil.write(written, low - (0.0, 1.5 * k * text), text, "DIM")
     return pencil.done("supports", f"Support plan{_stopped(archive)}", text)
@@ -297,11 +252,6 @@ def _sewn(archive: Archive) -> set[str]:
     return {end for seam in archive.results.seams for meeting in seam.meetings for end in meeting.ends}
 
 
-def _segments(curve: Floats) -> Floats:
-    """(k - 1, 2, 2) the parts of a polyline (k, 2)."""
-    return np.stack([curve[:-1], curve[1:]], axis=1)
-
-
 def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None:
     """The numbers of the places on seams where rods meet, as in the table of the seams, where there is room."""
     size, left_out = SMALL * text, 0
@@ -326,14 +276,10 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
 
     Each number stands off all rods and diagonals of its cell, as large as finds room; where there is none the table
     has it.
-
-    Parameters
-    ----------
-    text : usual size of the texts [mm at 1:1].
     """
     pencil, final = Pencil(), archive.final
     assert final is not None
-    seen_from_above(pencil, archive, text)
+    _seen_from_above(pencil, archive, text)
     joints = joint_places(archive, archive.states[final])
     supports = [f"{rod.id}.{end}" for rod in archive.results.rods for end in (0, 1)]
     joints |= {name: np.array(place) for name, place in zip(supports, archive.results.boundary, strict=False)}
@@ -370,7 +316,7 @@ def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list
     along, above = (np.column_stack(pair) for pair in ((np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))))
     middle, centred = 0.5 * (a + b), np.full(len(words), BACK["middle"])
     room, found = Room(3 * text), dict[int, Text]()
-    for size, (side, up) in ((text * share, side) for share in NUMBER_SIZES for side in SIDES):
+    for size, (side, up) in ((text * share, side) for share in _NUMBER_SIZES for side in SIDES):
         at = middle + (side * (CLEAR + 0.5 * LETTER * letters) * size)[:, None] * along + up * size * above
         (x, y), (cosine, sine), sizes = at.T, along.T, np.full(len(words), size)
         boxes = np.array(corners(x, y, cosine, sine, sizes, letters, centred)).transpose(2, 0, 1).copy()

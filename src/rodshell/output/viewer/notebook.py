@@ -55,12 +55,7 @@ export default {{
 
 
 def frame_html(scene: Scene) -> str:
-    """The viewer with a scene as one HTML element.
-
-    Parameters
-    ----------
-    scene : see `scene_of`.
-    """
+    """The viewer with a scene as one HTML element."""
     packed = _packed(scene.content())
     page = _PAGE.format(style=viewer_style(), load=_LOAD, script=_packed_script(), scene=packed)
     attributes = f'style="width: 100%; height: {HEIGHT}px; border: 0" title="The gridshell in 3D"'
@@ -70,13 +65,8 @@ def frame_html(scene: Scene) -> str:
 def widget_of(scene: Scene) -> "AnyWidget":
     """The viewer with a scene as a widget, whose `picked` is the id of the rod or joint that was clicked last.
 
-    Parameters
-    ----------
-    scene : see `scene_of`.
-
-    Raises
-    ------
-    InputError : anywidget is not installed.
+    Raises:
+        InputError: anywidget is not installed.
     """
     try:
         import anywidget

@@ -18,17 +18,27 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
-from rodshell.output.grid import GridJoint, GridRod, Shape, joints_of, laid_out, rods_of, shape_names, shape_of
-from rodshell.output.models import section_outline, widths_along
-from rodshell.output.pictures import FAMILIES
-from rodshell.output.schedules import Table, heading, joints_table, rods_table
+from rodshell.output.drawing import FAMILIES
+from rodshell.output.grid import (
+    GridRod,
+    Shape,
+    family_numbers,
+    joint_entries,
+    laid_out,
+    meshed_rods,
+    shape_names,
+    shape_of,
+)
+from rodshell.output.models import section_outline, section_widths
+from rodshell.output.schedules import SCHEDULES, Table, heading
 from rodshell.results import Archive, wording
+from rodshell.results.states import DRAPED
 from rodshell.results.wording import nice_ticks, rounding_of
 
 STEPS = 65535  # of a coordinate: 16 bits
 COLOURS: tuple[Colour, ...] = ("stress", "gap", "curvature", "force")
 UNKNOWN = 255  # in place of the index of a colour
-SEGMENTS = 14000  # of rods at most, so that pages stay small
+_SEGMENTS = 14000  # of rods at most, so that pages stay small
 VERSION = 1
 
 
@@ -36,10 +46,9 @@ VERSION = 1
 class Scene:
     """What the viewer shows.
 
-    Parameters
-    ----------
-    header : names, captions, colours; arrays as {"at": first byte, "type": "u1"|"i1"|"u2"|"u4"|"f4", "count": n}.
-    data : the arrays, each beginning at a multiple of four bytes.
+    Args:
+        header: names, captions, colours; arrays as {"at": first byte, "type": "u1"|"i1"|"u2"|"u4"|"f4", "count": n}.
+        data: the arrays, each beginning at a multiple of four bytes.
     """
 
     header: Mapping[str, Any]
@@ -65,17 +74,17 @@ class Coloured:
 class Drawn:
     """What a scene is made of.
 
-    Parameters
-    ----------
-    rods : id and family of each rod.
-    nodes : (k,) nodes of all rods, one rod after the other; counts : (m,) how many each rod has.
-    joints : ids; meeting : (c, 2) entry in `nodes` of each joint on either rod.
-    shapes : in their order, with what colours them; a flat one is shown below the last, where the deployment begins.
-    outline : size of everything [m] -> (s, 2) corners of the rods' section, across and up [m].
-    target : points (p, 3) and triangles (t, 3) of the target, if there is one.
-    reactions : by shape, the forces (2 m, 3) at the start and end of each rod over the largest, and that one in words.
-    rows : of the schedules, by the kind of part.
-    widths : (k, 2) of the section at each node, across and up, over those of `outline`; None: the same everywhere.
+    Args:
+        rods: id and family of each rod.
+        nodes: (k,) nodes of all rods, one rod after the other; counts : (m,) how many each rod has.
+        joints: ids; meeting : (c, 2) entry in `nodes` of each joint on either rod.
+        shapes: in their order, with what colours them; a flat one is shown below the last, where the deployment begins.
+        outline: size of everything [m] -> (s, 2) corners of the rods' section, across and up [m].
+        target: points (p, 3) and triangles (t, 3) of the target, if there is one.
+        reactions: by shape, the forces (2 m, 3) at the start and end of each rod over the largest, and that one in
+            words.
+        rows: of the schedules, by the kind of part.
+        widths: (k, 2) of the section at each node, across and up, over those of `outline`; None: the same everywhere.
     """
 
     name: str
@@ -98,12 +107,14 @@ class Drawn:
         meeting = np.searchsorted(entries, self.meeting).astype(np.uint32)
         lying = self._lying()
         clouds = [(lying if shape.flat else shape.positions)[nodes] for shape, _ in self.shapes]
-        low, size = _box([*clouds, *([] if self.target is None else [self.target[0]])])
+        low, high = bounds(np.concatenate([*clouds, *([] if self.target is None else [self.target[0]])]))
+        size = high - low
         outline = self.outline(float(size.max()))
         frame = _Frame(low, float(size.max()), entries, data)
         laths = _laths(outline)
         known = {kind: coloured.scale for _, colours in self.shapes for kind, coloured in colours.items()}
         shown = {kind: known[kind] for kind in COLOURS if kind in known}
+        families = family_numbers(family for _, family in self.rods)
         header: dict[str, Any] = {
             "version": VERSION,
             "name": self.name,
@@ -111,10 +122,10 @@ class Drawn:
             "low": low.tolist(),
             "box": (size / frame.size).tolist(),
             "rods": [
-                {"id": name, "count": count, "ink": FAMILIES[family == "v"]}
-                for (name, family), count in zip(self.rods, counts.tolist(), strict=True)
+                {"id": name, "count": count, "ink": FAMILIES[family % len(FAMILIES)]}
+                for (name, _), count, family in zip(self.rods, counts.tolist(), families, strict=True)
             ],
-            "joints": {"ids": list(self.joints), "entries": data.add(meeting)},
+            "joints": {"ids": list(self.joints), "entries": data.put(meeting)},
             "outline": (outline / frame.size).tolist(),
             "kinds": {kind: scale.caption.split(" in ")[0] for kind, scale in shown.items()},
             "palettes": {kind: scale.palette for kind, scale in shown.items()},
@@ -125,19 +136,19 @@ class Drawn:
             "rows": self.rows,
         }
         if self.widths is not None:
-            header["widths"] = data.add(self.widths[entries].astype("<f4"))
+            header["widths"] = data.put(self.widths[entries].astype("<f4"))
         if self.target is not None:
             points, faces = self.target
-            header["target"] = {"points": frame.points(points), "faces": data.add(faces.astype("<u4"))}
+            header["target"] = {"points": frame.points(points), "faces": data.put(faces.astype("<u4"))}
         last = np.cumsum(counts)
         header["supports"] = {
-            "entries": data.add(np.column_stack([last - counts, last - 1]).astype("<u4")),
+            "entries": data.put(np.column_stack([last - counts, last - 1]).astype("<u4")),
             "reactions": {
-                name: {"forces": data.add(forces.astype("<f4")), "largest": largest}
+                name: {"forces": data.put(forces.astype("<f4")), "largest": largest}
                 for name, (forces, largest) in self.reactions.items()
             },
         }
-        return Scene(header, data.content())
+        return Scene(header, bytes(data))
 
     def _lying(self) -> Floats:
         """The flat grid (n, 3), moved in its plane to below the last shape: a target may be far from the origin."""
@@ -153,16 +164,15 @@ class Drawn:
 def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     """All shapes of an archive, the draped one among them; None where it has no shape in space.
 
-    Parameters
-    ----------
-    schedules : whether rods and joints have the rows of the schedules with them, which takes most of the time.
+    Args:
+        schedules: whether rods and joints have the rows of the schedules with them, which takes most of the time.
     """
-    rods = [rod for rod in rods_of(archive) if len(rod.nodes)]
-    names = [name for name in _in_order(shape_names(archive)) if rods]
+    rods = meshed_rods(archive)
+    names = sorted(shape_names(archive), key=lambda name: name != DRAPED) if rods else []
     if len(names) < 2:
         return None
-    joints, shapes = _drawn_joints(archive, rods), [shape_of(archive, name) for name in names]
-    tables = {"rod": rods_table(archive, brief=True), "joint": joints_table(archive, brief=True)} if schedules else {}
+    joints, shapes = joint_entries(archive), [shape_of(archive, name) for name in names]
+    tables = {kind: SCHEDULES[f"{kind}s"].brief(archive) for kind in ("rod", "joint") if schedules}
     target = archive.states.get("target_points")
     return Drawn(
         archive.name,
@@ -190,14 +200,14 @@ class _Frame:
     data: "_Data"
 
     def points(self, points: NDArray[np.floating]) -> dict[str, Any]:
-        return self.data.add(np.rint((points - self.low) / self.size * STEPS).astype("<u2"))
+        return self.data.put(np.rint((points - self.low) / self.size * STEPS).astype("<u2"))
 
     def stage(
         self, shape: Shape, colours: Mapping[Colour, Coloured], cloud: Floats, normals: Floats | None
     ) -> dict[str, Any]:
         stage: dict[str, Any] = {"name": shape.name, "caption": shape.caption, "points": self.points(cloud)}
         if normals is not None:
-            stage["normals"] = self.data.add(np.rint(127 * normals).astype(np.int8))
+            stage["normals"] = self.data.put(np.rint(127 * normals).astype(np.int8))
         stage["colours"] = {kind: self._coloured(coloured) for kind, coloured in colours.items()}
         return stage
 
@@ -205,63 +215,28 @@ class _Frame:
         scale = coloured.scale
         bins = np.where(np.isfinite(scale.values), scale.bins, UNKNOWN)[self.entries].astype(np.uint8)
         worst = {"at": ((coloured.where - self.low) / self.size).tolist(), "text": coloured.worst}
-        return {"bins": self.data.add(bins), "caption": scale.caption, "ticks": _ticks(scale), "worst": worst}
+        return {"bins": self.data.put(bins), "caption": scale.caption, "ticks": _ticks(scale), "worst": worst}
 
 
-class _Data:
+class _Data(bytearray):
     """Collects arrays."""
 
-    def __init__(self) -> None:
-        self._parts: list[bytes] = []
-        self._length = 0
-
-    def add(self, values: NDArray[Any]) -> dict[str, Any]:
+    def put(self, values: NDArray[Any]) -> dict[str, Any]:
         """Where the values stand."""
         plain = np.ascontiguousarray(values)
-        part = plain.tobytes()
-        here = {"at": self._length, "type": f"{plain.dtype.kind}{plain.dtype.itemsize}", "count": int(plain.size)}
-        part += b"\0" * (-len(part) % 4)
-        self._parts.append(part)
-        self._length += len(part)
+        here = {"at": len(self), "type": f"{plain.dtype.kind}{plain.dtype.itemsize}", "count": int(plain.size)}
+        self += plain.tobytes()
+        self += b"\0" * (-len(self) % 4)
         return here
-
-    def content(self) -> bytes:
-        return b"".join(self._parts)
-
-
-def _in_order(names: list[str]) -> list[str]:
-    """Draped, flat, the deployment, popped up: as they are found."""
-    return [name for name in names if name == "draped"] + [name for name in names if name != "draped"]
-
-
-def _drawn_joints(archive: Archive, rods: list[GridRod]) -> list[tuple[GridJoint, tuple[int, int]]]:
-    """Every joint whose rods have nodes, and the entry of `rod_nodes` on either rod that lies nearest to it."""
-    if "flat" not in archive.states:
-        return []
-    starts = np.cumsum([0, *(len(rod.nodes) for rod in rods)])
-    flat = archive.states["flat"]
-    stations = [np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[0]], axis=1) for rod in rods]
-    found = []
-    for joint in joints_of(rods):
-        pairs = zip(joint.rods, joint.at, strict=True)
-        first, second = (int(starts[k] + np.abs(stations[k] - place).argmin()) for k, place in pairs)
-        found.append((joint, (first, second)))
-    return found
 
 
 def _entries(counts: Ints, meeting: Ints) -> Ints:
     """Entries that are drawn, of all rods: of very many some, those of ends and joints among them."""
     stop = np.cumsum(counts)
     along = np.arange(stop[-1]) - np.repeat(stop - counts, counts)
-    drawn = along % max(1, -(-int(stop[-1]) // SEGMENTS)) == 0
+    drawn = along % max(1, -(-int(stop[-1]) // _SEGMENTS)) == 0
     drawn[stop - 1] = drawn[meeting.ravel()] = True
     return np.flatnonzero(drawn)
-
-
-def _box(clouds: Sequence[NDArray[np.floating]]) -> tuple[Floats, Floats]:
-    """Lowest corner and extent, each (3,), of all points."""
-    low, high = bounds(np.concatenate(clouds))
-    return low, high - low
 
 
 def _colours(archive: Archive, shape: Shape) -> dict[Colour, Coloured]:
@@ -293,15 +268,11 @@ def _worst(archive: Archive, shape: Shape, kind: Colour, scale: Scale) -> tuple[
 
 def _widths(archive: Archive, rods: list[GridRod]) -> Floats | None:
     """Of the rods' sections, see `Drawn`; None where no section changes, or the flat grid is not known."""
-    if "flat" not in archive.states or not any(rod.record.stiffness for rod in rods):
+    each = [section_widths(archive, rod) for rod in rods]
+    if all(widths is None for widths in each):
         return None
-    flat, along = archive.states["flat"], [rod.record.stiffness for rod in rods]
-    return np.concatenate(
-        [
-            np.ones((len(rod.nodes), 2)) if stiffness is None else widths_along(stiffness, flat[rod.nodes])
-            for rod, stiffness in zip(rods, along, strict=True)
-        ]
-    )
+    known = zip(each, rods, strict=True)
+    return np.concatenate([np.ones((len(rod.nodes), 2)) if widths is None else widths for widths, rod in known])
 
 
 def _laths(outline: Floats) -> bool:
@@ -347,5 +318,5 @@ def _reactions(archive: Archive, rods: list[GridRod]) -> dict[str, tuple[Floats,
 
 def _rows(table: Table) -> dict[str, Any]:
     """A schedule by the name in its first column."""
-    columns, rows = table
-    return {"columns": [heading(column) for column in columns], "rows": {row[0]: row for row in rows}}
+    rows = zip(*table.values(), strict=True)
+    return {"columns": [heading(column) for column in table], "rows": {row[0]: row for row in rows}}

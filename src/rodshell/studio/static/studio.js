@@ -363,7 +363,7 @@ let typing = false, stale = false;  // while somebody types or drags in a contro
 
 // The keys that the page has a field for: those of a case whose tables are of these kinds.
 function keysOfCase() {
-  const kinds = { target: base.target?.kind || "hemisphere", "rod.section": base.rod?.section?.kind || "circle", joint: base.joint?.kind || "ball" };
+  const kinds = { target: base.target?.kind || "hemisphere", layout: base.layout?.kind || "chebyshev", "rod.section": base.rod?.section?.kind || "circle", joint: base.joint?.kind || "ball" };
   return start.keys.filter(key => !key.reads_file && key.path !== "drape.frames" && (!key.kinds.length || key.kinds.includes(kinds[key.path.replace(/\.[^.]*$/, "")])));
 }
 
@@ -376,6 +376,7 @@ function buildControls() {
   gui = new GUI({ container: byId("controls"), injectStyles: false, title: file ? `Case of ${words(file).replace("upload:", "")}` : "Case" });
   const known = keysOfCase();
   const design = gui.addFolder("Design");
+  addKey(design, known.find(({ path }) => path === "layout.kind"), "Lattice");
   for (const [path, name, kind] of SLIDERS) {
     if (!known.some(key => key.path === path)) continue;
     addSlider(design, path, name, kind);
@@ -442,7 +443,7 @@ function addKey(folder, key, label = "") {
   const asGiven = () => { try { return JSON.parse(holder.value); } catch { return holder.value; } };
   controller.onFinishChange(() => {
     change(next => {
-      if (key.path.endsWith(".kind") || key.path === "rod.material.preset") forget(next, key.path);
+      if (key.path.endsWith(".kind") || key.path === "rod.material.preset") forget(next, key.path, holder.value);
       set(next, key.path, holder.value === "" ? undefined : asGiven());
       if (key.path.startsWith("target.")) pending = true;
     });
@@ -453,10 +454,11 @@ function addKey(folder, key, label = "") {
   describe(controller, key.path, key.help);
 }
 
-// Another kind of a table has other keys: those of the old one go.
-function forget(next, path) {
-  const table = path.replace(/\.[^.]*$/, "");
-  set(next, table, {});
+// Another kind of a table has other keys: those of the old one go that it does not have, and all of a material.
+function forget(next, path, kind) {
+  const table = path.replace(/\.[^.]*$/, ""), before = get(next, table);
+  const kept = table === "layout" ? start.keys.filter(key => key.path.startsWith("layout.") && key.kinds.includes(kind || "chebyshev")).map(key => key.path.slice(7)) : [];
+  set(next, table, Object.fromEntries(Object.entries(isTable(before) ? before : {}).filter(([name]) => kept.includes(name))));
 }
 
 function describe(controller, path, help) {

@@ -1,4 +1,4 @@
-"""The table of kernels: complete, and the types are those that jobs call them with."""
+"""The types that kernels are declared with: those of all that Python calls, and of no other."""
 
 import ast
 import re
@@ -10,20 +10,24 @@ from functools import cache
 from pathlib import Path
 
 import rodshell
-from rodshell.kernels.table import KERNELS
+from rodshell.kernels import modules
 
 SOURCE = Path(rodshell.__file__).parent
 
 
-def test_each_kernel_that_python_calls_has_a_row_and_no_other_name_has() -> None:
+def test_each_kernel_that_python_calls_has_types_and_no_other_has() -> None:
     called = {resolved(module, name) for module in sources() for name in names_outside_kernels(module)} - {None}
-    assert called == {(module, name) for module, rows in KERNELS.items() for name in rows}
+    assert called == {(module, name) for module in sources() for name in types_of(module)}
 
 
-def test_a_row_has_a_type_for_each_argument() -> None:
-    for module, rows in KERNELS.items():
-        for name, row in rows.items():
-            assert len(kernels_of(module)[name].args.args) == len(row.split()), f"{module}.{name}"
+def test_kernels_have_a_type_for_each_argument() -> None:
+    for module in modules():
+        for name, types in types_of(module).items():
+            assert len(kernels_of(module)[name].args.args) == len(types.split()), f"{module}.{name}"
+
+
+def test_modules_of_kernels_are_those_that_declare_types() -> None:
+    assert modules() == sorted(module for module in sources() if types_of(module))
 
 
 def test_modules_of_kernels_import_without_what_is_not_there_when_a_wheel_is_built() -> None:
@@ -36,7 +40,7 @@ def test_modules_of_kernels_import_without_what_is_not_there_when_a_wheel_is_bui
     missing = {re.split(r"\W", word)[0] for word in hooks["custom"]["dependencies"]} - there
     assert {"pydantic", "pillow"} <= missing
     code = "import sys\n" + "".join(f"sys.modules[{name!r}] = None\n" for name in sorted(missing | {"PIL"}))
-    code += "".join(f"import rodshell.{module}\n" for module in KERNELS)
+    code += "".join(f"import rodshell.{module}\n" for module in modules())
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert not done.returncode, done.stderr
 
@@ -63,6 +67,17 @@ def kernels_of(module: str) -> dict[str, ast.FunctionDef]:
     return {
         one.name: one for one in functions if any(ast.unparse(mark).startswith("njit(") for mark in one.decorator_list)
     }
+
+
+def types_of(module: str) -> dict[str, str]:
+    """The types that kernels of a module are declared with, of those that have some."""
+    marks = {
+        name: mark
+        for name, one in kernels_of(module).items()
+        for mark in one.decorator_list
+        if isinstance(mark, ast.Call) and mark.args
+    }
+    return {name: ast.literal_eval(mark.args[0]) for name, mark in marks.items()}
 
 
 @cache

@@ -1,0 +1,88 @@
+"""Shells with energies of one's own, on supports that let their rods' ends slide."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeGuard
+
+import numpy as np
+
+from rodshell.arrays import Floats
+from rodshell.errors import InputError
+from rodshell.model import Shell
+from rodshell.model.shell import Direction
+from rodshell.rods.elements import Elements
+from rodshell.rods.supports import Support
+from rodshell.solve.equilibrium import MOST_ITERATIONS, Equilibrium, find_stable
+from rodshell.solve.problem import Supports
+from rodshell.validation import described, direction, listed, mapping, some, whole
+
+_ENERGY = "an energy, such as rodshell.LocalEnergy, or a list of them"
+_Counting = Callable[[str, int], Callable[[int, float], None]]
+
+
+def let_go(
+    shell: Shell, held: Equilibrium, support: Support, points: Floats, counting: _Counting
+) -> tuple[Shell, Equilibrium]:
+    """A shell on its support.
+
+    Args:
+        held: the equilibrium with the rods' ends held at `points` (2m, 3).
+        counting: makes a progress of what is done, and of how many iterations it takes at most.
+    """
+    slides = slides_of(support, support.free(points), len(points))
+    springs = energies_of(support.energies(shell.ends, points), shell.node_count)
+    if not slides and not springs:
+        return shell, held
+    there = replace(shell, slides=slides, springs=springs)
+    shell, found = at_rest(there, held, counting(f"{support}, let go, iteration", MOST_ITERATIONS))
+    return shell, replace(found, report=found.report.after(held.report))
+
+
+def at_rest(shell: Shell, near: Equilibrium, progress: Callable[[int, float], None]) -> tuple[Shell, Equilibrium]:
+    """A shell in equilibrium with all its energies, its ends being free to slide where they can.
+
+    Args:
+        near: the equilibrium of the same shell with other energies, or with its ends held.
+    """
+    problem = replace(near.problem, elements=shell.elements, constraint=Supports(shell.held_ends()))
+    found = find_stable(problem, near.state, near.forces, limit_steps=True, progress=progress)
+    return shell.with_elements(found.elements), found
+
+
+def energies_of(given: object, nodes: int) -> tuple[Elements, ...]:
+    """One or several energies of a shell with so many nodes.
+
+    Raises:
+        InputError: one is not an energy, or acts on a node that the shell has not.
+    """
+    added = (given,) if _is_energy(given) else tuple(listed("energies", given, _ENERGY))
+    for energy in added:
+        if not _is_energy(energy):
+            raise InputError(f"energies must be {_ENERGY}, not {described(energy)}")
+        if (energy.blocks >= nodes).any():
+            raise InputError(f"an energy acts on node {energy.blocks.max()}: the shell has {nodes}, from 0")
+    return added
+
+
+def _is_energy(given: object) -> TypeGuard[Elements]:
+    return all(hasattr(given, name) for name in ("blocks", "evaluate", "refreshed"))
+
+
+def slides_of(support: Support, free: object, ends: int) -> dict[int, tuple[Direction, ...]]:
+    """Directions along which some of so many rod ends may move, by the number of the end.
+
+    Raises:
+        InputError: there is no such end; its directions are not at right angles; the support holds directions.
+    """
+    slides = dict[int, tuple[Direction, ...]]()
+    for end, directions in mapping("free", free, "directions by the number of the rod end").items():
+        whole("a rod end in free", end, 0, ends - 1)
+        if support.holds_directions:
+            raise InputError(f"a {support} rod end cannot be set free: pop the shell up with pinned ends")
+        name = f"a direction of rod end {end}"
+        given = np.array([direction(name, each) for each in some(f"free of rod end {end}", directions, "directions")])
+        across: Floats = given @ given.T - np.eye(len(given))
+        if len(given) > 3 or np.abs(across).max(initial=0.0) > 1e-9:
+            raise InputError(f"the directions along which rod end {end} may move are not at right angles to each other")
+        slides[end] = tuple((x, y, z) for x, y, z in given.tolist())
+    return slides
