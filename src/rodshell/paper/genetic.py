@@ -79,10 +79,9 @@ class Sought:
 class Comparison:
     """One target by both methods.
 
-    Parameters
-    ----------
-    direct : agreement of the direct method, pinned.
-    searches : from the best to the worst.
+    Args:
+        direct: agreement of the direct method, pinned.
+        searches: from the best to the worst.
     """
 
     case: Case
