@@ -44,10 +44,10 @@ COMPARED = {  # what the paper shows in this place
     "counts.",
     "genetic": 'The paper: a hemispherical gridshell "may take approximately" 100 generations of 500 individuals, or '
     "50,000 forward simulations, where its direct method needs one. It shows the algorithm's G0 for the paraboloid and "
-    "the ellipsoid, from reference 30, as a line in its figure, without numbers. There is one search for each target, "
-    "from seed 1, kept with the package; its best shape is popped up again with the present solver. The spread over "
-    "seeds is not known: which shapes are stable depends on the solver's last digits, and so does a search. One of "
-    "another seed takes some ten thousand pop-ups (`rodshell paper genetic --seed 2`).",
+    "the ellipsoid, from reference 30, as a line in its figure, without numbers. There are searches from five seeds for "
+    "each target, kept with the package; the best shape of each is popped up again with the present solver. A search is "
+    "judged by the popped shape, so that two may end in different G0: how far they are from that of the direct method "
+    "stands in the table. One of another seed takes some ten thousand pop-ups (`rodshell paper genetic --seed 6`).",
     "studies": 'The paper: H, E, r and g "do not significantly influence the actuated shape" of soft, inextensible '
     'rods; C1 = C2 = 1e6 EI "after a convergent study".',
 }
