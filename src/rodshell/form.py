@@ -193,7 +193,7 @@ class Form:
         limit = strength / material.youngs_modulus if strength and material else THIN
         return FlatState(
             lies_flat=found.report.stable and (found.strain or 0.0) <= limit, in_plane_strain=found.strain, limit=limit,
-            negative_modes=found.report.negative_modes,
+            negative_modes=None if found.strain is None else found.report.negative_modes,
         )  # fmt: skip
 
     # Checks, fabrication, verdict

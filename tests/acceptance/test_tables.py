@@ -43,7 +43,8 @@ CHEAP: dict[str, tuple[Rows, ...]] = {
     "house": (house.tree_rows,),
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
     "lattices": (
-        lattices.geodesic_rows, lattices.straight_rows, lattices.shell_rows, lattices.family_rows, lattices.flat_rows,
+        lattices.geodesic_rows, lattices.straight_rows, lattices.shell_rows, lattices.family_rows, lattices.curve_rows,
+        lattices.flat_rows,
         partial(lattices.gallery_rows, ("garden pavilion", "saddle")),
     ),
     "loads": (
