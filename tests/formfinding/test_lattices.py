@@ -110,17 +110,18 @@ def test_schedules_have_the_places_of_joints_and_no_flat_ones_of_a_shell_that_is
     form: Callable[[], rs.Form],
 ) -> None:
     archive, mesh = kept(form()), form().footprint.mesh
-    names, rows = joints_table(archive)
+    table = joints_table(archive)
+    rows = {row[0]: dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)}
     places = form().popped["pinned"].positions[mesh.joint_nodes]
     for joint, place in zip(mesh.grid.joint_names, places, strict=True):
-        row = next(dict(zip(names, row, strict=True)) for row in rows if row[0] == joint)
+        row = rows[joint]
         found = [float(row[f"final_{axis}_mm"]) for axis in "xyz"]
         np.testing.assert_allclose(found, 1e3 * place, atol=0.1)  # twice the rounding
         assert bool(row["flat_x_mm"]) == bool(row["scissor_deg"]) == (form is low)
     if form is low:
         scissors = {"/".join(load.rods): load.scissor_deg for load in archive.results.joint_loads["pinned"]}
-        for row in rows:
-            assert float(row[names.index("scissor_deg")]) == pytest.approx(scissors[row[0]], abs=0.05)
+        for joint, row in rows.items():
+            assert float(row["scissor_deg"]) == pytest.approx(scissors[joint], abs=0.05)
 
 
 def test_a_result_is_kept_and_its_case_gives_it_again(tmp_path: Path) -> None:

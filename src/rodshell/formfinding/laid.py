@@ -30,7 +30,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status, find_stable
 from rodshell.solve.problem import Problem, Supports
 from rodshell.targets import Target
-from rodshell.units import shown
+from rodshell.units import length_text, shown
 
 MOST_ITERATIONS = 24  # of the flat state: a grid that lies flat takes less than ten, another may take hundreds
 PENALTY = 8e4  # stiffness of the edges against that of bending over the size, as of a bound drape
@@ -81,8 +81,27 @@ def lay(
     return Draped(
         method=Bound(), target=target, layout=lattice, rod=rod, anchor=anchor, eccentricity=0.0, mesh=mesh,
         positions=positions, rods=_built(mesh.grid.rods, lattice), levels=(report,), figures=figures, flat_state=flat,
-        warnings=(*target.warnings, *net.warnings),
+        warnings=(*target.warnings, *net.warnings, *_near_joints(mesh.grid, rod)),
     )  # fmt: skip
+
+
+def _near_joints(grid: FlatGrid, rod: Rod) -> tuple[str, ...]:
+    """A warning where joints of a rod are so near to each other that its laths lie on one another and holes meet."""
+    rods, at = grid.crossings.rods.ravel(), grid.crossings.at.ravel()
+    order = np.lexsort((at, rods))
+    rods, at = rods[order], at[order]
+    apart = np.where(rods[1:] == rods[:-1], np.diff(at), np.inf)
+    breadth = rod_breadth(rod)
+    near = int(np.count_nonzero(apart < breadth))
+    if not near:
+        return ()
+    k = int(np.argmin(apart))
+    line, place = grid.rods[rods[k]], length_text(at[k] - grid.rods[rods[k]].start)
+    return (
+        f"{near} pairs of neighbouring joints on a rod are nearer than its breadth of {length_text(breadth)}, down to "
+        f"{length_text(apart[k])} on {line.name}, {place} from its start, where their holes have no room: use another "
+        "spacing, anchor or heading, leave a rod out (layout.left_out), or use narrower laths",
+    )
 
 
 def _built(rods: tuple[FlatRod, ...], lattice: SurfaceLattice) -> tuple[FlatRod, ...]:

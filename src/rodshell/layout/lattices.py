@@ -165,7 +165,7 @@ class Curves(SurfaceLattice):
 
     lines: Annotated[Strokes, 'points of each rod, "x,y,z; x,y,z" or in plan; "|" between two rods'] = ()
     names: Annotated[Names, "names of the rods; default: R01, R02, ..."] = ()
-    rest: Annotated[Rest, "rods are straight at rest, or cut so that none bends within the surface"] = "straight"
+    rest: Annotated[Rest, "straight rods, or rods cut so that none bends within the surface"] = "straight"
 
     kind = "curves"
 
