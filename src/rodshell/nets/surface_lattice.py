@@ -98,8 +98,9 @@ def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float,
         s = spacing * (np.arange(np.ceil(low - shift), np.floor(high - shift) + 1) + shift)
         x, along = guides.at(np.full(len(s), k), s)
         families.append(_Family(spacing, x, _off(target, x, along, law)))
-    _fill_corners(target, law, families)
-    curves = trace(target, law, *(np.concatenate([family[k] for family in families]) for k in (1, 2)))
+    curves = _trace_all(target, law, families)
+    if _fill_corners(target, law, families, curves):
+        curves = _trace_all(target, law, families)
     counts = [len(family.points) for family in families]
     names = [f"{LETTERS[k]}{number:02d}" for k in range(len(counts)) for number in range(1, counts[k] + 1)]
     return _joined(lattice, curves, names, np.repeat(np.arange(len(counts)), counts))
@@ -139,33 +140,48 @@ class _Family(NamedTuple):
         )
 
 
-def _fill_corners(target: Target, law: Law, families: list[_Family]) -> None:
+def _trace_all(target: Target, law: Law, families: list[_Family]) -> SurfaceCurves:
+    return trace(target, law, *(np.concatenate([family[part] for family in families]) for part in (1, 2)))
+
+
+def _fill_corners(target: Target, law: Law, families: list[_Family], rods: SurfaceCurves) -> bool:
     """Add rods on both sides of families, where the target goes on beside the curves that set them out.
 
     Along each part of an outermost rod that has room beside it, a rod is laid a spacing away, where there is most. One
     that is shorter than two spacings is none.
+
+    Args:
+        rods: of the families, one after the other.
+
+    Returns:
+        Whether there are any.
     """
     family, last = np.divmod(np.arange(2 * len(families)), 2)
-    x, tangents = (np.array([families[k][part][-end] for k, end in zip(family, last, strict=True)]) for part in (1, 2))
-    while len(x):
-        rods, rod = trace(target, law, x, tangents), np.repeat(np.arange(len(x)), PLACES)
-        share = (np.arange(PLACES) + 0.5) / PLACES
-        x, along = rods.at(rod, (rods.ends[:, :1] + np.diff(rods.ends) * share).ravel())
-        outward = np.where(last, -1.0, 1.0)[rod, None]
+    stop = np.cumsum([len(each.points) for each in families])
+    outer = np.column_stack([np.append(0, stop[:-1]), stop - 1]).ravel()
+    share, added = (np.arange(PLACES) + 0.5) / PLACES, False
+    while len(outer):
+        ends = rods.ends[outer]
+        x, along = rods.at(np.repeat(outer, PLACES), (ends[:, :1] + np.diff(ends) * share).ravel())
+        outward = np.where(last, -1.0, 1.0)[:, None]
         try:
-            across = trace(target, law, x, outward * _off(target, x, along, law))
+            across = trace(target, law, x, np.repeat(outward, PLACES, axis=0) * _off(target, x, along, law))
         except NetLimitError:  # one of them does not arrive
-            return
-        spacing = np.array([each.spacing for each in families])[family][:, None]
+            break
+        spacing = np.array([each.spacing for each in families])[family]
         room = across.ends[:, 1].reshape(-1, PLACES)
-        parts, count = label(room > spacing, structure=[[0, 0, 0], [1, 1, 1], [0, 0, 0]])
-        of, place = np.array(maximum_position(room, parts, np.arange(1, count + 1)), dtype=np.intp).reshape(-1, 2).T
-        x, along = across.at(of * PLACES + place, spacing[of, 0])
-        tangents = _off(target, x, -np.where(last[of], -1.0, 1.0)[:, None] * along, law)
-        long = np.diff(trace(target, law, x, tangents).ends)[:, 0] > 2.0 * spacing[of, 0] if count else of > of
-        family, last, x, tangents = family[of[long]], last[of[long]], x[long], tangents[long]
-        for k, end, point, tangent in zip(family, last, x, tangents, strict=True):
-            families[k] = families[k].with_rod(bool(end), point, tangent)
+        parts, count = label(room > spacing[:, None], structure=[[0, 0, 0], [1, 1, 1], [0, 0, 0]])
+        if not count:
+            break
+        of, place = np.array(maximum_position(room, parts, np.arange(1, count + 1)), dtype=np.intp).T
+        x, along = across.at(of * PLACES + place, spacing[of])
+        tangents = _off(target, x, -outward[of] * along, law)
+        rods = trace(target, law, x, tangents)
+        outer = np.flatnonzero(np.diff(rods.ends)[:, 0] > 2.0 * spacing[of])
+        family, last = family[of[outer]], last[of[outer]]
+        for k, end, point, tangent in zip(family, last, x[outer], tangents[outer], strict=True):
+            families[k], added = families[k].with_rod(bool(end), point, tangent), True
+    return added
 
 
 def _of_lines(target: Target, lattice: Curves) -> SurfaceNet:
