@@ -19,6 +19,7 @@ from rodshell.nets.surface_lattice import surface_net
 from rodshell.solve.equilibrium import find_stable
 from rodshell.solve.problem import Problem
 from tests.acceptance.lattices_gallery import gallery_rows
+from tests.acceptance.lattices_twin import twin_rows
 from tests.acceptance.rows import Row, print_table
 from tests.targets.meshes import lattice
 
@@ -277,7 +278,17 @@ def up_from_flat(form: rs.Form) -> float:
     return float(np.abs(state[: shell.mesh.node_count] - popped.positions).max() / form.target.size)
 
 
-ROWS = (geodesic_rows, straight_rows, shell_rows, family_rows, strip_rows, curve_rows, flat_rows, gallery_rows)
+ROWS = (
+    geodesic_rows,
+    straight_rows,
+    shell_rows,
+    family_rows,
+    strip_rows,
+    curve_rows,
+    flat_rows,
+    twin_rows,
+    gallery_rows,
+)
 
 
 def main() -> int:

@@ -44,7 +44,7 @@ CHEAP: dict[str, tuple[Rows, ...]] = {
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
     "lattices": (
         lattices.geodesic_rows, lattices.straight_rows, lattices.shell_rows, lattices.family_rows, lattices.curve_rows,
-        lattices.flat_rows,
+        lattices.flat_rows, lattices.twin_rows,
         partial(lattices.gallery_rows, ("garden pavilion", "saddle")),
     ),
     "loads": (
