@@ -231,7 +231,7 @@ class Stages:
         if self.lying is not None and self.draped.report.reason:
             return self.draped.report.reason
         if self.lying is not None and not self.draped.converged:
-            sentence = self.draped.report.status.sentence
+            sentence = self.draped.report.status.sentence_on(self.layout)
             weighed = not isinstance(self.draped.method, Bound) and "bound" not in sentence
             other = ', or use method = "bound", which needs no weight' if weighed else ""
             return f"drape {sentence}{other}"
@@ -243,7 +243,7 @@ class Stages:
     def _lost(self, shell: PopUp) -> str:
         """How a pop-up ended that did not converge, and what to do. A table of rods has neither spacing nor target."""
         if not self.from_table:
-            return shell.report.status.sentence
+            return shell.report.status.sentence_on(self.layout)
         return (
             f"could be followed from flat only up to {percent_text(shell.followed)} of the way of the rods' ends; rods "
             "of another section may be followed further (rod.section), and rodshell form starts from a target instead"
