@@ -8,7 +8,14 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.figures.checks import OTHER_SHAPES
 from rodshell.output.drawing import TEXT, Drawing
-from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan, per_sheet, strips_drawing
+from rodshell.output.drawings.flat import (
+    FlatPlan,
+    flat_drawing,
+    flat_plan,
+    sheets_of_strips,
+    strip_size,
+    strips_drawing,
+)
 from rodshell.output.drawings.sheets import (
     SCALES,
     Compose,
@@ -129,10 +136,8 @@ def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
     """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
     low, high = room(paper)
     width, height = high - low
-    longest = max((1e3 * rod.cut_length for rod in plan.rods), default=1.0)
-    scale = next((scale for scale in SCALES if (longest + 12 * scale * TEXT) / scale <= width), SCALES[-1])
-    count = per_sheet(height, TEXT)
-    groups = [plan.rods[k : k + count] for k in range(0, len(plan.rods), count)]
+    scale = next((scale for scale in SCALES if _fits(plan, width, height, scale)), SCALES[-1])
+    groups = sheets_of_strips(plan, scale * height, scale * TEXT)
     sheets = []
     for k, rods in enumerate(groups):
         drawing = strips_drawing(plan, scale * TEXT, rods)
@@ -141,3 +146,9 @@ def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
         many = f", {k + 1} of {len(groups)}" if len(groups) > 1 else ""
         sheets.append(Sheet(drawing.title + many, placed, scale))
     return sheets
+
+
+def _fits(plan: FlatPlan, width: float, height: float, scale: float) -> bool:
+    """Whether the longest and the tallest strip find room on a sheet [mm] at a scale."""
+    longest, tallest = strip_size(plan, scale * TEXT)
+    return (longest + 12 * scale * TEXT) / scale <= width and tallest <= scale * (height - 3 * TEXT)
