@@ -13,6 +13,7 @@ from rodshell.case import load_case
 from rodshell.case.rod_ends import read_result
 from rodshell.errors import InputError
 from rodshell.nets.surface_lattice import surface_net
+from rodshell.output.blanks import blanks_of
 from rodshell.output.drawing import FAMILIES
 from rodshell.output.drawings import drawing_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
@@ -375,6 +376,26 @@ def test_a_result_keeps_how_its_rods_are_curved_at_rest(tmp_path: Path) -> None:
     assert rs.Job.load(folder / "case.toml").run(until="drape").draped.rods == form.draped.rods
     with pytest.raises(InputError, match=r"do not lie straight in the plane \(the first: R0\d\).*run its case again"):
         read_result(folder)
+
+
+@pytest.mark.slow
+def test_a_refinement_of_curved_laths_keeps_their_curves_and_the_blank_follows_the_breadth() -> None:
+    refined = rs.refine(curved(), ["taper"])
+    assert refined.refined is not None
+    assert refined.refined.changed
+    found, before = kept(refined), kept(curved())
+    rods = [archive.results.rods[0] for archive in (found, before)]
+    assert rods[0].rest_curvature == rods[1].rest_curvature
+    along = rods[0].stiffness
+    assert along is not None
+    assert along.varies == "size"
+    right, left = blanks_of(found)[rods[0].id].across(along.at[1])
+    assert np.hypot(*(left - right)) == pytest.approx(0.04 * along.factors[1] ** 0.25, rel=1e-3)
+
+
+def test_lengths_cannot_be_refined_along_curves() -> None:
+    with pytest.raises(InputError, match="tails and holes cannot vary where rods follow curves of the target"):
+        rs.refine(low(), ["tails", "holes"])
 
 
 def test_a_straight_rod_has_no_curvature_at_rest() -> None:

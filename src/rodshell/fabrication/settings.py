@@ -17,9 +17,7 @@ class Fabrication:
     end_allowance: Annotated[Distance, "length added to each end of a rod, for its support"] = 0.0
     stock_length: Annotated[Length | None, "length of the bars that rods are cut from; default: no limit"] = None
     kerf: Annotated[Distance, "width of a saw cut; needs stock_length"] = 0.0
-    slot_clearance: Annotated[
-        Distance, "by which slots of upright strips are wider and deeper than the strips need"
-    ] = 0.0
+    slot_clearance: Annotated[Distance, "by which slots of upright strips are wider and deeper than needed"] = 0.0
 
     def __post_init__(self) -> None:
         checked(self, {"end_allowance": "the end allowance", "kerf": "the kerf", "stock_length": "the stock length",

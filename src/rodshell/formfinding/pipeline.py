@@ -386,11 +386,12 @@ def meshed_again(form: Stages, ends: Ends) -> Stages:
         form: of a target, with a pop-up.
     """
     old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
-    mesh, normals = mesh_grid(old.grid, form.layout.longest_edge), None
+    mesh = mesh_grid(old.grid, form.layout.longest_edge)
     if old.layered:
         mesh = mesh.in_layers(2 * float(np.abs(old.heights).max()))
-        assert boundary.normals is not None
-        normals = old.prolong(boundary.normals, mesh)
+    elif form.flat_state is not None:  # not straight in the plane
+        mesh = replace(mesh, flat=old.prolong(old.flat, mesh))
+    normals = None if boundary.normals is None else old.prolong(boundary.normals, mesh)
     draped = None if boundary.draped is None else old.prolong(boundary.draped, mesh)
     start = replace(boundary, draped=old.prolong(positions, mesh), normals=normals)
     again = popped_again(form, Footprint(mesh), start, ends)
