@@ -9,6 +9,7 @@ from rodshell.arrays import Floats
 from rodshell.figures.checks import OTHER_SHAPES
 from rodshell.output.drawing import TEXT, Drawing
 from rodshell.output.drawings.flat import (
+    TALL,
     FlatPlan,
     flat_drawing,
     flat_plan,
@@ -136,7 +137,13 @@ def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
     """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
     low, high = room(paper)
     width, height = high - low
-    scale = next((scale for scale in SCALES if _fits(plan, width, height, scale)), SCALES[-1])
+
+    def fits(scale: float) -> bool:
+        sizes = [strip_size(plan, rod, scale * TEXT) for rod in plan.rods]
+        longest, broadest = map(max, zip(*sizes, strict=True)) if sizes else (1.0, 0.0)
+        return (longest + 12 * scale * TEXT) / scale <= width and broadest / scale + (TALL + 3) * TEXT <= height
+
+    scale = next((scale for scale in SCALES if fits(scale)), SCALES[-1])
     groups = sheets_of_strips(plan, scale * height, scale * TEXT)
     sheets = []
     for k, rods in enumerate(groups):
@@ -146,9 +153,3 @@ def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
         many = f", {k + 1} of {len(groups)}" if len(groups) > 1 else ""
         sheets.append(Sheet(drawing.title + many, placed, scale))
     return sheets
-
-
-def _fits(plan: FlatPlan, width: float, height: float, scale: float) -> bool:
-    """Whether the longest and the tallest strip find room on a sheet [mm] at a scale."""
-    longest, tallest = strip_size(plan, scale * TEXT)
-    return (longest + 12 * scale * TEXT) / scale <= width and tallest <= scale * (height - 3 * TEXT)

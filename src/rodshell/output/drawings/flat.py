@@ -326,7 +326,7 @@ def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None =
     layer = {rod.id: rod.record.layer for rod in plan.rods}
     chosen = plan.rods if rods is None else rods
     for k, rod in enumerate(chosen):
-        y -= _more(plan, rod, text)
+        y -= strip_size(plan, rod, text)[1]
         _strip(pencil, rod, plan.blanks.get(rod.id), y - k * TALL * text, text, layer, plan.rounding.mm)
     for row, line in enumerate(_legend(plan)):
         pencil.write(line, (0.0, y - len(chosen) * TALL * text + (9.0 - LEADING * row) * text), text, "DIM")
@@ -337,7 +337,7 @@ def sheets_of_strips(plan: FlatPlan, height: float, text: float) -> list[list[Gr
     """The rods whose strips find room one below the other in a height [mm], with texts of a size [mm]."""
     sheets, left = list[list[GridRod]](), 0.0
     for rod in plan.rods:
-        taken = TALL * text + _more(plan, rod, text)
+        taken = TALL * text + strip_size(plan, rod, text)[1]
         if not sheets or taken > left + 1e-9 * height:
             sheets.append([])
             left = height - 3 * text - LEADING * text * len(_legend(plan)[len(_STRIPS_LEGEND) :])
@@ -346,25 +346,16 @@ def sheets_of_strips(plan: FlatPlan, height: float, text: float) -> list[list[Gr
     return sheets
 
 
-def strip_size(plan: FlatPlan, text: float) -> tuple[float, float]:
-    """Width of the longest strip and height of the tallest one, with texts of a size [mm]."""
-    longest = [1e3 * max(rod.cut_length, _board(plan, rod)[0]) for rod in plan.rods]
-    return max(longest, default=1.0), max((_more(plan, rod, text) for rod in plan.rods), default=0.0) + TALL * text
+def strip_size(plan: FlatPlan, rod: GridRod, text: float) -> tuple[float, float]:
+    """Length of a rod's strip, and what it takes across in addition to that of a line, with texts of a size [mm]."""
+    length, width = plan.blanks[rod.id].board if rod.id in plan.blanks else (0.0, 0.0)
+    return 1e3 * max(rod.cut_length, length), 1e3 * width + SLOT * text * any(on.slot for on in rod.record.joints)
 
 
 def _legend(plan: FlatPlan) -> list[str]:
     curved = [_CURVED] if any(rod.record.rest_curvature for rod in plan.rods) else []
     slots = [] if plan.slot_depth is None else [_SLOTS.format(plan.rounding.mm(plan.slot_depth))]
     return [*_STRIPS_LEGEND, *curved, *slots]
-
-
-def _board(plan: FlatPlan, rod: GridRod) -> tuple[float, float]:
-    return plan.blanks[rod.id].board if rod.id in plan.blanks else (0.0, 0.0)
-
-
-def _more(plan: FlatPlan, rod: GridRod, text: float) -> float:
-    """What the strip of a rod that is more than a line takes across in addition [mm]."""
-    return 1e3 * _board(plan, rod)[1] + SLOT * text * any(joint.slot for joint in rod.record.joints)
 
 
 def _strip(
