@@ -197,3 +197,25 @@ def test_sheets_have_room_for_each_strip_and_straight_ones_are_as_many_as_before
 def test_a_curvature_that_is_no_curve_is_refused(at: Any, curvatures: Any, says: str) -> None:
     with pytest.raises(OutputError, match=rf"rods\[0\].rest_curvature.*{says}"):
         curved(at, curvatures)
+
+
+def test_lengths_of_slots_and_sections_that_no_drawing_can_show_are_refused() -> None:
+    for table, key, value in ((("fabrication",), "slot_depth", -1.0), (("rod", "section"), "height", 1e20)):
+        found = slotted().results.plain()
+        inner = found
+        for name in table:
+            inner = inner[name]
+        inner[key] = value
+        with pytest.raises(OutputError, match=r"rod.section or fabrication.slot_depth has a length"):
+            Results.of(found)
+    found = slotted().results.plain()
+    found["rods"][0]["joints"][0]["slot"] = 1e9
+    with pytest.raises(OutputError, match=r"rods\[0\] has a length that is not from"):
+        Results.of(found)
+
+
+def test_a_curved_rod_of_an_unknown_section_has_its_centre_line() -> None:
+    found = curved([0.0, LENGTH], [0.0, 0.0]).results.plain()
+    del found["rod"]
+    (blank,) = blanks_of(Archive(Results.of(found), {}, "")).values()
+    assert blank.board == pytest.approx((LENGTH + 2 * MORE, 0.0), abs=1e-9)

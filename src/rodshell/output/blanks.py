@@ -97,7 +97,8 @@ def curved_blank(archive: Archive, rod: GridRod, start: float, stop: float) -> B
     points = edges.reshape(-1, 2)
     corners = points[ConvexHull(points, qhull_options="QJ").vertices]
     sides = np.roll(corners, -1, axis=0) - corners
-    sides /= np.linalg.norm(sides, axis=1)[:, None]
+    lengths = np.linalg.norm(sides, axis=1)
+    sides = sides[lengths > 0] / lengths[lengths > 0, None]
     x, y = sides[np.ptp(corners @ (sides @ QUARTER).T, axis=0).argmin()]
     turned = np.array([[x, -y], [y, x]]) * np.copysign(1.0, (centre[-1] - centre[0]) @ (x, y))
     edges = edges @ turned - (points @ turned).min(axis=0)

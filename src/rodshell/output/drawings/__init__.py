@@ -140,8 +140,10 @@ def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
 
     def fits(scale: float) -> bool:
         sizes = [strip_size(plan, rod, scale * TEXT) for rod in plan.rods]
-        longest, broadest = map(max, zip(*sizes, strict=True)) if sizes else (1.0, 0.0)
-        return (longest + 12 * scale * TEXT) / scale <= width and broadest / scale + (TALL + 3) * TEXT <= height
+        longest = max((long for long, _ in sizes), default=1.0)
+        broadest = max((across for _, across in sizes), default=0.0)
+        fitting = (longest + 12 * scale * TEXT) / scale <= width and broadest / scale + (TALL + 3) * TEXT <= height
+        return bool(fitting)
 
     scale = next((scale for scale in SCALES if fits(scale)), SCALES[-1])
     groups = sheets_of_strips(plan, scale * height, scale * TEXT)
