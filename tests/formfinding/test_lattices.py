@@ -12,6 +12,7 @@ import rodshell as rs
 from rodshell.case import load_case
 from rodshell.case.rod_ends import read_result
 from rodshell.errors import InputError
+from rodshell.formfinding.pipeline import meshed_again
 from rodshell.nets.surface_lattice import surface_net
 from rodshell.output.blanks import blanks_of
 from rodshell.output.drawing import FAMILIES
@@ -391,6 +392,12 @@ def test_a_refinement_of_curved_laths_keeps_their_curves_and_the_blank_follows_t
     assert along.varies == "size"
     right, left = blanks_of(found)[rods[0].id].across(along.at[1])
     assert np.hypot(*(left - right)) == pytest.approx(0.04 * along.factors[1] ** 0.25, rel=1e-3)
+
+
+def test_meshed_again_rods_lie_in_the_plane_as_before() -> None:
+    """Angles at rest of rigid joints are those of the flat state."""
+    old, again = low().footprint.mesh, meshed_again(low().stages, "pinned").footprint.mesh
+    np.testing.assert_allclose(again.flat[again.joint_nodes], old.flat[old.joint_nodes], atol=1e-9)
 
 
 def test_lengths_cannot_be_refined_along_curves() -> None:
