@@ -15,6 +15,7 @@ from rodshell.case import Case
 from rodshell.checks import Checks, check
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
+from rodshell.fabrication.settings import has_slots
 from rodshell.figures.form import FlatState
 from rodshell.figures.records import Ends
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PopUp, Stages, Trimmed
@@ -217,7 +218,17 @@ class Form:
             pattern=Pattern.of(getattr(self.case.bracing, "pattern", "both")),
             prestrain=getattr(self.case.bracing, "prestrain", None),
             to_supports=getattr(self.case.bracing, "ends_at", "joints") == "supports",
+            slotted=() if shape is None else self._slotted(shape),
         )
+
+    def _slotted(self, final: Floats) -> tuple[Floats, ...]:
+        """The shapes (n, 3) in which strips fit into each other's slots: the final one and, where they are laid out in
+        the plane first, that."""
+        upright = not self.stages.from_table and self.stages.layout.upright
+        if not has_slots(upright, self.rod, self.joint):
+            return ()
+        flat = self.flat_state
+        return (final, self.footprint.mesh.flat) if flat and flat.lies_flat else (final,)
 
     @cached_property
     def loaded(self) -> LoadChecks | None:

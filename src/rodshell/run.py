@@ -38,8 +38,8 @@ STAGES: dict[str, tuple[str, ...]] = {
     "pop-up": ("pop_up",),
     "refine": ("refine",),
     "checks": ("checks",),
-    "fabrication": ("fabrication", "bracing"),
-    "loads": ("loads", "combinations", "locked_joints", "stability", "strength"),
+    "fabrication": ("fabrication", "bracing", "strength"),
+    "loads": ("loads", "combinations", "locked_joints", "stability"),
     "files": ("drawings",),
 }
 """The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""
@@ -107,6 +107,7 @@ class Run:
         ends: RodEnds = case.target.held.value
         fit, stages = Fit.between(ends.lengths, ends.final), None
         rod = case.rod.held.value if case.rod.held else case.rod.build(lambda: fit, strength=case.permanent_strength)
+        case.require_slots(rod, upright=False)
         require_likely_sizes(fit.width, min(ends.grid.span, fit.width), rod.section)  # flat, rods may be longer
         if self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, self._table_stages)

@@ -33,6 +33,7 @@ CODES = {
     "not_checked": "something was not checked",
     "not_computed": "a computation did not converge or is not complete",
     "not_followed": "the shell could be followed only up to a part of the loads",
+    "not_nested": "rods are cut from boards, curved at rest, and are in no plan of cutting bars",
     "not_refined": "the form was not refined, or not to the end",
     "not_sold": "the chosen section is thinner than any that is sold",
     "not_spliced": "rods cannot be spliced from the stock",
@@ -41,6 +42,7 @@ CODES = {
     "reserve": "the shell carries its own weight, but not with the reserve that is asked for",
     "sinks": "under its own weight the shell takes another shape",
     "slip": "a joint transfers more than the force at which it slips",
+    "slots": "little of a strip remains next to one of its slots",
     "snaps": "the shell snaps forward by itself during the deployment",
     "stands": "the shell carries its own weight with the reserve that is asked for",
     "stands_under_loads": "the shell carries a combination of loads",
@@ -58,7 +60,9 @@ CODES = {
 
 Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
-GOOD = frozenset({"in_place", "lies_flat", "stands", "stands_under_loads", "no_loads", "no_imperfections"})
+GOOD = frozenset(
+    {"in_place", "lies_flat", "not_nested", "stands", "stands_under_loads", "no_loads", "no_imperfections"}
+)
 FAULTS = frozenset({
     "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",
     "too_thick", "unstable",

@@ -7,7 +7,7 @@ LOADS = "with {ends} ends {what} under {place}{at}{where}"
 UNLOADED = "with {ends} ends {what}{where}"
 
 SENTENCES = {
-    "contact": "{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section) or a larger spacing",
+    "contact": "{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section), or set them further apart",
     "ends_in_the_air": (
         "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
         "beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has to be designed"
@@ -62,7 +62,7 @@ SENTENCES = {
     ),
     "no_room": (
         "{who} pass each other with {room} between them {where}: that leaves hardly any room for joints; use thinner "
-        "rods (rod.section) or a larger spacing"
+        "rods (rod.section), or set them further apart"
     ),
     "no_shear_strength": (
         "torsion shears the rods by up to {stress}, counted by von Mises as in isotropic materials; timber and fibre "
@@ -116,6 +116,10 @@ SENTENCES = {
         "with {ends} ends the shell{bracing} carries {times} its own weight; above, it could not be followed, and "
         "nothing is known"
     ),
+    "not_nested": (
+        "rods that are curved at rest are cut from boards, whose sizes are in the schedule of rods: no plan of cutting "
+        "them from bars was made"
+    ),
     "not_refined": "the form is not refined: {why}",
     "not_refined: late": "{when}: the refinement was stopped at what it had found",
     "not_sold": "the chosen section is {thin}: have it made, or choose another material or a larger target",
@@ -135,6 +139,10 @@ SENTENCES = {
     ),
     "slip": LOADS,
     "slip: unloaded": UNLOADED,
+    "slots": (
+        "where strips meet at {angle}, slots are {width} wide, and on {place} only {left} remain next to one, less "
+        "than its depth of {depth}: use thinner or lower strips (rod.section), or set them further apart"
+    ),
     "snaps": "{where} of the deployment from flat the shell snaps forward by itself, by up to {by}{continues}{other}",
     "stands": (
         "with {all} ends the shell{bracing} is stable and carries {weight} times its own weight, {asked} being asked "

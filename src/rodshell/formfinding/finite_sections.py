@@ -40,6 +40,16 @@ def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     return np.asarray(after - before)
 
 
+def joint_angles(mesh: GridMesh, positions: Floats) -> Floats:
+    """(c,) angles between both rods at each joint, 0 to pi/2 [rad].
+
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
+    """
+    first, second = joint_tangents(mesh, positions).transpose(1, 0, 2)
+    return np.asarray(np.arctan2(np.linalg.norm(cross(first, second), axis=1), np.abs(dot(first, second))))
+
+
 def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
     """(c, 3) unit normals at the joints, across both rods, on the side that is up in the flat grid.
 

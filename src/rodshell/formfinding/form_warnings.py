@@ -63,7 +63,8 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     np.minimum.at(first, grid.crossings.rods, grid.crossings.at)
     np.maximum.at(last, grid.crossings.rods, grid.crossings.at)
     tails = np.maximum(first - ends[:, 0], ends[:, 1] - last)
-    spacing = trimmed.draped.layout.most_spacing
+    layout = trimmed.draped.layout
+    spacing = layout.most_spacing
     long, worst = int(np.count_nonzero(tails > LONG_TAIL * spacing)), int(np.argmax(tails))
     if not long:
         return ()
@@ -72,8 +73,8 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     near = f"no joint is made within {NEAREST_JOINT:g} spacings of a rod's end, here at {left} crossings"
     why = f": {near}" if left else ""
     return (
-        f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; another offset or "
-        "anchor of the layout may help, or leave such rods out",
+        f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; "
+        f"{layout.elsewhere} may help, or leave such rods out (layout.left_out)",
     )
 
 

@@ -231,7 +231,7 @@ class Stages:
         if self.lying is not None and self.draped.report.reason:
             return self.draped.report.reason
         if self.lying is not None and not self.draped.converged:
-            sentence = self.draped.report.status.sentence
+            sentence = self.draped.report.status.sentence_on(self.layout)
             weighed = not isinstance(self.draped.method, Bound) and "bound" not in sentence
             other = ', or use method = "bound", which needs no weight' if weighed else ""
             return f"drape {sentence}{other}"
@@ -243,7 +243,7 @@ class Stages:
     def _lost(self, shell: PopUp) -> str:
         """How a pop-up ended that did not converge, and what to do. A table of rods has neither spacing nor target."""
         if not self.from_table:
-            return shell.report.status.sentence
+            return shell.report.status.sentence_on(self.layout)
         return (
             f"could be followed from flat only up to {percent_text(shell.followed)} of the way of the rods' ends; rods "
             "of another section may be followed further (rod.section), and rodshell form starts from a target instead"
@@ -386,11 +386,12 @@ def meshed_again(form: Stages, ends: Ends) -> Stages:
         form: of a target, with a pop-up.
     """
     old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
-    mesh, normals = mesh_grid(old.grid, form.layout.longest_edge), None
+    mesh = mesh_grid(old.grid, form.layout.longest_edge)
     if old.layered:
         mesh = mesh.in_layers(2 * float(np.abs(old.heights).max()))
-        assert boundary.normals is not None
-        normals = old.prolong(boundary.normals, mesh)
+    elif form.flat_state is not None:  # not straight in the plane
+        mesh = replace(mesh, flat=old.prolong(old.flat, mesh))
+    normals = None if boundary.normals is None else old.prolong(boundary.normals, mesh)
     draped = None if boundary.draped is None else old.prolong(boundary.draped, mesh)
     start = replace(boundary, draped=old.prolong(positions, mesh), normals=normals)
     again = popped_again(form, Footprint(mesh), start, ends)

@@ -135,7 +135,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     dropped += [(name, f"it has fewer than {fewest} joints and would swing") for name in swinging]
     if not kept.rods:
         raise InputError(
-            f"no rod of the grid has {fewest} joints on the target: use a smaller spacing or a larger target"
+            f"no rod of the grid has {fewest} joints on the target: use {draped.layout.closer} or a larger target"
         )
     mesh, nodes = cut_mesh(source, kept.rods, margin=margin)
     positions = positions.take(nodes, axis=0)

@@ -183,10 +183,13 @@ def _lattice(grid: FlatGrid) -> Ints:
     """(c, 2) which line of either family each crossing is on, counted from the axis next to the anchor.
 
     Raises:
-        InputError: rods of a table are on no lattice.
+        InputError: rods are on no lattice of straight lines.
     """
-    if any(rod.family == "free" for rod in grid.rods):
-        raise InputError("rods of a table are on no lattice that lines of bracing could be counted on: brace all cells")
+    if not all(rod.along_axis for rod in grid.rods):
+        raise InputError(
+            "rods of a table or along curves of a target are on no lattice that lines of bracing could be counted on: "
+            "brace all cells"
+        )
     result = np.zeros((len(grid.crossings), 2), dtype=np.intp)
     for column, family in enumerate("uv"):
         offsets = np.array([rod.offset if rod.family == family else np.nan for rod in grid.rods])

@@ -18,7 +18,7 @@ from rodshell.layout.rest_curve import RestCurve
 from rodshell.untrusted import limit, raised
 from rodshell.validation import LARGEST, finite, instance, listed, number, short, texts
 
-Family = Literal["u", "v", "free"]
+Family = Literal["u", "v", "first", "second", "third", "free"]
 
 MOST_RODS = 5000  # of a grid, of which all pairs are looked at; they take 0.4 GB
 _PARALLEL = 1e-9  # sine of the angle between lines that do not cross
@@ -29,13 +29,13 @@ class FlatRod(NamedTuple):
     """A straight rod in the flat state: the points `origin + s * direction` for `start <= s <= end`.
 
     Rods of family "u" run along the layout's x axis at y = `offset`, rods of family "v" along y at x = `offset`, and s
-    is measured from the middle of the layout. A rod of family "free" is given by its two ends, and s is measured from
-    its first end.
+    is measured from the middle of the layout. A rod of another family lies anywhere, and s is measured from a point of
+    its own: those of a lattice along curves of a target are of its first, second or third family, "free" is what was
+    given one by one.
 
     Args:
         name: label such as "U09".
-        family: "u", "v" or "free".
-        offset: of the rod's line; 0 for a free one [m].
+        offset: of the rod's line; 0 for a rod of another family than u and v [m].
         start, end: material coordinates of the ends [m].
         origin: point of the rod's line at which s is 0 [m].
         direction: unit vector along the rod.
@@ -78,6 +78,11 @@ class FlatRod(NamedTuple):
             virtual: whether the line only shapes the net and is not built.
         """
         return FlatRod(name, "v", offset, start, end, (offset, 0.0), (0.0, 1.0), virtual)
+
+    @property
+    def along_axis(self) -> bool:
+        """Whether it runs along an axis of the layout."""
+        return self.family in ("u", "v")
 
     @property
     def length(self) -> float:

@@ -55,6 +55,9 @@ class GridLayout:
     auto_edge: bool = False
 
     kind: ClassVar[str] = "chebyshev"
+    upright: ClassVar[bool] = False
+    closer: ClassVar[str] = "a smaller spacing"
+    elsewhere: ClassVar[str] = "another offset, anchor or heading"
 
     def __post_init__(self) -> None:
         for name in ("spacing", "offset"):

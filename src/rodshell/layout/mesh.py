@@ -582,12 +582,12 @@ def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
 
 def _along(rod: FlatRod, shift: Floats) -> float:
     """Change of a rod's material coordinates: those of families u and v are measured from the middle of the layout."""
-    return 0.0 if rod.family == "free" else float(shift @ np.array(rod.direction))
+    return float(shift @ np.array(rod.direction)) if rod.along_axis else 0.0
 
 
 def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
     label, by = f"{name}-{rod.name}", _along(rod, shift)
-    if rod.family == "free":
+    if not rod.along_axis:
         x, y = np.array(rod.origin) + shift
         return rod._replace(name=label, origin=(float(x), float(y)))
     make, across = (FlatRod.u, shift[1]) if rod.family == "u" else (FlatRod.v, shift[0])

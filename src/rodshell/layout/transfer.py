@@ -64,7 +64,7 @@ def corresponding_rods(mesh: GridMesh, to: GridMesh) -> list[tuple[int, int]]:
     for k, rod in enumerate(to.grid.rods):
         apart = np.abs(before - now[k])
         same = [j for j, old in enumerate(mesh.grid.rods) if old.family == rod.family and apart[j, 0] < SAME_LINE]
-        if same and rod.family != "free":
+        if same and rod.along_axis:
             pairs.append((k, min(same, key=lambda j: apart[j, 1])))
     return pairs
 

@@ -19,7 +19,7 @@ from rodshell.nets.surface_curves import Law, SurfaceCurves, asymptotic, geodesi
 from rodshell.targets import Target
 from rodshell.units import length_text
 
-LETTERS = "UVW"  # of the families
+FAMILIES = "uvw"
 PLACES = 24  # on an outermost rod at which room beside it is looked for
 MOVED = 1e-3  # of the size: lines that lie further off the target are said to be moved
 
@@ -31,6 +31,7 @@ class SurfaceNet:
     Args:
         curves: of the rods, from past an end of the target to past another.
         names: of the rods.
+        families: of the rods, by their names; "free" of those along lines that are given.
         crossings: of the rods, with the arc lengths of `curves`.
         warnings: sentences.
     """
@@ -38,6 +39,7 @@ class SurfaceNet:
     lattice: SurfaceLattice
     curves: SurfaceCurves
     names: tuple[str, ...]
+    families: tuple[str, ...]
     crossings: Crossings
     warnings: tuple[str, ...] = ()
 
@@ -102,7 +104,7 @@ def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float,
     if _fill_corners(target, law, families, curves):
         curves = _trace_all(target, law, families)
     counts = [len(family.points) for family in families]
-    names = [f"{LETTERS[k]}{number:02d}" for k in range(len(counts)) for number in range(1, counts[k] + 1)]
+    names = [f"{FAMILIES[k].upper()}{number:02d}" for k in range(len(counts)) for number in range(1, counts[k] + 1)]
     return _joined(lattice, curves, names, np.repeat(np.arange(len(counts)), counts))
 
 
@@ -121,7 +123,8 @@ def _joined(lattice: SurfaceLattice, curves: SurfaceCurves, names: list[str], fa
             f"{np.count_nonzero(met)} times, such as {first} and {second}; leave some of them out (layout.left_out), "
             "or choose a larger spacing, another anchor or heading",
         )
-    return SurfaceNet(lattice, curves, tuple(names), every.select(~within), warnings)
+    of = tuple(FAMILIES[k] for k in family)
+    return SurfaceNet(lattice, curves, tuple(names), of, every.select(~within), warnings)
 
 
 class _Family(NamedTuple):
@@ -195,7 +198,7 @@ def _of_lines(target: Target, lattice: Curves) -> SurfaceNet:
     warnings = tuple[str, ...]()
     if moved > MOVED * target.size:
         warnings = (f"the lines of the rods lie up to {length_text(moved)} off the target, and were moved onto it",)
-    return SurfaceNet(lattice, curves, tuple(names), curves.crossings(line), warnings)
+    return SurfaceNet(lattice, curves, tuple(names), ("free",) * len(names), curves.crossings(line), warnings)
 
 
 def _normal(target: Target, x: Floats) -> Floats:

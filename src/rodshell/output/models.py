@@ -21,13 +21,11 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.figures.form import Section, Stiffness
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.grid import (
     STAGE,
-    GridRod,
     Shape,
     deployed_shape,
     joint_places,
@@ -36,6 +34,7 @@ from rodshell.output.grid import (
     shape_names,
     shape_of,
 )
+from rodshell.output.sections import section_outline, section_widths
 from rodshell.output.svg import tag
 from rodshell.results import Archive
 
@@ -199,8 +198,6 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
         return path.read_bytes()
 
 
-ROUND = 8  # sides of a circle
-SLENDER = 1e-3  # of the shell's size: thickness of a rod whose section has no shape
 FLOAT, INDEX, VERTICES, ELEMENTS = 5126, 5125, 34962, 34963  # glTF's numbers for types and uses
 
 
@@ -220,40 +217,6 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
         shades = None if colours is None else np.repeat(colours[k], len(outline), axis=0)
         file.add(rod.id, points, normals, faces, shades)
     return file.content()
-
-
-def section_outline(section: Section | None, size: float) -> Floats:
-    """(s, 2) corners of the rods' section [m], across and up; of a section without a shape, a thin circle.
-
-    Up is m1, the normal of the grid: a rectangle's width and an ellipse's a lie there.
-
-    Args:
-        size: of the shell [m], for the thickness of a section without a shape.
-    """
-    section = section or Section()
-    if section.kind == "rectangle" and section.height is not None and section.width is not None:
-        w, h = 0.5 * section.height, 0.5 * section.width
-        return np.array([[w, -h], [w, h], [-w, h], [-w, -h]])
-    radius = section.radius or SLENDER * size
-    a, b = section.a or radius, section.b or radius
-    angle = np.linspace(0, 2 * np.pi, ROUND, endpoint=False)
-    return np.column_stack([b * np.cos(angle), a * np.sin(angle)])
-
-
-def section_widths(archive: Archive, rod: GridRod) -> Floats | None:
-    """(k, 2) widths across and up of a rod's section at its nodes, over those of the unchanged one; None: it does not
-    change, or the flat grid is not known."""
-    along, flat = rod.record.stiffness, archive.states.get("flat")
-    return None if along is None or flat is None else widths_along(along, flat[rod.nodes])
-
-
-def widths_along(along: Stiffness, flat: Floats) -> Floats:
-    """The same of a rod whose nodes are `flat` (k, 3) in the flat grid [m]."""
-    factors = np.interp(np.linalg.norm(flat - flat[0], axis=1), along.at, along.factors)
-    same = np.ones_like(factors)
-    if along.varies in ("laths", "width", "a"):
-        return np.column_stack([same, factors if along.varies == "laths" else np.cbrt(factors)])
-    return np.column_stack([factors, same] if along.varies in ("height", "b") else 2 * [np.sqrt(np.sqrt(factors))])
 
 
 def swept(curve: Floats, outline: Floats, widths: Floats | None = None) -> tuple[Floats, Floats, NDArray[np.uint32]]:

@@ -22,6 +22,7 @@ from rodshell.figures.form import Meeting, Stiffness
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends, printable
 from rodshell.geometry.frames import unit
+from rodshell.output.blanks import boards_of
 from rodshell.output.grid import GridJoint, GridRod, end_nodes, joints_of, lies_flat, node_stations, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
@@ -64,6 +65,7 @@ def rods_table(archive: Archive) -> Table:
 
     Splices and joints are measured from the cut end of the rod's start, as on the strips.
 
+    `boards_mm` are length x width of the board that each piece of a rod that is curved at rest is cut from.
     Bending is that of the final shape; in columns named `pop_up` it is the worst of all shapes of the deployment.
     """
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
@@ -91,6 +93,9 @@ def rods_table(archive: Archive) -> Table:
         "second_laths_mm": lambda rod: "; ".join(mm(stop - start) for start, stop in laths_on(rod.record)),
         "second_laths_splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
     }
+    if any(rod.record.rest_curvature for rod in rods):
+        boards = {rod.id: boards_of(archive, rod) for rod in rods}
+        columns["boards_mm"] = lambda rod: "; ".join(f"{mm(long)} x {mm(wide)}" for long, wide in boards[rod.id])
     table = {name: [cell(rod) for rod in rods] for name, cell in columns.items()}
     for end in (0, 1):
         table |= _by_axis("flat_", f"{end}_mm", [rod.flat[end] for rod in rods], mm, "xy")
@@ -184,6 +189,9 @@ def joints_table(archive: Archive) -> Table:
         "final_deg": [_number(angle, 2) for angle in angles.tolist()],
         "scissor_deg": [_number(angle, 2) for angle in (angles - flats).tolist()],
     }
+    slots = {(rod.id, on.other): on.slot for rod in rods for on in rod.record.joints if on.slot}
+    if slots:
+        table["slot_mm"] = [mm(slots.get((a.id, b.id))) for a, b in pairs]
     loads = {load.rods: load for load in archive.results.joint_loads.get((final or "").removeprefix(POPPED), ())}
     if loads:
         joint_loads = [loads.get((a.id, b.id), JointLoad(rods=(a.id, b.id))) for a, b in pairs]

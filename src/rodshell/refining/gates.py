@@ -99,6 +99,9 @@ def _stable(form: Stages, *_: object) -> tuple[str, int]:
 
 
 def _flat(form: Stages, *_: object) -> tuple[str, int]:
+    """Rods along curves of the target keep their holes."""
+    if form.flat_state is not None:
+        return "", 0
     worst = misfit(form.footprint.mesh) / form.target.size
     if worst <= MISFIT:
         return "", 0
@@ -154,6 +157,9 @@ def worst_with_errors(form: Stages, span_error: float, progress: Progress = sile
 
 
 def _from_flat(form: Stages, _: object, progress: Progress) -> tuple[str, int]:
+    """Shells that do not lie straight in the plane may be assembled in place."""
+    if form.flat_state is not None:
+        return "", 0
     (shell,) = form.popped.values()
     found = pop_up(
         form.footprint, form.boundary, form.rod, ends=shell.support, start="flat", joint=form.joint,

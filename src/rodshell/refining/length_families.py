@@ -85,7 +85,7 @@ class Offsets:
             InputError: rods are not of two orthogonal families.
         """
         mesh, rods = structure.mesh, structure.mesh.grid.rods
-        if any(rod.family == "free" for rod in rods):
+        if not all(rod.along_axis for rod in rods):
             raise InputError("offsets can only vary in a grid of two families of parallel rods: vary something else")
         crossing = mesh.at_crossings
         count, pairs = len(rods), mesh.grid.crossings.rods

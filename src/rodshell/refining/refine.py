@@ -34,6 +34,7 @@ FAMILIES: dict[str, Family] = {
 """The families of variables by the names that users write."""
 
 STIFFNESSES = ("taper", "double", "sections")  # the others work by compressing rods, too
+LENGTHS = ("tails", "holes", "offsets")  # of which rods along curves of a target have their own
 STIFFER = 1.02  # of the eigenvalue before, since EA does not follow EI
 OPPOSITE = 0.5  # of the way that lengths go, to the other side: all of it mostly has no stable equilibrium
 LEAST_EIGENVALUE = 0.5  # of the lowest one before
@@ -114,6 +115,11 @@ def refine(
         ConvergenceError: it falls under the loads, or has no stable equilibrium with the design to start from.
     """
     families = chosen_families(vary)
+    if stages.flat_state is not None and (lengths := [each.name for each in families if each.name in LENGTHS]):
+        raise InputError(
+            f"{' and '.join(lengths)} cannot vary where rods follow curves of the target, on which their joints lie: "
+            "vary taper, double or sections"
+        )
     ends = stages.ends[0] if ends is None else ends
     structure = replace(structure_of(stages, ends), weight=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)

@@ -173,6 +173,10 @@ def _rods(
             "layer": int(fabricated.layer[k]),
             "splices": tuple(fabricated.splices[k]),
         }
+        if len(fabricated.slots):
+            joint, side = np.nonzero(mesh.grid.crossings.rods == k)
+            slots = fabricated.slots[joint][np.argsort(mesh.grid.crossings.at[joint, side])].tolist()
+            made["joints"] = tuple(on.changed(slot=slot) for on, slot in zip(rod.joints, slots, strict=True))
         beyond = tuple(lath.splices for lath in fabricated.laths if lath.rod == k and lath.number > 1)
         if rod.stiffness is not None and any(beyond):
             made["stiffness"] = rod.stiffness.changed(splices=beyond)

@@ -232,8 +232,14 @@ def contradictions(results: Results) -> Iterator[str]:
     for k, rod in enumerate(results.rods):
         lengths = [length for length in (rod.end - rod.start, rod.length, rod.cut_length) if length is not None]
         at = [rod.start, rod.end, rod.offset or 0.0, *rod.splices, *(joint.at for joint in rod.joints), *lengths]
+        at += [joint.slot for joint in rod.joints if joint.slot is not None]
         if min(lengths) < SHORTEST or max(map(abs, at)) > FARTHEST:
             yield f"rods[{k}] has a length that is not from {SHORTEST:g} to {FARTHEST:g} m"
+    section = results.rod.section if results.rod else None
+    sizes = [getattr(section, name, None) for name in ("radius", "width", "height", "a", "b")]
+    sizes += [results.fabrication.slot_depth] if results.fabrication else []
+    if not all(size is None or 0 <= size <= FARTHEST for size in sizes):
+        yield f"rod.section or fabrication.slot_depth has a length that is not from 0 to {FARTHEST:g} m"
     for name, points in _places(results):
         placed = [point for point in points if None not in point]
         if placed and (fault := far_apart(np.array(placed))):

@@ -16,7 +16,7 @@ from rodshell.form import Form
 from rodshell.layout import GridMesh
 from rodshell.output.colour_scale import Colour, gap_scale
 from rodshell.output.grid import CAPTIONS, Shape, supported
-from rodshell.output.models import section_outline
+from rodshell.output.sections import section_outline
 from rodshell.output.viewer.scene import Coloured, Drawn
 from rodshell.results import wording
 from rodshell.results.from_form import rod_type

@@ -8,7 +8,15 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.figures.checks import OTHER_SHAPES
 from rodshell.output.drawing import TEXT, Drawing
-from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan, per_sheet, strips_drawing
+from rodshell.output.drawings.flat import (
+    TALL,
+    FlatPlan,
+    flat_drawing,
+    flat_plan,
+    sheets_of_strips,
+    strip_size,
+    strips_drawing,
+)
 from rodshell.output.drawings.sheets import (
     SCALES,
     Compose,
@@ -129,10 +137,16 @@ def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
     """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
     low, high = room(paper)
     width, height = high - low
-    longest = max((1e3 * rod.cut_length for rod in plan.rods), default=1.0)
-    scale = next((scale for scale in SCALES if (longest + 12 * scale * TEXT) / scale <= width), SCALES[-1])
-    count = per_sheet(height, TEXT)
-    groups = [plan.rods[k : k + count] for k in range(0, len(plan.rods), count)]
+
+    def fits(scale: float) -> bool:
+        sizes = [strip_size(plan, rod, scale * TEXT) for rod in plan.rods]
+        longest = max((long for long, _ in sizes), default=1.0)
+        broadest = max((across for _, across in sizes), default=0.0)
+        fitting = (longest + 12 * scale * TEXT) / scale <= width and broadest / scale + (TALL + 3) * TEXT <= height
+        return bool(fitting)
+
+    scale = next((scale for scale in SCALES if fits(scale)), SCALES[-1])
+    groups = sheets_of_strips(plan, scale * height, scale * TEXT)
     sheets = []
     for k, rods in enumerate(groups):
         drawing = strips_drawing(plan, scale * TEXT, rods)

@@ -29,8 +29,8 @@ from rodshell.output.grid import (
     shape_names,
     shape_of,
 )
-from rodshell.output.models import section_outline, section_widths
 from rodshell.output.schedules import SCHEDULES, Table, heading
+from rodshell.output.sections import section_outline, section_widths
 from rodshell.results import Archive, wording
 from rodshell.results.states import DRAPED
 from rodshell.results.wording import nice_ticks, rounding_of
