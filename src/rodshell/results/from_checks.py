@@ -58,8 +58,8 @@ def checked_results(
     material = results.rod.material if results.rod else None
     anisotropic = material is not None and material.shear is not None  # as timber is
     torsion = checks.shear_unknown(strength) if anisotropic and shear_strength is None else ()
-    withstood = _Withstood.of(limits, strength, np.ones(len(mesh.rod_nodes)) if net is None else net)
-    bending = _bending(checks, mesh, withstood)
+    withstood = _Withstood.of(limits, strength, mesh, np.ones(len(mesh.rod_nodes)) if net is None else net)
+    bending = _bending(checks, withstood)
     joint = (results.joint.mass if results.joint else None) or 0.0
     way, known = bending.deployment, limits.erection is not None
     erected = way.utilisation if way and known else None
@@ -122,33 +122,36 @@ class _Withstood(NamedTuple):
     """By what the utilisation of the final shapes and that of the deployment are counted [Pa], and by which factors
     (k,) their stresses."""
 
+    limits: Limits
+    mesh: GridMesh
     net: Floats
     standing: float | None
     erection: float | None
     given: bool = False
 
     @classmethod
-    def of(cls, limits: Limits, strength: float | None, net: Floats) -> "_Withstood":
+    def of(cls, limits: Limits, strength: float | None, mesh: GridMesh, net: Floats) -> "_Withstood":
         """Design strengths where they are known; then a final shape has to withstand its stress permanently."""
         if limits.bending:
-            return cls(net, limits.bending.get("permanent"), limits.erection, limits.given)
-        return cls(net, strength, limits.erection or strength)
+            return cls(limits, mesh, net, limits.staying, limits.erection, limits.given)
+        return cls(limits, mesh, net, strength, limits.erection or strength)
 
     def stressed(self, bent: BendingCheck) -> Floats:
         """The stress at each entry of `rod_nodes`, or the curvature where the stress is not known."""
-        return self.net * (bent.curvature if bent.stress is None else bent.stress)
+        stress = self.limits.standing(bent, self.mesh)
+        return self.net * (bent.curvature if stress is None else stress)
 
-    def worst_place(self, bent: BendingCheck, mesh: GridMesh) -> dict[str, Any]:
+    def worst_place(self, bent: BendingCheck) -> dict[str, Any]:
         """The most stressed place: the rod, and how far along it [m]."""
         at = int(np.argmax(self.stressed(bent)))
-        return dict(zip(("rod", "at"), mesh.place(at), strict=True))
+        return dict(zip(("rod", "at"), self.mesh.place(at), strict=True))
 
     def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
         """Worst figures over a part of the rods' nodes, in any of the shapes."""
         figures: dict[str, Any] = worst([*final, *stages], where)
         judged = ((final, self.standing), (stages, self.erection))
         shares = [
-            float((self.net * shape.stress)[where].max()) / strength
+            float(self.stressed(shape)[where].max()) / strength
             for shapes, strength in judged
             for shape in shapes
             if strength is not None and shape.stress is not None
@@ -180,10 +183,10 @@ def _rods(
     return tuple(found)
 
 
-def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
+def _bending(checks: Checks, withstood: _Withstood) -> Bending:
     everywhere, shapes = slice(None), dict[str, Any]()
     for ends, bent in checks.bending.items():
-        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **withstood.worst_place(bent, mesh))
+        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **withstood.worst_place(bent))
     if checks.deployment is not None:
         stages = list(zip(checks.deployment.share.tolist(), checks.deployment_bending, strict=True))
         stage = int(np.argmax([bent.curvature.max() for bent in checks.deployment_bending]))
@@ -193,7 +196,7 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
     if checks.stages_below_final:
         share, worst = max(checks.stages_below_final, key=lambda stage: float(withstood.stressed(stage[1]).max()))
         figures = withstood.worst((), [bent for _, bent in checks.stages_below_final], everywhere)
-        shapes["deployment"] = WorstBent(**figures, share=share, **withstood.worst_place(worst, mesh))
+        shapes["deployment"] = WorstBent(**figures, share=share, **withstood.worst_place(worst))
     return Bending(strength=withstood.standing, erection_strength=withstood.erection, **shapes)
 
 
@@ -202,7 +205,10 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
     found = results.changed(
         loads={
             name: {
-                ends: shell.changed(bracing=_in_order(results, mesh, checks.braced, shell.bracing_forces))
+                ends: shell.changed(
+                    bracing=_in_order(results, mesh, checks.braced, shell.bracing_forces),
+                    bracing_unloaded=_in_order(results, mesh, checks.braced, shell.bracing_before),
+                )
                 for ends, shell in by_ends.items()
             }
             for name, by_ends in checks.shells.items()
