@@ -53,6 +53,11 @@ class Limits(DesignStrength):
     cracked: Found[float] = Field(default=1.0, description="share of the section that carries shear forces")
     given: Found[bool] = Field(default=False, description="whether strengths were given in place of a preset's")
     rod: Found[Rod | None] = Field(default=None, description="that is judged")
+    counted: Found[float | None] = Field(
+        default=None, description="bending strength as given, or a preset's characteristic one [Pa]"
+    )
+    strength_of: Found[str | None] = Field(default=None, description="the preset whose strengths these are")
+    shear_strength: Found[float | None] = Field(default=None, description="that goes with it [Pa]; None: von Mises")
 
     @property
     def bending(self) -> dict[Duration, float]:
@@ -101,12 +106,12 @@ class Limits(DesignStrength):
         return np.maximum(stress, self.shear_weight * bent.torsion_stress)
 
     @staticmethod
-    def of(rod: Rod, asked: Strength, *, given: float | None = None, shear_weight: float | None = None) -> "Limits":
+    def of(rod: Rod, asked: Strength, *, given: float | None = None, shear_given: float | None = None) -> "Limits":
         """The limits of a rod: what is `asked`, or else one strength for every duration of load, or else the preset's.
 
         Args:
             given: bending strength [Pa] in place of that of the rod's preset.
-            shear_weight: bending strength over shear strength; default: the preset's.
+            shear_given: shear strength that goes with it [Pa]; default: in the preset's proportion, or by von Mises.
 
         Raises:
             InputError: a service class is given, and nothing depends on it.
@@ -121,8 +126,10 @@ class Limits(DesignStrength):
         characteristic, shear = None, None
         if (material := rod.material) is not None:
             characteristic, shear = material.bending_strength, material.shear_strength
-        if shear_weight is None:
-            shear_weight = characteristic / shear if characteristic and shear else VON_MISES
+        counted = given or characteristic
+        if given is not None:
+            shear = shear_given or (given * shear / characteristic if characteristic and shear else None)
+        shear_weight = counted / shear if counted and shear else VON_MISES
         bending: dict[Duration, float] = {}
         rules: DesignFactors | None = None
         source = "no design strength is known"
@@ -169,6 +176,9 @@ class Limits(DesignStrength):
             source=source,
             given=bool(asked.given) or given is not None,
             rod=rod,
+            counted=counted,
+            strength_of=material.name if material and characteristic and not (asked.given or given) else None,
+            shear_strength=shear,
         )
 
 

@@ -40,25 +40,20 @@ def checked_results(
     checks: Checks,
     fabricated: Fabricated,
     *,
-    strength: float | None,
     limits: Limits = Limits(),
     net: Floats | None = None,
-    shear_strength: float | None = None,
-    strength_of: str | None = None,
 ) -> Results:
     """The results of a form with all that was checked and made: more of each rod, and tables of the checks.
 
     Args:
         mesh: of the flat grid, its rods in the order of the results.
-        strength, shear_strength: of the rods' material [Pa]; None: not known.
         limits: design strengths of the rods, by which utilisation is counted where they are known.
         net: (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
-        strength_of: the preset material that the strengths are of, where they were not given.
     """
     material = results.rod.material if results.rod else None
     anisotropic = material is not None and material.shear is not None  # as timber is
-    torsion = checks.shear_unknown(strength) if anisotropic and shear_strength is None else ()
-    withstood = _Withstood.of(limits, strength, mesh, np.ones(len(mesh.rod_nodes)) if net is None else net)
+    torsion = checks.shear_unknown(limits.counted) if anisotropic and limits.shear_strength is None else ()
+    withstood = _Withstood(limits, mesh, np.ones(len(mesh.rod_nodes)) if net is None else net)
     bending = _bending(checks, withstood)
     joint = (results.joint.mass if results.joint else None) or 0.0
     way, known = bending.deployment, limits.erection is not None
@@ -66,7 +61,7 @@ def checked_results(
     found = results.changed(
         warnings=(*checks.warnings, *torsion, *results.warnings, *fabricated.warnings),
         rods=_rods(results.rods, mesh, checks, fabricated, withstood),
-        bending=bending.changed(shear_strength=shear_strength, strength_of=None if withstood.given else strength_of),
+        bending=bending.changed(shear_strength=limits.shear_strength, strength_of=limits.strength_of),
         strength=limits.changed(erection_utilisation=erected),
         reactions=dict(checks.reactions),
         joint_loads={ends: loads.records(mesh.grid) for ends, loads in checks.joints.items()},
@@ -119,22 +114,21 @@ def _stacked(rows: list[Any]) -> NDArray[np.float32]:
 
 
 class _Withstood(NamedTuple):
-    """By what the utilisation of the final shapes and that of the deployment are counted [Pa], and by which factors
-    (k,) their stresses."""
+    """By what utilisation is counted, and by which factors (k,) stresses."""
 
     limits: Limits
     mesh: GridMesh
     net: Floats
-    standing: float | None
-    erection: float | None
-    given: bool = False
 
-    @classmethod
-    def of(cls, limits: Limits, strength: float | None, mesh: GridMesh, net: Floats) -> "_Withstood":
-        """Design strengths where they are known; then a final shape has to withstand its stress permanently."""
-        if limits.bending:
-            return cls(limits, mesh, net, limits.staying, limits.erection, limits.given)
-        return cls(limits, mesh, net, strength, limits.erection or strength)
+    @property
+    def standing(self) -> float | None:
+        """Strength that the final shapes are judged by [Pa], which have to withstand their stress permanently."""
+        return self.limits.staying if self.limits.bending else self.limits.counted
+
+    @property
+    def erection(self) -> float | None:
+        """Of the deployment [Pa]."""
+        return self.limits.erection if self.limits.bending else self.limits.erection or self.limits.counted
 
     def stressed(self, bent: BendingCheck) -> Floats:
         """The stress at each entry of `rod_nodes`, or the curvature where the stress is not known."""
