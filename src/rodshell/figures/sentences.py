@@ -52,10 +52,7 @@ SENTENCES = {
         "under {place} with {ends} ends linear buckling is at {factor} times these loads: the shell carries them only "
         "in another shape, its nodes having moved by {moved}"
     ),
-    "low_stiffness": (
-        "under {place} with {ends} ends the shell falls at {factor} times these loads with {share} of the mean "
-        "modulus, which {code} asks for in stability"
-    ),
+    "low_stiffness": ("under {place} with {ends} ends the shell falls at {factor} times these loads with {share}"),
     "lost": (
         "the deployment could not be followed all the way: {how}; stages are missing, and whether the shell reaches "
         "its final shape from flat is not known"

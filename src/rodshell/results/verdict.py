@@ -6,6 +6,7 @@ not checked, and then the result is not good.
 """
 
 from collections.abc import Iterable, Iterator
+from math import inf
 
 from rodshell.figures.checks import OTHER_SHAPES, Clearance, Deployment, WorstBent
 from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
@@ -373,12 +374,22 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
             elif kind == "not followed" or (imperfect is not None and imperfect < 1):
                 sentence = "imperfect: not followed" if kind == "not followed" else "imperfect"
                 yield said(sentence, end, imperfect, 1, place=name, factor=factor)
-            strength, known = results.strength, [each for each in (found.limit_factor, imperfect) if each is not None]
-            if strength is not None and strength.stiffness is not None and min(known, default=0.0) >= 1:
-                lower = strength.stiffness * min(known)
-                if lower < 1:
-                    yield said("low_stiffness", end, lower, 1, place=name, factor=rounded_down(lower),
-                               share=percent(strength.stiffness), code=strength.code)  # fmt: skip
+            lower, share = _lowered(results, found)
+            if lower < 1 and stands and (imperfect is None or imperfect >= 1):
+                factor = rounded_down(lower)
+                yield said("low_stiffness", end, lower, 1, place=name, factor=factor, share=share)
+
+
+def _lowered(results: Results, found: LoadedShell) -> tuple[float, str]:
+    """The smallest limit factor with the modulus that a code asks for in stability, and how that is said; infinite: no
+    code asks, or no limit was met."""
+    strength, limits = results.strength, [found.limit_factor, found.imperfect_factor]
+    known = [limit for limit in limits if limit is not None]
+    if strength is None or strength.stiffness is None or not known:
+        return inf, ""
+    imperfect = "imperfections and " * (found.imperfect_factor is not None)
+    share = f"{imperfect}{percent(strength.stiffness)} of the mean modulus, which {strength.code} asks for in stability"
+    return strength.stiffness * min(known), share
 
 
 def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -464,11 +475,9 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)
-        strength, lower = results.strength, ""
-        if strength is not None and strength.stiffness is not None and least is not None:
-            share = f"{percent(strength.stiffness)} of the mean modulus, as {strength.code} asks for"
-            lower = f", and up to {shown_factor(strength.stiffness * least)} times with {share}"
-        yield said("stands_under_loads", None, least, 1, place=name, factor=shown_factor(least), stiffness=lower)
+        lower, share = min((_lowered(results, by_ends[ends]) for ends in usable if ends in by_ends), default=(inf, ""))
+        words = f", and with {share}, up to {rounded_down(lower)} times" if share else ""
+        yield said("stands_under_loads", None, least, 1, place=name, factor=shown_factor(least), stiffness=words)
 
 
 def _assumed(results: Results) -> Iterator[Said]:
