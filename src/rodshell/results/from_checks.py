@@ -1,7 +1,8 @@
 """From checks, fabrication and loads to what is kept of them: records of result.json and arrays of states.npz."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,12 +114,14 @@ def _stacked(rows: list[Any]) -> NDArray[np.float32]:
     return np.array(rows, dtype=np.float32)  # for colours: single precision is plenty
 
 
-class _Withstood(NamedTuple):
-    """By what utilisation is counted, and by which factors (k,) stresses."""
+@dataclass(frozen=True, eq=False)
+class _Withstood:
+    """By what utilisation is counted, and by which factors (k,) stresses; `known` are those of shapes, by their id."""
 
     limits: Limits
     mesh: GridMesh
     net: Floats
+    known: dict[int, Floats] = field(default_factory=dict)
 
     @property
     def standing(self) -> float | None:
@@ -132,8 +135,10 @@ class _Withstood(NamedTuple):
 
     def stressed(self, bent: BendingCheck) -> Floats:
         """The stress at each entry of `rod_nodes`, or the curvature where the stress is not known."""
-        stress = self.limits.standing(bent, self.mesh)
-        return self.net * (bent.curvature if stress is None else stress)
+        if id(bent) not in self.known:  # it is asked for rod by rod
+            stress = self.limits.standing(bent, self.mesh)
+            self.known[id(bent)] = self.net * (bent.curvature if stress is None else stress)
+        return self.known[id(bent)]
 
     def worst_place(self, bent: BendingCheck) -> dict[str, Any]:
         """The most stressed place: the rod, and how far along it [m]."""
