@@ -190,7 +190,7 @@ class Form:
         if found is None:
             return None
         limits, material = self.options.limits(self.rod, self.case.strength), self.rod.material
-        strength = limits.erection or self.options.judged_by(self.rod).strength
+        strength = limits.erection or limits.counted
         limit = strength / material.youngs_modulus if strength and material else THIN
         return FlatState(
             lies_flat=found.report.stable and (found.strain or 0.0) <= limit, in_plane_strain=found.strain, limit=limit,
@@ -379,7 +379,7 @@ class Form:
         return {"flat": self.footprint.mesh.flat} | {ends: shell.positions for ends, shell in self.popped.items()}
 
     def _weight(self, options: OutputOptions) -> float:
-        return options.judged_by(self.rod).shear_weight
+        return options.limits(self.rod, self.case.strength).shear_weight
 
     def _checked(self, progress: Progress) -> Checks:
         self.options.require_known_stress(self.rod, self.joint)
@@ -396,7 +396,7 @@ class Form:
 
     @cached_property
     def _archive(self) -> Archive:
-        checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
+        checks, style = self.checks, self.options.drawings
         results = self.results()
         if self.stages.seams is not None:
             results = with_seam_forces(results, self.stages.seams, checks)
@@ -404,7 +404,6 @@ class Form:
         results = checked_results(
             results, mesh, checks, self.fabrication,
             limits=self.options.limits(self.rod, asked), net=net_factors(mesh, self.rod.section, asked.hole),
-            shear_strength=strengths.shear_strength, strength=strengths.strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         if self.loaded is not None:
             results = loaded_results(results, self.footprint.mesh, self.loaded)

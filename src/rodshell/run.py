@@ -129,7 +129,7 @@ class Run:
             rod: provisional, of which the first shell is made.
             stages_of: the shells of a rod.
         """
-        fit, weight, before = estimate, self.options.judged_by(rod).shear_weight, self._sized_before()
+        fit, weight, before = estimate, self.options.limits(rod, self.asked.strength).shear_weight, self._sized_before()
         rod = before or rod
         assert rod.material is not None
         strength, stages = self.asked.permanent_strength(rod.material), stages_of(rod)

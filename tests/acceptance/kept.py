@@ -65,6 +65,7 @@ SYMMETRIC = JOBS.keys() - {"freeform", "oculus"}  # whose shells have mirror ima
 _NEW, _AS_ONE = "a new key", "all patches are one shell, carry their weight on one path, and are searched together"
 CHANGED_ON_PURPOSE: dict[str, str] = {
     "*.flat_state": _NEW,
+    "bumps.loads.*.bracing_unloaded": _NEW,
     "*.layout.kind": _NEW,
     "patches": "all patches are popped up as one shell",
     "patches.other_shapes.*": _AS_ONE,

@@ -209,6 +209,8 @@ class Bending:
             no rods cross.
         twist_rate: twist per length [rad/m]; zero where nothing twists the rods.
         torsion_stress: largest shear stress of torsion over the section [Pa]; None as the stress.
+        fibre_strains: (k, 2) of the outermost fibres along m1 and m2, of bending alone [-]; None as the stress, and
+            where it is not known which way a section bends that is not round.
     """
 
     curvature: Floats
@@ -219,6 +221,7 @@ class Bending:
     geodesic_curvature: Floats | None
     twist_rate: Floats
     torsion_stress: Floats | None
+    fibre_strains: Floats | None = None
 
     __repr__ = brief
 
@@ -316,7 +319,7 @@ def bending(
         edge_strains = lengths / mesh.edge_lengths - 1.0
     axial = _mean_of_edges(mesh, edge_strains)
     twist = np.zeros(len(curvature)) if twist_rate is None else twist_rate
-    stress = strain = sheared = normal = geodesic = None
+    stress = strain = sheared = normal = geodesic = fibres = None
     if components is not None:
         normal, geodesic = components.T
     elif normals is not None:
@@ -330,13 +333,17 @@ def bending(
     if fibre is not None:
         bent = fibre * sharp if bends is None else fibre_strain(rod, bends[:, 0], bends[:, 1])
         strain = bent + np.abs(axial)
+        if bends is not None and rod.section.half_widths is not None:
+            fibres = bends * np.array(rod.section.half_widths)
+        elif rod.section.round:
+            fibres = np.column_stack([bent, np.zeros(len(bent))])
     if known and strain is not None:
         sheared = torsion_stress(rod, sheared_by) if twist.any() else np.zeros(len(twist))
         if bends is None:
             stress = np.hypot(fibre_modulus(rod) * strain, shear_weight * sheared)
         else:
             stress = largest_stress(rod, bends[:, 0], bends[:, 1], axial, sheared_by, weight=shear_weight)
-    return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared)
+    return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared, fibres)
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:

@@ -8,7 +8,10 @@ from rodshell.figures.records import Ends, Number, Record, Rows, Text, key, rows
 from rodshell.figures.sentences import SENTENCES
 
 CODES = {
+    "assumed_class": "strengths are those of a service class that was taken, as none was given",
+    "cables_short": "cables are shortened by so little that they have to be stressed to their forces",
     "contact": "rods touch or cross",
+    "creep_unknown": "creep is not known of these rods",
     "ends_in_the_air": "rod ends lie above the lowest: what holds them has to be designed",
     "erection_contact": "rods touch or cross on the way that was computed",
     "erection_strength": "rods use more than their strength on the way that was computed",
@@ -22,6 +25,7 @@ CODES = {
     "lies_flat": "the rods can be laid out flat, although they follow curves of the target",
     "linear_buckling": "linear buckling is below the loads, which the shell carries in another shape",
     "lost": "the deployment could not be followed all the way",
+    "low_stiffness": "with the modulus that a code asks for, the shell falls under a combination of loads",
     "needs_bracing": "without its bracing the shell does not carry its own weight",
     "no_imperfections": "imperfections were not looked at",
     "no_loads": "loads other than the own weight were not checked",
@@ -60,9 +64,10 @@ CODES = {
 
 Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
-GOOD = frozenset(
-    {"in_place", "lies_flat", "not_nested", "stands", "stands_under_loads", "no_loads", "no_imperfections"}
-)
+GOOD = frozenset({
+    "assumed_class", "cables_short", "creep_unknown", "in_place", "lies_flat", "no_imperfections", "no_loads", "not_nested",
+    "stands", "stands_under_loads",
+})  # fmt: skip
 FAULTS = frozenset({
     "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",
     "too_thick", "unstable",

@@ -7,7 +7,16 @@ LOADS = "with {ends} ends {what} under {place}{at}{where}"
 UNLOADED = "with {ends} ends {what}{where}"
 
 SENTENCES = {
+    "assumed_class": (
+        "strengths and creep are those of service class 2 (covered), which was taken as none was given: give "
+        "strength.service_class (1 inside, 3 in the weather)"
+    ),
+    "cables_short": (
+        "cables are shortened by only {short}: one that is {scatter} too long {slack}, one {scatter} too short has up "
+        "to {times} times its force; stress them to their forces (bracing.csv), not to their lengths"
+    ),
     "contact": "{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section), or set them further apart",
+    "creep_unknown": "creep of these rods is not known, and the factors on permanent loads are those at first",
     "ends_in_the_air": (
         "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
         "beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has to be designed"
@@ -43,6 +52,7 @@ SENTENCES = {
         "under {place} with {ends} ends linear buckling is at {factor} times these loads: the shell carries them only "
         "in another shape, its nodes having moved by {moved}"
     ),
+    "low_stiffness": ("under {place} with {ends} ends the shell falls at {factor} times these loads with {share}"),
     "lost": (
         "the deployment could not be followed all the way: {how}; stages are missing, and whether the shell reaches "
         "its final shape from flat is not known"
@@ -148,7 +158,7 @@ SENTENCES = {
         "with {all} ends the shell{bracing} is stable and carries {weight} times its own weight, {asked} being asked "
         "for{near}"
     ),
-    "stands_under_loads": "under {place} it is stable up to {factor} times these loads",
+    "stands_under_loads": "under {place} it is stable up to {factor} times these loads{stiffness}",
     "strength": "{shape} the rods use {share} of {whose}{where}",
     "strength: given": "{shape} the rods would break: {share} of their strength{where}",
     "strength: unloaded": UNLOADED,

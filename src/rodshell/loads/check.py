@@ -66,6 +66,7 @@ class LoadedShell(figures.LoadedShell):
     bracing_forces: Found[Floats] = Field(
         description="(d,) axial force of each brace, tension positive, of slack cables exactly 0 [N]"
     )
+    bracing_before: Found[Floats] = Field(description="(d,) the same before the loads [N]")
     modes: Found[Floats] = Field(description="(j, n, 3) lowest linear buckling modes, the largest component being 1")
     mode: Found[Floats | None] = Field(description="(n, 3) how the shell gives way at the limit, or None")
 
@@ -291,10 +292,13 @@ def loaded_shell(
     judged = partial(utilisation, rod=structure.rod, limits=limits, asked=loads.strength)
     moments = structure.locked_moments(found)
     slip = None if loads.locked_joints is None else loads.locked_joints.slip
-    alone = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration=PERMANENT)
+    erected = (structure.shell, unloaded.state)
+    standing = bending_under(*erected, structure.rod, unloaded.forces[:edges], limits)
+    alone = judged(*erected, forces=unloaded.forces[:edges], duration=None, bent=standing)
     used = judged(
-        shell, found.state, forces=forces, duration=duration, bent=bent, moments=moments, slip_moment=slip
-    ).with_permanent(alone)
+        shell, found.state, forces=forces, duration=duration, bent=bent, before=standing, moments=moments,
+        slip_moment=slip,
+    ).with_permanent(alone)  # fmt: skip
     total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
     shapes, factors = np.zeros((0, n, 3)), np.zeros(0)
     if buckling is not None:
@@ -327,6 +331,7 @@ def loaded_shell(
         euler_at=_place(mesh, int(np.argmax(used.euler))),
         governs=None if used.governs is None else _place(mesh, used.governs[1], used.governs[0]),
         bracing_forces=structure.bracing_forces(found),
+        bracing_before=structure.bracing_forces(unloaded),
         bracing_utilisation=_of_bracing(structure, found, loads, limits, duration),
         joint_moments=moments,
         joint_moment_at=names[int(np.argmax(np.abs(moments)))] if len(moments) else None,
@@ -356,9 +361,9 @@ def _of_bracing(
     """Largest utilisation of the bracing; None: there is none, or its strength is not known."""
     bracing, asked, edges = loads.bracing, loads.strength, len(structure.mesh.edges)
     shares = list[float]()
-    for state, lasting in ((found, duration), (structure.equilibrium, PERMANENT)):  # prestress and bends of laths stay
+    for state, lasting in ((found, duration), (structure.equilibrium, None)):  # prestress and bends of laths stay
         if isinstance(bracing, Cables):
-            strength = preset_limits(bracing.rod, asked.service_class).bending.get(lasting)
+            strength = preset_limits(bracing.rod, asked.service_class).bending.get(lasting or PERMANENT)
             pull = float(structure.bracing_forces(state).max(initial=0.0))
             shares += [] if strength is None else [pull / (strength * area_of(bracing.rod))]
         elif (layer := structure.laths) is not None:

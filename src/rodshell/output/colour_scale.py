@@ -14,6 +14,7 @@ from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import document, label, number, tag
 from rodshell.results.archive import Archive, made_once
 from rodshell.results.states import is_shell, shells_among
+from rodshell.results.strength_used import by_code
 from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
 
@@ -118,10 +119,10 @@ def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, Floats]]:
 
 
 def _stress_scale(archive: Archive, shape: Shape) -> Scale:
-    """Utilisation where the strength is known, else the stress in a unit of its size."""
+    """Utilisation where the strength is known and the stress alone decides, else the stress in a unit of its size."""
     assert shape.stress is not None
     bending, final = archive.results.bending, is_shell(shape.name)
-    strength = bending.strength if bending else None
+    strength = bending.strength if bending and not by_code(archive.results) else None
     erection = (bending.erection_strength if bending else None) or strength
     known = [(name, float(np.max(values))) for name, values in _of_all_shapes(archive, "stress")]
     if strength and erection:

@@ -42,6 +42,7 @@ UNITS = {
     "Nm": "N m",
 }
 UNKNOWN = (np.nan, np.nan, np.nan)  # force
+FINE, OF_SHORTENING = 0.1, 20.0  # mm, of cables whose shortening is under so many steps of the other lengths
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
 Show = Callable[[float | None], str]
 
@@ -240,9 +241,11 @@ def seams_table(archive: Archive) -> Table:
 
 def bracing_table(archive: Archive) -> Table:
     """One row a diagonal: its length flat and in the final shape, of cables also free of stress; where loads were
-    checked its axial force under each combination, tension positive, and which leave it slack.
+    checked the force that a cable is to be stressed to, its axial force under each combination, tension positive, and
+    which leave it slack.
     """
-    results, mm = archive.results, rounding_of(archive.results).mm
+    results, rounding = archive.results, rounding_of(archive.results)
+    mm = rounding.mm
     braces = _bracing_of(archive)
     table = {
         "from": [brace.start for brace in braces],
@@ -252,7 +255,12 @@ def bracing_table(archive: Archive) -> Table:
     }
     cables = any(brace.cut is not None for brace in braces)
     if cables:
-        table["cut_mm"] = [mm(brace.cut) for brace in braces]
+        shortened = [(brace.final or 0.0) - brace.cut for brace in braces if brace.cut is not None]
+        fine = 1e3 * min(shortened) < OF_SHORTENING * rounding.step
+        to_cut = Rounding(min(FINE, rounding.step)) if fine else rounding
+        table["cut_mm"] = [to_cut.mm(brace.cut) for brace in braces]
+        for ends, shell in {ends: shell for _, ends, shell in loaded_shells(results) if shell.bracing_unloaded}.items():
+            table[f"stress_to_N_{ends}"] = [_six(force) for force in shell.bracing_unloaded]
     loaded = {(name, ends): shell.bracing for name, ends, shell in loaded_shells(results) if shell.bracing}
     for (name, ends), forces in loaded.items():
         table[f"force_N_{ends}_{name}"] = [_six(force) for force in forces]

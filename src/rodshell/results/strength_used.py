@@ -19,7 +19,14 @@ def strength_name(results: Results, shape: str) -> str:
         return "the given strength"
     if not by_design_strength(results):
         return f"{preset}'s strength, which is characteristic and short-term"
-    return f"{preset}'s {'design strength for erection' if shape in OTHER_SHAPES else 'permanent design strength'}"
+    what = "design strength for erection" if shape in OTHER_SHAPES else "permanent design strength"
+    return f"{preset}'s {what}{by_code(results)}"
+
+
+def by_code(results: Results) -> str:
+    """By which building code strengths and how they go together are, in words; "": by none."""
+    code = results.strength.code if results.strength else None
+    return f" by {code}" if code else ""
 
 
 def by_design_strength(results: Results) -> bool:

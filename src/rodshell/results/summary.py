@@ -33,7 +33,6 @@ RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK s
 
 STAGES = ("pop_up", "deployment")  # of the deployment: with the final shape, and without
 STRAIGHT = 1e-6  # 1/m, rad/m: what is less is round-off
-HOLES = 1.001  # of its stress over the strength: a utilisation above is that of net sections
 MOST_DROPPED = 6  # rods that are listed
 
 Length = Callable[[float | None], str]
@@ -110,6 +109,11 @@ def _rod(rod: RodType, bending: Bending | None, judged_by: DesignStrength | None
         yield line
     if judged_by is not None and judged_by.permanent is not None:
         erection = "" if judged_by.erection is None else f", {stress(judged_by.erection)} during erection"
+        if judged_by.code is not None:
+            known = judged_by.service_class
+            erection += f", by {judged_by.code}, service class {known or '2 (not given)'}"
+            depths = [f"{factor:.3g}" for factor in judged_by.depth.tolist()]
+            erection += f"; {' and '.join(dict.fromkeys(depths))} times that by its depth (k_h)" if depths else ""
         yield f"            design strength {stress(judged_by.permanent)} permanently{erection}"
 
 
@@ -220,8 +224,7 @@ def _bending(results: Results, length: Length) -> Iterator[str]:
             line += f" (torsion alone {stress(bent.torsion_stress)})"
         if bent.utilisation is not None:
             line += f", {percent(bent.utilisation)} of {strength_name(results, shape)}"
-            strength = (bending.erection_strength if shape == "deployment" else None) or bending.strength
-            if strength and bent.max_stress and bent.utilisation > HOLES * bent.max_stress / strength:
+            if results.strength is not None and results.strength.hole:
                 line += ", holes at joints counted"
         yield line + (f"; unknown below {whole_percent(unknown)} of it" if shape in STAGES and unknown else "")
 

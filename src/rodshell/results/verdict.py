@@ -6,6 +6,7 @@ not checked, and then the result is not good.
 """
 
 from collections.abc import Iterable, Iterator
+from math import inf
 
 from rodshell.figures.checks import OTHER_SHAPES, Clearance, Deployment, WorstBent
 from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
@@ -16,7 +17,14 @@ from rodshell.figures.sentences import ANOTHER_WAY, SENTENCES
 from rodshell.results.own_weight import falling, is_braced, none_stands, reserve, weight_findings
 from rodshell.results.results import Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
-from rodshell.results.strength_used import THIN, bent_of, by_design_strength, holds_while_erected, strength_name
+from rodshell.results.strength_used import (
+    THIN,
+    bent_of,
+    by_code,
+    by_design_strength,
+    holds_while_erected,
+    strength_name,
+)
 from rodshell.results.supports import air_findings, width
 from rodshell.results.wording import (
     FORM_AGAIN,
@@ -36,6 +44,7 @@ FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the t
 # leaves a tenth of the second
 FLAT = SENTENCES["flat"]
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
+SCATTER, SURE = 2e-3, 10.0  # m, of cables as cut and fitted on site; times that, lengths decide their forces
 LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
 NEGLIGIBLE = 1e-3  # unless that gap is below this share of the target's size already
@@ -94,8 +103,8 @@ def verdict(results: Results) -> Verdict:
     if in_doubt:
         return _verdict("unknown", [*in_doubt, *to_check])
     if to_check:
-        return _verdict("check", [*to_check, *_flat(results), *_perfect(results)])
-    return _verdict("good", [*_merits(results, usable), *_flat(results), *_perfect(results)])
+        return _verdict("check", [*to_check, *_flat(results), *_assumed(results)])
+    return _verdict("good", [*_merits(results, usable), *_flat(results), *_assumed(results)])
 
 
 def unknown_below(results: Results) -> float:
@@ -149,12 +158,13 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[Said]:
 
 
 BY_WORDS = {
-    "shear": "the rods use {} of their design strength in shear",
+    "bending": "the rods use {} of their design strength{}",
+    "shear": "the rods use {} of their design strength in shear{}",
     "slip": "a joint has to transfer {} of the force at which it slips",
-    "permanent": "the erected shell, before loads act, uses {} of the rods' permanent design strength",
+    "permanent": "the erected shell, before loads act, uses {} of the rods' permanent design strength{}",
     "slip_unloaded": "before loads act a joint of the erected shell has to transfer {} of the force at which it slips",
 }
-"""What is used too much, where it is not bending."""
+"""What is used too much, and by which code."""
 SAME_USE = 1.02  # of what the erected shell uses: more is the loads' doing
 UNLOADED = ("permanent", "slip_unloaded")  # of these no load is the cause
 
@@ -186,14 +196,14 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
         for by, share in before.items():
             if share > 1:
                 sentence = "slip: unloaded" if by == "slip_unloaded" else "strength: unloaded"
-                rod, what = place.rod if place else None, BY_WORDS[by].format(_too_much(share))
+                rod, what = place.rod if place else None, BY_WORDS[by].format(_too_much(share), by_code(results))
                 word = said(sentence, ends, share, 1, place=rod, what=what, where=where * (by == governs))
                 if len(word) > len(unloaded.get(by, "")):  # the same under all, or with its place
                     unloaded[by] = word
         worst = max(uses, key=lambda by: uses[by], default="")
         if uses.get(worst, 0.0) > 1:
             at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
-            what = BY_WORDS.get(worst, "the rods use {} of their design strength").format(_too_much(uses[worst]))
+            what = BY_WORDS.get(worst, BY_WORDS["bending"]).format(_too_much(uses[worst]), by_code(results))
             code, where = "slip" if worst == "slip" else "strength_under_loads", where * (worst == governs)
             yield said(code, ends, uses[worst], 1, place=name, what=what, at=at, where=where)
         if (braced := found.bracing_utilisation) is not None and braced > 1:
@@ -208,9 +218,9 @@ def _not_of_loads(results: Results, found: LoadedShell) -> Iterator[str]:
         return
     if (parts.slip_unloaded or 0.0) > 1:
         yield "slip"
-    permanent, lasting = (getattr(strength, name or "", None) for name in ("permanent", found.duration))
-    if permanent and lasting:
-        alone = (parts.permanent or 0.0) * permanent / lasting
+    staying, lasting = (getattr(strength, name or "", None) for name in ("staying", found.duration))
+    if staying and lasting:
+        alone = (parts.permanent or 0.0) * staying / lasting
         yield from (by for by in ("bending", "shear") if (getattr(parts, by) or 0.0) <= SAME_USE * alone)
 
 
@@ -364,6 +374,22 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
             elif kind == "not followed" or (imperfect is not None and imperfect < 1):
                 sentence = "imperfect: not followed" if kind == "not followed" else "imperfect"
                 yield said(sentence, end, imperfect, 1, place=name, factor=factor)
+            lower, share = _lowered(results, found)
+            if lower < 1 and stands and (imperfect is None or imperfect >= 1):
+                factor = rounded_down(lower)
+                yield said("low_stiffness", end, lower, 1, place=name, factor=factor, share=share)
+
+
+def _lowered(results: Results, found: LoadedShell) -> tuple[float, str]:
+    """The smallest limit factor with the modulus that a code asks for in stability, and how that is said; infinite: no
+    code asks, or no limit was met."""
+    strength, limits = results.strength, [found.limit_factor, found.imperfect_factor]
+    known = [limit for limit in limits if limit is not None]
+    if strength is None or strength.stiffness is None or not known:
+        return inf, ""
+    imperfect = "imperfections and " * (found.imperfect_factor is not None)
+    share = f"{imperfect}{percent(strength.stiffness)} of the mean modulus, which {strength.code} asks for in stability"
+    return strength.stiffness * min(known), share
 
 
 def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -449,14 +475,36 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)
-        yield said("stands_under_loads", None, least, 1, place=name, factor=shown_factor(least))
+        lower, share = min((_lowered(results, by_ends[ends]) for ends in usable if ends in by_ends), default=(inf, ""))
+        words = f", and with {share}, up to {rounded_down(lower)} times" if share else ""
+        yield said("stands_under_loads", None, least, 1, place=name, factor=shown_factor(least), stiffness=words)
 
 
-def _perfect(results: Results) -> Iterator[Said]:
-    """That factors under loads are those of the perfect shell."""
+def _assumed(results: Results) -> Iterator[Said]:
+    """What was taken where nothing was given or is known: the perfect shell, a service class, no creep; and how cables
+    are to be stressed."""
+    strength = results.strength
     if any(found.imperfect_kind is None for by_ends in results.loads.values() for found in by_ends.values()):
         offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
         yield said("no_imperfections", offers=(offer,), offer=offer)
+    if strength is not None and strength.code and strength.service_class is None:
+        yield said("assumed_class")
+    if results.loads and (strength is None or strength.creep is None):
+        yield said("creep_unknown")
+    yield from _cables(results)
+
+
+def _cables(results: Results) -> Iterator[Said]:
+    """That lengths do not decide the forces of cables which are hardly shortened, and what scatter of them does."""
+    braces = results.fabrication.bracing if results.fabrication else ()
+    shortened = [final - cut for brace in braces if (cut := brace.cut) and (final := brace.final) and final > cut]
+    if not shortened or min(shortened) >= SURE * SCATTER or width(results) <= LARGE:
+        return
+    least, most = min(shortened), max(shortened)
+    slack = "is slack" if most <= SCATTER else "may be slack" if least <= SCATTER else "loses a part of its force"
+    short = f"{1e3 * least:.1f} to {1e3 * most:.1f} mm"
+    times, scatter = rounded(1.0 + SCATTER / least, 2), f"{1e3 * SCATTER:g} mm"
+    yield said("cables_short", None, least, SURE * SCATTER, "m", short=short, scatter=scatter, slack=slack, times=times)
 
 
 def _mm(results: Results, metres: float | None) -> str:
