@@ -66,6 +66,7 @@ _NEW, _AS_ONE = "a new key", "all patches are one shell, carry their weight on o
 CHANGED_ON_PURPOSE: dict[str, str] = {
     "*.flat_state": _NEW,
     "*.layout.kind": _NEW,
+    "table.rods[[]*[]].offset": "a rod of a table has no offset",
     "patches": "all patches are popped up as one shell",
     "patches.other_shapes.*": _AS_ONE,
     "patches.self_weight.*": _AS_ONE,

@@ -13,7 +13,7 @@ from rodshell.case import load_case
 from rodshell.errors import InputError
 from rodshell.nets.surface_lattice import surface_net
 from rodshell.output.drawings import drawing_set
-from rodshell.output.grid import joints_of, rods_of, shape_names
+from rodshell.output.grid import family_numbers, joints_of, rods_of, shape_names
 from rodshell.output.schedules import joints_table
 from rodshell.results.archive import Archive, read
 
@@ -110,17 +110,29 @@ def test_schedules_have_the_places_of_joints_and_no_flat_ones_of_a_shell_that_is
     form: Callable[[], rs.Form],
 ) -> None:
     archive, mesh = kept(form()), form().footprint.mesh
-    names, rows = joints_table(archive)
+    table = joints_table(archive)
+    rows = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
     places = form().popped["pinned"].positions[mesh.joint_nodes]
     for joint, place in zip(mesh.grid.joint_names, places, strict=True):
-        row = next(dict(zip(names, row, strict=True)) for row in rows if row[0] == joint)
+        row = next(row for row in rows if row["id"] == joint)
         found = [float(row[f"final_{axis}_mm"]) for axis in "xyz"]
         np.testing.assert_allclose(found, 1e3 * place, atol=0.1)  # twice the rounding
         assert bool(row["flat_x_mm"]) == bool(row["scissor_deg"]) == (form is low)
     if form is low:
         scissors = {"/".join(load.rods): load.scissor_deg for load in archive.results.joint_loads["pinned"]}
         for row in rows:
-            assert float(row[names.index("scissor_deg")]) == pytest.approx(scissors[row[0]], abs=0.05)
+            assert float(row["scissor_deg"]) == pytest.approx(scissors[row["id"]], abs=0.05)
+
+
+def test_families_of_a_lattice_are_named_in_the_result_and_coloured_in_drawings() -> None:
+    archive = kept(low())
+    families = [rod.family for rod in archive.results.rods]
+    assert {*families} == {"u", "v"}
+    assert [rod.id[0].lower() for rod in archive.results.rods] == families
+    assert {rod.offset for rod in archive.results.rods} == {None}  # on no line of the flat plan
+    crossed = {frozenset((rod.family, joint.other[0].lower())) for rod in archive.results.rods for joint in rod.joints}
+    assert all(len(pair) == 2 for pair in crossed)  # rods of a family do not cross
+    assert {*family_numbers(families)} == {0, 1}
 
 
 def test_a_result_is_kept_and_its_case_gives_it_again(tmp_path: Path) -> None:

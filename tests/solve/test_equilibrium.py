@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import rodshell as rs
-from rodshell.layout import FlatGrid, FlatRod
+from rodshell.layout import FlatGrid
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.model import Shell
 from rodshell.solve import equilibrium
 from rodshell.solve.equilibrium import Status, find_equilibrium, find_stable
@@ -29,7 +30,7 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def straight_rod(edges, **options):
-    mesh = rs.mesh_grid(FlatGrid.of([FlatRod.u("U01", 0.0, -0.5, 0.5)]), 1.0 / edges)
+    mesh = rs.mesh_grid(FlatGrid.of([lattice_rod(0, "U01", 0.0, -0.5, 0.5)]), 1.0 / edges)
     return Shell.of(mesh, ROD, **options)
 
 

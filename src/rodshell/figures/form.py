@@ -284,8 +284,11 @@ class RodLine(Record):
     """A rod's flat geometry, its joints, and how it is cut."""
 
     id: Text = Field(description="name of the rod")
-    family: Text = Field(description='"u" runs along x at y = offset, "v" along y at x = offset, "free": from a table')
-    offset: Number = key("place of the rod's line across its family", "m")
+    family: Text = Field(
+        description='rods that do not cross each other: "u" along x at y = offset, "v" along y at x = offset; without '
+        'an offset "u", "v", "w" along curves of the target; "free": of a table or along lines that are given'
+    )
+    offset: Number = key("place of the rod's line across its family; null: it is on no line of a straight lattice", "m")
     start: Real = Field(description="material coordinate of the start, from the layout's middle [m]")
     end: Real = Field(description="material coordinate of the end [m]")
     length: Number = key("length between the supports", "m")

@@ -581,18 +581,18 @@ def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
 
 
 def _along(rod: FlatRod, shift: Floats) -> float:
-    """Change of a rod's material coordinates: those of families u and v are measured from the middle of the layout."""
-    return 0.0 if rod.family == "free" else float(shift @ np.array(rod.direction))
+    """Change of a rod's material coordinates: those on the lines of a lattice are measured from its middle."""
+    return 0.0 if rod.offset is None else float(shift @ np.array(rod.direction))
 
 
 def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
-    label, by = f"{name}-{rod.name}", _along(rod, shift)
-    if rod.family == "free":
+    if rod.offset is None:
         x, y = np.array(rod.origin) + shift
-        return rod._replace(name=label, origin=(float(x), float(y)))
-    make, across = (FlatRod.u, shift[1]) if rod.family == "u" else (FlatRod.v, shift[0])
-    moved = make(label, rod.offset + float(across), rod.start + by, rod.end + by)
-    return moved._replace(profile=rod.profile, curve=rod.curve)
+        moved = rod._replace(origin=(float(x), float(y)))
+    else:
+        by = _along(rod, shift)
+        moved = rod.cut(rod.start + by, rod.end + by, float(shift @ np.array(rod.across)))
+    return moved._replace(name=f"{name}-{rod.name}")
 
 
 def _merged(meshes: list[GridMesh]) -> GridMesh:

@@ -13,6 +13,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod
+from rodshell.layout.gridlayout import FAMILIES, lattice_rod
 from rodshell.nets.compass import Net
 
 RINGS = 2  # of joints: on a 0.2 m hemisphere at 40 mm spacing the ends are 0.1 mm off the net; 0.5 mm with 1 ring
@@ -35,8 +36,8 @@ def with_apron(
     rows, columns = np.searchsorted(net.u, u - 1e-12), np.searchsorted(net.v, v - 1e-12)
     alive = np.isfinite(net.points[rows[:, None], columns, 0])
     families = [
-        _Family(name, stations, offsets, np.ascontiguousarray(live), rods, clearance)
-        for name, stations, offsets, live in (("u", u, v, alive.T), ("v", v, u, alive))
+        _Family(number, stations, offsets, np.ascontiguousarray(live), rods, clearance)
+        for number, (stations, offsets, live) in enumerate(((u, v, alive.T), (v, u, alive)))
     ]
     both = families[0].joints.T | families[1].joints
     (u_rods, u_whole), (v_rods, v_whole) = (
@@ -44,7 +45,7 @@ def with_apron(
         families[1].prolonged(both),
     )
     whole = np.empty(len(rods), dtype=np.intp)
-    along_u = np.array([rod.family == "u" for rod in rods], dtype=bool)
+    along_u = np.array([rod.family == FAMILIES[0] for rod in rods], dtype=bool)
     whole[along_u], whole[~along_u] = u_whole, len(u_rods) + v_whole
     return FlatGrid.of([*u_rods, *v_rods]), whole
 
@@ -62,10 +63,10 @@ class _Family:
     """
 
     def __init__(
-        self, name: str, stations: Floats, offsets: Floats, live: Bools, rods: Sequence[FlatRod], clearance: float
+        self, number: int, stations: Floats, offsets: Floats, live: Bools, rods: Sequence[FlatRod], clearance: float
     ) -> None:
-        self.name, self.stations, self.offsets = name, stations, offsets
-        self.rods = [rod for rod in rods if rod.family == name]
+        self.number, self.stations, self.offsets = number, stations, offsets
+        self.rods = [rod for rod in rods if rod.family == FAMILIES[number]]
         laid = np.array([(rod.offset, rod.start, rod.end) for rod in self.rods]).reshape(-1, 3)
         found = _stretches(stations, offsets, live, laid, clearance)
         self.stretches, self.line_of, self.stretch_of, self.first_rod, self.ends, self.joints = found
@@ -75,9 +76,11 @@ class _Family:
         joint, its own ends included; and which of them each rod is a piece of."""
         kept, ends = _prolong(self.stations, self.stretches, joints, self.first_rod, self.ends)
         columns = self.first_rod[kept].tolist(), self.offsets[self.line_of[kept]].tolist(), ends.tolist()
-        make = FlatRod.u if self.name == "u" else FlatRod.v
+        label = f"apron {FAMILIES[self.number].upper()}"
         rods = [
-            self.rods[rod].cut(a, b) if rod >= 0 else make(f"apron {self.name.upper()} {c:+.4f}", c, a, b, virtual=True)
+            self.rods[rod].cut(a, b)
+            if rod >= 0
+            else lattice_rod(self.number, f"{label} {c:+.4f}", c, a, b, virtual=True)
             for rod, c, (a, b) in zip(*columns, strict=True)
         ]
         return rods, np.searchsorted(kept, self.stretch_of)

@@ -18,8 +18,7 @@ from rodshell.errors import InputError, NetLimitError
 from rodshell.geometry.curves import nearest_four
 from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
-from rodshell.layout.flatgrid import Family
-from rodshell.layout.gridlayout import piece_names, rod_names
+from rodshell.layout.gridlayout import FAMILIES, lattice_rod, piece_names, rod_names
 from rodshell.nets.compass import ON_SURFACE, Axes, axes
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
@@ -77,7 +76,7 @@ class ChebyshevNet:
     def _along(self, rods: Sequence[FlatRod], start: Ints, s: Floats, nodes: Ints, count: int) -> Floats:
         """Points (count, 3) [m] of the `nodes` (k,) at the material coordinates `s` (k,) [m] of rods one after the
         other, which begin at `start` (m,) in `s`."""
-        offset, across = np.array([rod.offset for rod in rods]), np.array([rod.family == "v" for rod in rods])
+        offset, across = np.array([rod.offset for rod in rods]), np.array([rod.family == FAMILIES[1] for rod in rods])
         line = np.where(across, _nearest(self.net.u, offset), _nearest(self.net.v, offset))
         result, start = np.empty((count, 3)), np.append(start, len(s))
         _interpolate(self.net.u, self.net.v, self.net.points, line, across, start, s, nodes, result)
@@ -340,10 +339,8 @@ def _name_rods(
     """Rods from the lines: those of the layout get their names, all other lines are virtual; those that are dropped;
     and the names of the pieces of rods that have several."""
     rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), dict[str, tuple[str, ...]]()
-    families: tuple[tuple[Family, Floats, Cuts], ...] = (("u", lines.v, ends[0]), ("v", lines.u, ends[1]))
     spacing = max(layout.spacing)
-    for family, every, cuts in families:
-        make = FlatRod.u if family == "u" else FlatRod.v
+    for family, (every, cuts) in enumerate(zip((lines.v, lines.u), ends, strict=True)):
         pieces: dict[float, list[list[float]]] = {}  # of each line that touches the target, by its offset
         for offset, piece in zip(every[cuts.line].tolist(), cuts.ends.tolist(), strict=True):
             pieces.setdefault(offset, []).append(piece)
@@ -360,12 +357,15 @@ def _name_rods(
             parts = pieces.pop(offset)
             names = piece_names(name, len(parts))
             for label, (start, end) in zip(names, parts, strict=True):
-                rods.append(make(label, offset, start, end, virtual=label in layout.left_out))
+                rods.append(lattice_rod(family, label, offset, start, end, virtual=label in layout.left_out))
             if len(parts) > 1:
                 broken[name] = tuple(names)
         for offset, parts in pieces.items():
-            labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
-            rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
+            labels = piece_names(f"virtual {FAMILIES[family].upper()} {offset:+.4f}", len(parts))
+            rods += [
+                lattice_rod(family, label, offset, *part, virtual=True)
+                for label, part in zip(labels, parts, strict=True)
+            ]
     return tuple(rods), dropped, broken
 
 
@@ -384,7 +384,7 @@ def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:
         return
 
     def needed(rod: FlatRod) -> float:
-        middle = layout.middle(rod.family)
+        middle = layout.middle(rod)
         return 2 * max(rod.end - middle, middle - rod.start)
 
     longest = max((rod for rod in rods if not rod.virtual), key=needed, default=None)

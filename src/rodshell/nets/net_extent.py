@@ -13,7 +13,6 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.layout import GridLayout
-from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import auto_edge
 from rodshell.layout.mesh import MOST_NODES, edge_counts
 from rodshell.nets.compass import ON_SURFACE, Axes, Heights, Net, fill_quadrants, lay_axes
@@ -193,7 +192,7 @@ def find_lines(
         if (needed <= reach + 1e-12).all():
             break
         reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
-    u, v = _lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3])
+    u, v = _lattice(layout, 1, needed[0], needed[1]), _lattice(layout, 0, needed[2], needed[3])
     across, along = _steps(u, layout.edge), _steps(v, layout.edge)
     _refuse_too_many(target, layout, int(across.sum()) + 1, int(along.sum()) + 1)
     return LatticeLines(u, v, (_divided(u, across), _divided(v, along))), near
@@ -223,9 +222,9 @@ def _around(inside: Bools) -> Bools:
     return around
 
 
-def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:
+def _lattice(layout: GridLayout, family: int, below: float, above: float) -> Floats:
     """Offsets of the lattice lines of a family from -below to above, and of the axis."""
-    spacing = layout.spacing[0 if family == "u" else 1]
+    spacing = layout.spacing[family]
     offsets = layout.lattice(family, -below, above)
     offsets[np.abs(offsets) < 1e-9 * spacing] = 0.0
     return offsets if (offsets == 0.0).any() else np.sort(np.append(offsets, 0.0))

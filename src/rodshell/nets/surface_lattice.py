@@ -17,7 +17,7 @@ from rodshell.nets.surface_curves import SurfaceCurves, asymptotic, geodesic, tr
 from rodshell.targets import Target
 from rodshell.units import length_text
 
-LETTERS = "UVW"  # of the families
+FAMILIES = "uvw"
 MOVED = 1e-3  # of the size: lines that lie further off the target are said to be moved
 
 
@@ -28,6 +28,7 @@ class SurfaceNet:
     Args:
         curves: of the rods, from past an end of the target to past another.
         names: of the rods.
+        families: of the rods, by their names; "free" of those along lines that are given.
         crossings: of the rods, with the arc lengths of `curves`.
         warnings: sentences.
     """
@@ -35,6 +36,7 @@ class SurfaceNet:
     lattice: SurfaceLattice
     curves: SurfaceCurves
     names: tuple[str, ...]
+    families: tuple[str, ...]
     crossings: Crossings
     warnings: tuple[str, ...] = ()
 
@@ -98,9 +100,9 @@ def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float,
         tangents.append(_off(target, x, along, law))
         family += [k] * len(s)
     curves = trace(target, law, np.concatenate(points), np.concatenate(tangents))
-    families = np.array(family)
-    names = [f"{LETTERS[k]}{number:02d}" for k in range(len(headings)) for number in range(1, family.count(k) + 1)]
-    return SurfaceNet(lattice, curves, tuple(names), curves.crossings(families))
+    letters = [FAMILIES[k] for k in family]
+    names = [f"{letter.upper()}{k - letters.index(letter) + 1:02d}" for k, letter in enumerate(letters)]
+    return SurfaceNet(lattice, curves, tuple(names), tuple(letters), curves.crossings(np.array(family)))
 
 
 def _of_lines(target: Target, lattice: Curves) -> SurfaceNet:
@@ -114,7 +116,7 @@ def _of_lines(target: Target, lattice: Curves) -> SurfaceNet:
     warnings = tuple[str, ...]()
     if moved > MOVED * target.size:
         warnings = (f"the lines of the rods lie up to {length_text(moved)} off the target, and were moved onto it",)
-    return SurfaceNet(lattice, curves, tuple(names), curves.crossings(line), warnings)
+    return SurfaceNet(lattice, curves, tuple(names), ("free",) * len(names), curves.crossings(line), warnings)
 
 
 def _normal(target: Target, x: Floats) -> Floats:
