@@ -308,14 +308,12 @@ def test_edges_bends_and_lengths_are_those_of_each_rod_in_turn(seed, count, edge
     grid = random_rods(seed, count)
     mesh = mesh_grid(grid, edge)
     edges, bends, of_edge, of_bend, lengths, voronoi = [], [], [], [], [], []
-    share = np.zeros(mesh.node_count)
     for k in range(count):
         nodes, s = mesh.nodes_of(k).tolist(), mesh.stations[mesh.rod_slice(k)]
         for i in range(len(nodes) - 1):
             edges.append(nodes[i : i + 2])
             of_edge.append(k)
             lengths.append(s[i + 1] - s[i])
-            share[nodes[i : i + 2]] += (s[i + 1] - s[i]) / 2
         for i in range(1, len(nodes) - 1):
             bends.append(nodes[i - 1 : i + 2])
             of_bend.append(k)
@@ -326,10 +324,8 @@ def test_edges_bends_and_lengths_are_those_of_each_rod_in_turn(seed, count, edge
     np.testing.assert_array_equal(mesh.bend_rods, of_bend)
     np.testing.assert_allclose(mesh.edge_lengths, lengths, rtol=0, atol=ROUND_OFF)
     np.testing.assert_allclose(mesh.voronoi_lengths, voronoi, rtol=0, atol=ROUND_OFF)
-    np.testing.assert_allclose(mesh.tributary_lengths(), share, rtol=0, atol=ROUND_OFF)
     total = sum(rod.length for rod in grid.rods)
     assert mesh.edge_lengths.sum() == pytest.approx(total, rel=ROUND_OFF)
-    assert mesh.tributary_lengths().sum() == pytest.approx(total, rel=ROUND_OFF)
     # in the flat state an edge is as long as its rest length
     flat = np.linalg.norm(np.diff(mesh.flat[mesh.edges], axis=1)[:, 0], axis=1)
     np.testing.assert_allclose(flat, mesh.edge_lengths, rtol=0, atol=1e-9)
@@ -468,7 +464,7 @@ def test_a_cut_mesh_keeps_stations_nodes_and_the_joints_far_from_ends(seed, coun
     for (a, b), node in zip(part.grid.crossings.rods, part.joint_nodes, strict=True):
         assert node in part.nodes_of(a)
         assert node in part.nodes_of(b)
-    assert part.tributary_lengths().sum() == pytest.approx(sum(rod.length for rod in rods), rel=1e-9)
+    assert part.edge_lengths.sum() == pytest.approx(sum(rod.length for rod in rods), rel=1e-9)
 
 
 def test_of_three_rods_through_one_point_two_stay_joined_when_the_third_ends_near_it():

@@ -233,8 +233,8 @@ def _settled(shape: PopUp) -> PopUp:
 def _held(shape: PopUp) -> Reactions:
     """What the supports exert, and what they say of themselves."""
     found = reactions(shape.shell, shape.equilibrium)
-    own = figures_of(shape.support, found.points - shape.boundary.points, found.forces)
-    return found.changed(figures=own) if own else found
+    said_by = figures_of(shape.support, found.points - shape.boundary.points, found.forces)
+    return found.changed(figures=said_by) if said_by else found
 
 
 def _long_checks(

@@ -15,7 +15,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, NetLimitError
-from rodshell.geometry.curves import nearest_four
+from rodshell.geometry.curves import on_curve
 from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.gridlayout import FAMILIES, lattice_rod, piece_names, rod_names
@@ -76,10 +76,14 @@ class ChebyshevNet:
     def _along(self, rods: Sequence[FlatRod], start: Ints, s: Floats, nodes: Ints, count: int) -> Floats:
         """Points (count, 3) [m] of the `nodes` (k,) at the material coordinates `s` (k,) [m] of rods one after the
         other, which begin at `start` (m,) in `s`."""
-        offset, across = np.array([rod.offset for rod in rods]), np.array([rod.family == FAMILIES[1] for rod in rods])
-        line = np.where(across, _nearest(self.net.u, offset), _nearest(self.net.v, offset))
         result, start = np.empty((count, 3)), np.append(start, len(s))
-        _interpolate(self.net.u, self.net.v, self.net.points, line, across, start, s, nodes, result)
+        for k, rod in enumerate(rods):
+            first, here = rod.family == FAMILIES[0], slice(start[k], start[k + 1])
+            knots, others = (self.net.u, self.net.v) if first else (self.net.v, self.net.u)
+            line = int(_nearest(others, np.array([rod.offset]))[0])
+            points = self.net.points[:, line] if first else self.net.points[line]
+            known = np.isfinite(points[:, 0])
+            result[nodes[here]] = on_curve(knots[known], points[known], s[here])
         return result
 
     def __repr__(self) -> str:
@@ -261,43 +265,6 @@ def _sharpest(points, inside):  # type: ignore[no-untyped-def]
 def _nearest(ascending: Floats, values: Floats) -> Ints:
     """Indices (k,) of the nearest of `ascending` numbers to each of the `values` (k,)."""
     return np.asarray(np.searchsorted(0.5 * (ascending[1:] + ascending[:-1]), values))
-
-
-@njit("f1 f1 f3 i1 b1 i1 f1 i1 f2")
-def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: ignore[no-untyped-def]
-    """Points of the `nodes` (k,), put into `result`, at the places `s` (k,) of lines of a net, by cubics through the
-    four nearest known nodes.
-
-    line, across : (m,) index of each line in its family, and whether that is family v.
-    start : (m + 1,) where each line begins in `s`.
-    """
-    most = max(len(u), len(v))
-    at, there, shares = np.empty(most), np.empty((most, 3)), np.empty((1, 4))  # the known nodes of a line
-    for m in range(len(line)):
-        knots, count = (v if across[m] else u), 0
-        for n in range(len(knots)):
-            i, j = (line[m], n) if across[m] else (n, line[m])
-            if np.isfinite(points[i, j, 0]):
-                at[count] = knots[n]
-                for d in range(3):
-                    there[count, d] = points[i, j, d]
-                count += 1
-        near, after = min(4, count), 0
-        for e in range(start[m], start[m + 1]):
-            while after > 0 and at[after - 1] >= s[e]:
-                after -= 1
-            while after < count and at[after] < s[e]:
-                after += 1
-            if after < count and at[after] == s[e]:  # itself
-                for d in range(3):
-                    result[nodes[e], d] = there[after, d]
-                continue
-            first = nearest_four(at, s[e], after, 0, count - 1, shares, 0)
-            for d in range(3):
-                value = 0.0
-                for j in range(near):
-                    value += shares[0, j] * there[first + j, d]
-                result[nodes[e], d] = value
 
 
 def _extrapolate(

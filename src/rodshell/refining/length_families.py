@@ -44,8 +44,7 @@ class Stations:
 
     def change(self, values: Floats) -> Change:
         mesh, held = self.structure.mesh, len(self.structure.held)
-        before, after = _edge_entries(mesh)
-        slopes = csc_array(self.shifts[after] - self.shifts[before])
+        slopes = csc_array(self.shifts[mesh.edge_entries + 1] - self.shifts[mesh.edge_entries])
         none = Change.none(len(mesh.edges), held, len(values))
         return replace(none, lengths=slopes @ values, length_slopes=slopes)
 
@@ -125,12 +124,6 @@ class Holes:
             return Image(index, np.where(by.reversed[rod[holes]], -1.0, 1.0))
 
         return Stations(structure, between(mesh) @ moved, box, image)
-
-
-def _edge_entries(mesh: GridMesh) -> tuple[Ints, Ints]:
-    """(e,) entries of `rod_nodes` at which each edge begins and ends."""
-    begins = np.setdiff1d(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
-    return begins, begins + 1
 
 
 def usual_span(mesh: GridMesh) -> float:
