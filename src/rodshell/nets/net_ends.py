@@ -72,61 +72,18 @@ def _region(target: Target, net: Net) -> Bools:
 
     A square of nodes whose corners are closer to its middle than the end is needs only one evaluation.
     """
-    middles, points, way = _squares(net.points, net.u, net.v)
-    asked, points, inside = _by_squares(net.points, middles, target.margin(points), way)
-    _set_inside(asked, target.margin(points), inside)
-    return np.asarray(inside)
-
-
-@njit("f3 f1 f1")
-def _squares(points, u, v):  # type: ignore[no-untyped-def]
-    """The middle of each square of nodes that are all known: its indices (n, 2) and point (n, 3); and path lengths (n,)
-    to the square's corners."""
-    half, count = SQUARE // 2, 0
-    middles = np.empty(((len(u) // SQUARE) * (len(v) // SQUARE), 2), dtype=np.intp)
-    at, way = np.empty((len(middles), 3)), np.empty(len(middles))
-    for i in range(half, len(u) - half, SQUARE):
-        for j in range(half, len(v) - half, SQUARE):
-            known = True
-            for p in range(i - half, i + half + 1):
-                for q in range(j - half, j + half + 1):
-                    known &= not np.isnan(points[p, q, 0])
-            if known:
-                middles[count, 0], middles[count, 1] = i, j
-                for k in range(3):
-                    at[count, k] = points[i, j, k]
-                way[count] = max(u[i + half] - u[i], u[i] - u[i - half]) + max(v[j + half] - v[j], v[j] - v[j - half])
-                count += 1
-    return middles[:count], at[:count], way[:count]
-
-
-@njit("f3 i2 f1 f1")
-def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
-    """Indices (m, 2) and points (m, 3) of the known nodes that are in no square whose end is further than its corners;
-    and which of the other nodes (nu, nv) are inside."""
-    nu, nv = points.shape[:2]
-    half, count = SQUARE // 2, 0
-    inside, clear = np.zeros((nu, nv), dtype=np.bool_), np.zeros((nu, nv), dtype=np.bool_)
-    asked, at = np.empty((nu * nv, 2), dtype=np.intp), np.empty((nu * nv, 3))
-    for n in range(len(middles)):
-        if abs(margin[n]) > way[n]:
-            for i in range(middles[n, 0] - half, middles[n, 0] + half + 1):
-                for j in range(middles[n, 1] - half, middles[n, 1] + half + 1):
-                    clear[i, j], inside[i, j] = True, margin[n] > 0.0
-    for i in range(nu):
-        for j in range(nv):
-            if not clear[i, j] and not np.isnan(points[i, j, 0]):
-                asked[count, 0], asked[count, 1] = i, j
-                for k in range(3):
-                    at[count, k] = points[i, j, k]
-                count += 1
-    return asked[:count], at[:count], inside
-
-
-@njit("i2 f1 b2")
-def _set_inside(asked, margin, inside):  # type: ignore[no-untyped-def]
-    for n in range(len(asked)):
-        inside[asked[n, 0], asked[n, 1]] = margin[n] > 0.0
+    half, known = SQUARE // 2, np.isfinite(net.points[..., 0])
+    count = known.shape[0] // SQUARE, known.shape[1] // SQUARE
+    in_squares = known[: count[0] * SQUARE, : count[1] * SQUARE].reshape(count[0], SQUARE, count[1], SQUARE)
+    squares = np.nonzero(in_squares.all(axis=(1, 3)))
+    i, j = (SQUARE * row + half for row in squares)
+    reach = [np.maximum(s[k + half] - s[k], s[k] - s[k - half]) for s, k in ((net.u, i), (net.v, j))]
+    margin, signs, side = target.margin(net.points[i, j]), np.zeros(count), np.zeros(known.shape)
+    signs[squares] = np.sign(margin) * (np.abs(margin) > reach[0] + reach[1])
+    side[: count[0] * SQUARE, : count[1] * SQUARE] = signs.repeat(SQUARE, axis=0).repeat(SQUARE, axis=1)
+    asked, inside = known & (side == 0), side > 0
+    inside[asked] = target.margin(net.points[asked]) > 0
+    return inside
 
 
 class Lines(NamedTuple):
@@ -166,19 +123,12 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
     ]
 
 
-@njit("b2")
-def _runs(inside):  # type: ignore[no-untyped-def]
+def _runs(inside: Bools) -> Ints:
     """(k, 3) the line, the first and the last node of each run of nodes of `inside` (m, n)."""
-    lines, nodes = inside.shape
-    runs, count = np.empty((lines * ((nodes + 1) // 2), 3), dtype=np.intp), 0
-    for m in range(lines):
-        for n in range(nodes):
-            if inside[m, n]:
-                if n == 0 or not inside[m, n - 1]:
-                    runs[count, 0], runs[count, 1] = m, n
-                    count += 1
-                runs[count - 1, 2] = n
-    return runs[:count].copy()
+    begins, ends = inside.copy(), inside.copy()
+    begins[:, 1:] &= ~inside[:, :-1]
+    ends[:, :-1] &= ~inside[:, 1:]
+    return np.column_stack([*np.nonzero(begins), np.nonzero(ends)[1]])
 
 
 def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float) -> list[Ints]:
