@@ -281,24 +281,24 @@ def _fixed_points(grid: FlatGrid, marks: Sequence[Sequence[float]]) -> tuple[Int
 
     The start, the marks and the end of each rod get a new node each, unless there is a joint or an earlier one of them.
     """
-    given = [(rod.start, *more, rod.end) for rod, more in zip(grid.rods, marks, strict=True)]
-    counts, crossings = [len(row) for row in given], grid.crossings.rods
-    places = finite("marks", [place for row in given for place in row], sum(counts))
+    rows = [(rod.start, *more, rod.end) for rod, more in zip(grid.rods, marks, strict=True)]
+    counts, crossings = [len(row) for row in rows], grid.crossings.rods
+    given = finite("marks", [s for row in rows for s in row], sum(counts))
     lengths, sides = np.diff(grid.ends).ravel(), crossings.size  # both sides of each crossing, then the given points
-    rod = np.append(crossings.ravel(), np.repeat(np.arange(len(given)), counts))
-    s = np.append(grid.crossings.at.ravel(), places)
+    rod = np.append(crossings.ravel(), np.repeat(np.arange(len(rows)), counts))
+    s = np.append(grid.crossings.at.ravel(), given)
     order = np.lexsort((s, rod))
     joints, joint_nodes = _merged_joints(order[order < sides], rod, s, len(crossings), 1e-7 * lengths.max(initial=0.0))
     new = np.append(True, (np.diff(rod[order]) > 0) | (np.diff(s[order]) > 1e-9 * lengths[rod[order[1:]]]))
     first = np.repeat(np.minimum.reduceat(order, np.flatnonzero(new)), np.diff(np.append(np.flatnonzero(new), len(s))))
-    joint = np.append(np.repeat(joint_nodes, 2), np.full(len(places), -1))[order]
+    joint = np.append(np.repeat(joint_nodes, 2), np.full(len(given), -1))[order]
     _, once = np.unique(rod[order] * (joints + 1) + joint, return_index=True)  # three rods make three crossings
     # of points at one place the first is kept, and every joint once
     kept = np.where(order < sides, np.isin(np.arange(len(order)), once), order == first)
     placed = np.sort(order[kept & (order >= sides)])
     node = np.append(np.repeat(joint_nodes, 2), joints + np.searchsorted(placed, np.arange(sides, len(s))))
     order = order[kept]
-    begin = np.searchsorted(rod[order], np.arange(len(given) + 1))
+    begin = np.searchsorted(rod[order], np.arange(len(rows) + 1))
     return begin, s[order], node[order], joints + len(placed), joint_nodes
 
 
