@@ -107,7 +107,7 @@ class GridMesh:
     @cached_property
     def edges(self) -> Ints:
         """(e, 2) nodes of each edge, rod by rod."""
-        return self.rod_nodes[self.edge_entries[:, None] + [0, 1]]
+        return np.asarray(self.rod_nodes[self.edge_entries[:, None] + [0, 1]])
 
     @cached_property
     def edge_rods(self) -> Ints:
@@ -127,7 +127,7 @@ class GridMesh:
     @cached_property
     def bends(self) -> Ints:
         """(b, 3) nodes of each pair of consecutive edges of a rod."""
-        return self.rod_nodes[self._bend_entries[:, None] + [-1, 0, 1]]
+        return np.asarray(self.rod_nodes[self._bend_entries[:, None] + [-1, 0, 1]])
 
     @cached_property
     def bend_rods(self) -> Ints:
@@ -356,43 +356,39 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float = 0.0) ->
     grid, joints = mesh.grid.cut(rods, margin=margin)
     index = whole_rods(mesh.grid.rods, rods)
     spans, limits = spans_along(mesh, grid.ends, index), np.full(len(rods), CROWDED * mesh.edge_lengths.max())
-    source = spans, mesh.rod_nodes, mesh.stations, grid.crossings.rods, mesh.joint_nodes[joints], mesh.node_count
-    nodes, *part, left_out = _cut(*source, limits)
+    crossing_nodes = mesh.joint_nodes[joints]
+    part, nodes, left_out = _cut(mesh, grid, spans, crossing_nodes, limits)
     if left_out:
-        nodes, *part, _ = _cut(*source, CROWDED * _usual_edges(mesh)[index])
-    return GridMesh(grid, mesh.flat.take(nodes, axis=0), *part), nodes
+        part, nodes, _ = _cut(mesh, grid, spans, crossing_nodes, CROWDED * _usual_edges(mesh)[index])
+    return part, nodes
 
 
 def _cut(
-    spans: Ints,
-    rod_nodes: Ints,
-    stations: Floats,
-    crossings: Ints,
-    crossing_nodes: Ints,
-    node_count: int,
-    limits: Floats,
-) -> tuple[Ints, Ints, Ints, Floats, Ints, int]:
-    """Nodes of the part in the mesh; its `rod_nodes`, `rod_start`, stations and joint nodes; the number of nodes that
-    are left out, because they are closer than `limits` (m,) [m] to an end and not at a joint.
-
-    The pieces have the entries `spans` (m, 2), and cross in pairs `crossings` (c, 2) at the nodes `crossing_nodes`.
+    mesh: GridMesh, grid: FlatGrid, spans: Ints, crossing_nodes: Ints, limits: Floats
+) -> tuple[GridMesh, Ints, int]:
+    """The part of a mesh with the rods of `grid`, which have the entries `spans` (m, 2), and its nodes in the mesh, at
+    which their crossings are (c,); and the number of nodes that are left out, because they are closer than `limits`
+    (m,) [m] to an end and not at a joint.
     """
+    rod_nodes, stations = mesh.rod_nodes, mesh.stations
     counts = 1 + spans[:, 1] - spans[:, 0]
     piece, stops = np.repeat(np.arange(len(spans)), counts), np.cumsum(counts)
     entry = np.arange(len(piece)) + (spans[:, 0] - stops + counts)[piece]
     low, high = stations[spans].T
     from_end = np.minimum(stations[entry] - low[piece], high[piece] - stations[entry])
-    joined = np.isin(piece * node_count + rod_nodes[entry], crossings * node_count + crossing_nodes[:, None])
+    at_joints = grid.crossings.rods * mesh.node_count + crossing_nodes[:, None]
+    joined = np.isin(piece * mesh.node_count + rod_nodes[entry], at_joints)
     kept = joined | (from_end <= 0.0) | (from_end >= limits[piece])
     left_out, piece, entry, joined = len(kept) - int(kept.sum()), piece[kept], entry[kept], joined[kept]
     known, first = np.unique(crossing_nodes, return_index=True)
     known = known[np.argsort(first)]
-    number = np.full(node_count, -1)
+    number = np.full(mesh.node_count, -1)
     number[known] = np.arange(len(known))
     part = np.where(joined, number[rod_nodes[entry]], len(known) - 1 + np.cumsum(~joined))
     nodes = np.append(known, rod_nodes[entry[~joined]])
     begin = np.searchsorted(piece, np.arange(len(spans)))
-    return nodes, part, begin, stations[entry], number[crossing_nodes], left_out
+    flat = mesh.flat.take(nodes, axis=0)
+    return GridMesh(grid, flat, part, begin, stations[entry], number[crossing_nodes]), nodes, left_out
 
 
 def spans_along(mesh: GridMesh, ends: Floats, whole: Ints) -> Ints:
