@@ -192,7 +192,9 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
         if len(nodes) == 0:
             return
         found, change, sine = _compass(target, net.heights, known, chords, tolerance)
-        _keep(nodes, found, chords, change, sine, tolerance, net.points, tried)
+        # none that did not converge, nor where the net folds: (P - B) x (P - A) no longer points along the normal
+        good = (change < tolerance) & (sine * chords[2] > SMALLEST_SINE)
+        net.points[tuple(nodes.T)], tried[tuple(nodes.T)] = np.where(good[:, None], found, np.nan), True
 
 
 @njit("f3 b2 f1 f1 i i i")
@@ -242,18 +244,6 @@ def _compass(
         if not _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, change, sine):
             break
     return p, change, sine
-
-
-@njit("i2 f2 f2 f1 f1 f f3 b2")
-def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type: ignore[no-untyped-def]
-    """Put the points that were `found` (n, 3) in their places; not those that did not converge, nor where the net
-    folds: (P - B) x (P - A) no longer points along the normal."""
-    for n in range(len(nodes)):
-        i, j = nodes[n, 0], nodes[n, 1]
-        tried[i, j] = True
-        good = change[n] < tolerance and sine[n] * chords[2, n] > SMALLEST_SINE
-        for k in range(3):
-            points[i, j, k] = found[n, k] if good else np.nan
 
 
 @njit("f2 f2 f2 f2 ff f1 f2 f3 f f1 f1")

@@ -6,12 +6,12 @@ same net in longer steps; the first of these nets has only a few long steps.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
-from rodshell.kernels import njit
 from rodshell.layout import GridLayout
 from rodshell.layout.gridlayout import auto_edge
 from rodshell.layout.mesh import MOST_NODES, edge_counts
@@ -97,45 +97,26 @@ def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats
 
 
 def _want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats, wanted: Bools) -> bool:
-    """Add to the nodes `wanted` (nu, nv) those of `wanted_nodes`; return whether any was not wanted before."""
-    if near.inside.any():
-        return bool(_want(near.inside, near.u, near.v, past, u, v, *margin, wanted))
-    added = not wanted.all()
-    wanted[:] = True
-    return added
-
-
-@njit("b2 f1 f1 i f1 f1 f f b2")
-def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # type: ignore[no-untyped-def]
-    """Add to the `wanted` nodes, see `wanted_nodes`; return whether any was not wanted before. In each quadrant they
-    are below a staircase that only descends, away from the axis."""
-    i_axis, j_axis, (nu, nv) = np.argmin(np.abs(u)), np.argmin(np.abs(v)), inside.shape
-    added = False
-    for quadrant in range(4):
-        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
-        ends, height = np.full(nu + 1, np.inf), np.full(nu + 1, -np.inf)  # end and height of each step
-        for k in range(nu - 1, -1, -1):
-            i, height[k] = (k if i_side > 0 else nu - 1 - k), height[k + 1]
-            ends[k] = i_side * known_u[min(max(i + i_side * past, 0), nu - 1)]
-            for m in range(nv - 1, -1, -1):
-                j = m if j_side > 0 else nv - 1 - m
-                if inside[i, j]:
-                    height[k] = max(height[k], j_side * known_v[min(max(j + j_side * past, 0), nv - 1)])
-                    break
-        k, shifted, count = 0, 0, len(v) - j_axis if j_side > 0 else j_axis + 1
-        for i in range(i_axis, len(u) if i_side > 0 else -1, i_side):
-            while ends[k] < abs(u[i]):
-                k += 1
-            while ends[shifted] + margin_u < abs(u[i]):
-                shifted += 1
-            highest = max(height[shifted], height[k] + margin_v)
-            while count > 0 and abs(v[j_axis + j_side * (count - 1)]) > highest:
-                count -= 1
-            first = j_axis if j_side > 0 else j_axis + 1 - count
-            for j in range(first, first + count):
-                added |= not wanted[i, j]
-                wanted[i, j] = True
-    return added
+    """Add to the nodes `wanted` (nu, nv) those of `wanted_nodes`; return whether any was not wanted before. In each
+    quadrant they are below a staircase that only descends, away from the axis."""
+    before, (i, j) = int(wanted.sum()), (int(np.abs(s).argmin()) for s in (u, v))
+    if not near.inside.any():
+        wanted[:] = True
+        return before < wanted.size
+    for i_side, j_side in product((1, -1), (1, -1)):
+        inside = near.inside[::i_side, ::j_side]
+        ends, heights = (
+            side * known[::side][np.clip(np.arange(len(known)) + past, 0, len(known) - 1)]
+            for side, known in ((i_side, near.u), (j_side, near.v))
+        )
+        last = inside.shape[1] - 1 - inside[:, ::-1].argmax(axis=1)
+        steps = np.append(np.where(inside.any(axis=1), heights[last], -np.inf), -np.inf)
+        steps = np.maximum.accumulate(steps[::-1])[::-1]  # height of each step up to its end
+        along, across = np.abs(u[i::i_side]), np.abs(v[j::j_side])
+        here, shifted = np.searchsorted(ends, along), np.searchsorted(ends + margin[0], along)
+        highest = np.maximum(steps[shifted], steps[here] + margin[1])
+        wanted[i::i_side, j::j_side] |= across <= highest[:, None]
+    return int(wanted.sum()) > before
 
 
 @dataclass(frozen=True, eq=False)
