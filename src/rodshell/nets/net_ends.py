@@ -1,7 +1,6 @@
 """Where the lines of a net end on a target: runs of inside nodes, and the cuts between nodes."""
 
 from collections.abc import Sequence
-from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -109,18 +108,10 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
         depth: pieces that are nowhere further inside than this only graze the end and are ignored [m].
     """
     runs = _deep(target, sets, [_runs(lines.inside) for lines in sets], depth)
-    count = 2 * sum(len(run) for run in runs)
-    knots, points = np.empty((count, 4)), np.empty((count, 4, 3))
-    outer, inner = np.empty(count), np.empty(count)
-    stops = list(accumulate((2 * len(run) for run in runs), initial=0))
-    for (s, nodes, _), run, begin, stop in zip(sets, runs, stops, stops[1:], strict=False):
-        here = slice(begin, stop)
-        _around_ends(s, nodes, run, knots[here], points[here], outer[here], inner[here])
-    ends = _roots(target, knots, points, outer, inner).reshape(-1, 2)
-    return [
-        Cuts(run[:, 0].copy(), ends[begin // 2 : stop // 2])
-        for run, begin, stop in zip(runs, stops, stops[1:], strict=False)
-    ]
+    around = [_around_ends(lines, run) for lines, run in zip(sets, runs, strict=True)]
+    ends = _roots(target, *(np.concatenate(parts) for parts in zip(*around, strict=True))).reshape(-1, 2)
+    pieces = np.split(ends, np.cumsum([len(run) for run in runs])[:-1])
+    return [Cuts(run[:, 0].copy(), piece) for run, piece in zip(runs, pieces, strict=True)]
 
 
 def _runs(inside: Bools) -> Ints:
@@ -148,24 +139,18 @@ def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float)
     return kept
 
 
-@njit("f1 f3 i2 f2 f3 f1 f1")
-def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[no-untyped-def]
-    """Four nodes around both ends of each of the `runs` (k, 3): their places `knots` (2k, 4) and points `around`
-    (2k, 4, 3); and the places of the nodes between which the end is, `outer` and `inner` (2k,)."""
-    for e in range(len(outer)):
-        line, last = runs[e // 2, 0], e % 2 == 1
-        i = runs[e // 2, 2] if last else runs[e // 2, 1] - 1  # the cut is between nodes i and i + 1
-        outer[e], inner[e] = (s[i + 1], s[i]) if last else (s[i], s[i + 1])
-        window = min(max(i - 1, 0), len(s) - 4)
-        for shift in (-1, 1):  # near the net's limit, four nodes further inside
-            for k in range(window, window + 4):
-                if not np.isfinite(points[line, k, 0]):
-                    window = min(max(i - 1 + shift, 0), len(s) - 4)
-                    break
-        for k in range(4):
-            knots[e, k] = s[window + k]
-            for d in range(3):
-                around[e, k, d] = points[line, window + k, d]
+def _around_ends(lines: Lines, runs: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+    """Four nodes around both ends of each of the `runs` (k, 3): their places (2k, 4) and points (2k, 4, 3); and the
+    places (2k,) of the nodes outside and inside, between which the end is."""
+    s, most, line = lines.s, len(lines.s) - 4, runs[:, :1].repeat(2, axis=0)
+    last = np.tile([0, 1], len(runs))
+    i = runs[:, 1:].ravel() + last - 1  # the cut is between nodes i and i + 1
+    window = np.clip(i - 1, 0, most)
+    for shift in (-1, 1):  # near the net's limit, four nodes further inside
+        lost = ~np.isfinite(lines.points[line, window[:, None] + np.arange(4), 0]).all(axis=1)
+        window = np.where(lost, np.clip(i - 1 + shift, 0, most), window)
+    four = window[:, None] + np.arange(4)
+    return s[four], lines.points[line, four], s[i + last], s[i + 1 - last]
 
 
 def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: Floats) -> Floats:
