@@ -18,7 +18,7 @@ from rodshell.output.blanks import blanks_of
 from rodshell.output.drawing import FAMILIES
 from rodshell.output.drawings import drawing_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
-from rodshell.output.grid import joints_of, rods_of, shape_names
+from rodshell.output.grid import family_numbers, joints_of, rods_of, shape_names
 from rodshell.output.schedules import joints_table
 from rodshell.output.viewer import scene_of
 from rodshell.results.archive import Archive, read
@@ -129,6 +129,17 @@ def test_schedules_have_the_places_of_joints_and_no_flat_ones_of_a_shell_that_is
         scissors = {"/".join(load.rods): load.scissor_deg for load in archive.results.joint_loads["pinned"]}
         for joint, row in rows.items():
             assert float(row["scissor_deg"]) == pytest.approx(scissors[joint], abs=0.05)
+
+
+def test_families_of_a_lattice_are_named_in_the_result_and_coloured_in_drawings() -> None:
+    archive = kept(low())
+    families = [rod.family for rod in archive.results.rods]
+    assert {*families} == {"u", "v"}
+    assert [rod.id[0].lower() for rod in archive.results.rods] == families
+    assert {rod.offset for rod in archive.results.rods} == {None}  # on no line of the flat plan
+    crossed = {frozenset((rod.family, joint.other[0].lower())) for rod in archive.results.rods for joint in rod.joints}
+    assert all(len(pair) == 2 for pair in crossed)  # rods of a family do not cross
+    assert {*family_numbers(families)} == {0, 1}
 
 
 def test_a_result_is_kept_and_its_case_gives_it_again(tmp_path: Path) -> None:

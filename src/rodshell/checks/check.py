@@ -19,6 +19,7 @@ from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, St
 from rodshell.figures.findings import Said, said
 from rodshell.figures.records import Ends
 from rodshell.formfinding import PopUp
+from rodshell.formfinding.supports import figures_of
 from rodshell.joints.crossings import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.quantities import MOST_STAGES
@@ -189,7 +190,7 @@ def check(
         bending={
             ends: bending_of(shape.shell, shape.state, rod, shear_weight=shear_weight) for ends, shape in done.items()
         },
-        reactions={ends: reactions(shape.shell, shape.equilibrium) for ends, shape in done.items()},
+        reactions={ends: _held(shape) for ends, shape in done.items()},
         joints={ends: joint_loads(shape.shell, shape.state) for ends, shape in done.items()},
         contact={ends: contact_of(shape.shell, shape.state, rod) for ends, shape in done.items()},
         **_long_checks(popped, done, stages, progress),
@@ -227,6 +228,13 @@ def _settled(shape: PopUp) -> PopUp:
     last = shape.equilibrium
     found = find_equilibrium(last.problem, last.state, last.forces)
     return replace(shape, shell=shape.shell.with_elements(found.elements), equilibrium=found)
+
+
+def _held(shape: PopUp) -> Reactions:
+    """What the supports exert, and what they say of themselves."""
+    found = reactions(shape.shell, shape.equilibrium)
+    said_by = figures_of(shape.support, found.points - shape.boundary.points, found.forces)
+    return found.changed(figures=said_by) if said_by else found
 
 
 def _long_checks(

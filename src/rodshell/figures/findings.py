@@ -65,8 +65,8 @@ CODES = {
 Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
 GOOD = frozenset({
-    "assumed_class", "cables_short", "creep_unknown", "in_place", "lies_flat", "no_imperfections", "no_loads", "not_nested",
-    "stands", "stands_under_loads",
+    "assumed_class", "cables_short", "creep_unknown", "in_place", "lies_flat", "no_imperfections", "no_loads",
+    "not_nested", "stands", "stands_under_loads",
 })  # fmt: skip
 FAULTS = frozenset({
     "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",

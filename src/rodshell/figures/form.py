@@ -305,10 +305,10 @@ class RodLine(Record):
 
     id: Text = Field(description="name of the rod")
     family: Text = Field(
-        description='"u" runs along x at y = offset, "v" along y at x = offset; "first", "second", "third": of a '
-        'lattice along curves of the target; "free": given one by one, in a table or by lines'
+        description='rods that do not cross each other: "u" along x at y = offset, "v" along y at x = offset; without '
+        'an offset "u", "v", "w" along curves of the target; "free": of a table or along lines that are given'
     )
-    offset: Number = key("place of the rod's line across its family", "m")
+    offset: Number = key("place of the rod's line across its family; null: it is on no line of a straight lattice", "m")
     start: Real = Field(description="material coordinate of the start, from the layout's middle [m]")
     end: Real = Field(description="material coordinate of the end [m]")
     length: Number = key("length between the supports", "m")

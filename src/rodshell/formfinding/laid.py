@@ -122,8 +122,8 @@ def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
     curves, lattice, reach = net.curves, net.lattice, net.curves.reach
     of, ends = curves.pieces
     lines, rods = list[FlatRod](), list[FlatRod]()
-    for k, (name, family, (start, stop)) in enumerate(zip(net.names, net.families, reach.tolist(), strict=True)):
-        line = FlatRod(name, family, 0.0, start, stop, (0.0, lattice.least_spacing * k), (1.0, 0.0))
+    for k, (name, (start, stop)) in enumerate(zip(net.names, reach.tolist(), strict=True)):
+        line = FlatRod(name, net.families[k], None, start, stop, (0.0, lattice.least_spacing * k), (1.0, 0.0))
         lines.append(line._replace(curve=_at_rest(net, k)))
         pieces = ends[of == k].tolist()
         named = zip(piece_names(name, len(pieces)), pieces, strict=True)

@@ -27,8 +27,8 @@ from rodshell.formfinding.trim import (
     trim,
     untrimmed,
 )
+from rodshell.geometry.curves import on_curve
 from rodshell.joints import Ball, Joint, require_joint
-from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, GridMesh, Layout, mesh_grid
 from rodshell.layout.flatgrid import TOGETHER
 from rodshell.layout.lattices import EDGES_A_SPAN
@@ -100,28 +100,11 @@ def agreement(popped: PopUp, target: Target) -> Agreement:
 
 def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     """(e, 3) points of the rods halfway along each edge, on the cubic through the nearest nodes of the rod."""
-    return np.asarray(_edge_middles(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
-
-
-@njit("f2 i1 i1 i1 f1")
-def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
-    result, edge = np.zeros((len(rod_nodes) - len(rod_start), 3)), 0
-    for rod in range(len(rod_start)):
-        start, stop = rod_start[rod], rod_stop[rod]
-        count = min(stop - start, 4)
-        for entry in range(start, stop - 1):
-            middle = 0.5 * (stations[entry] + stations[entry + 1])
-            first = min(max(entry + 1 - count // 2, start), stop - count)
-            for j in range(first, first + count):
-                above, below = 1.0, 1.0
-                for k in range(first, first + count):
-                    if j != k:
-                        above, below = above * (middle - stations[k]), below * (stations[j] - stations[k])
-                weight = above / below
-                for axis in range(3):
-                    result[edge, axis] += weight * positions[rod_nodes[j], axis]
-            edge += 1
-    return result
+    middles = list[Floats]()
+    for k in range(len(mesh.rod_start)):
+        s = mesh.stations[mesh.rod_slice(k)]
+        middles.append(on_curve(s, positions[mesh.nodes_of(k)], 0.5 * (s[:-1] + s[1:])))
+    return np.concatenate(middles)
 
 
 @dataclass(frozen=True)

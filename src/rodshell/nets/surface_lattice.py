@@ -20,7 +20,7 @@ from rodshell.targets import Target
 from rodshell.units import length_text
 
 FAMILIES = "uvw"
-PLACES = 24  # on an outermost rod at which room beside it is looked for
+PLACES = 24  # on an outermost rod at which room next to it is looked for
 MOVED = 1e-3  # of the size: lines that lie further off the target are said to be moved
 
 
@@ -148,10 +148,10 @@ def _trace_all(target: Target, law: Law, families: list[_Family]) -> SurfaceCurv
 
 
 def _fill_corners(target: Target, law: Law, families: list[_Family], rods: SurfaceCurves) -> bool:
-    """Add rods on both sides of families, where the target goes on beside the curves that set them out.
+    """Add rods on both sides of families, where the target continues next to the curves that set them out.
 
-    Along each part of an outermost rod that has room beside it, a rod is laid a spacing away, where there is most. One
-    that is shorter than two spacings is none.
+    Along each part of an outermost rod that has room next to it, a rod is laid a spacing away, where there is most. One
+    that is shorter than two spacings is left out.
 
     Args:
         rods: of the families, one after the other.

@@ -347,7 +347,7 @@ def _line(ends: Floats) -> FlatRod:
     along = ends[1] - ends[0]
     length = float(np.hypot(*along))
     (x, y), (dx, dy) = ends[0].tolist(), (along / length).tolist()
-    return FlatRod("", "free", 0.0, 0.0, length, (x, y), (dx, dy))
+    return FlatRod("", "free", None, 0.0, length, (x, y), (dx, dy))
 
 
 def opens(outline: Floats) -> bool:

@@ -280,8 +280,11 @@ def checks_table(results: Results) -> dict[str, Any] | None:
     met = results.contact
     near = [met.of("deployment" if column == stages else column) for column in columns] if met else []
     rows += _side_by_side(_CLEARANCE, [found or Clearance() for found in near], rounding)
-    held = {str(end): reactions for end, reactions in results.reactions.items()}
-    rows += _side_by_side(_REACTIONS, [held.get(column) or Reactions() for column in columns], rounding)
+    held = [results.reactions.get(column) or Reactions() for column in columns]
+    rows += _side_by_side(_REACTIONS, held, rounding)
+    for name in dict.fromkeys(name for each in held for name in each.figures):
+        said = [wording.figure(*each.figures.get(name, (None, "")), rounding) for each in held]
+        rows.append((name[:1].upper() + name[1:], said))
     deployment = f"deployment above {whole_percent(unknown)}" if unknown else "deployment"
     heads = [deployment if column == stages else column for column in columns]
     return {"columns": heads, "rows": rows} if rows else None

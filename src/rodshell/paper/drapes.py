@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Floats
 from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
 from rodshell.formfinding.methods import MethodName
 from rodshell.formfinding.trim import ends_past_net
 from rodshell.layout import FlatGrid
+from rodshell.output.drawing import FAMILIES
 from rodshell.output.svg import label, tag
 from rodshell.paper.figure import (
     CASES,
-    FAMILY,
     FINAL,
     FLAT,
     HEIGHT,
@@ -41,7 +41,7 @@ from rodshell.results.wording import nice_ticks
 
 FALL = Fall(height=HEIGHT)  # shared DOFs: the paper's *mapping*
 METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")
-_METHOD_COLOURS = {"paper": FAMILY["v"], "gravity": FAMILY["u"], "bound": FLAT}
+_METHOD_COLOURS = {"paper": FAMILIES[1], "gravity": FAMILIES[0], "bound": FLAT}
 WORDS = {"paper": "paper's, in time", "gravity": "gravity statics", "bound": "bound to the target"}
 COLUMNS = (
     "target", "rods", "method", "unknowns", "time [s]", "ends off the net, max [mm]", "rms [mm]", "how it rests",
@@ -182,16 +182,12 @@ def _differences_svg(drapes: Sequence[DrapeRun]) -> str:
         same = [run for run in drapes if run.case.label == name and run.draped.converged]
         drawn = [(WORDS[run.method], _METHOD_COLOURS[run.method], 1e3 * run.errors) for run in same]
         if (sought := _sought(same[0])) is not None:
-            along = np.abs(np.where(_along_u(same[0]), sought[:, 0], sought[:, 1]))
+            rods = same[0].trimmed.mesh.grid.rods
+            along = np.abs((sought * np.repeat([rod.direction for rod in rods], 2, axis=0)).sum(axis=1))
             drawn.append(("genetic algorithm", FINAL, 1e3 * (along - np.abs(same[0].net.ravel()))))
         offsets = 1e3 * np.repeat([rod.offset for rod in same[0].trimmed.mesh.grid.rods], 2)
         panels.append((f"({name})  {same[0].case.target.name}", list(_scatter(offsets, drawn))))
     return rows_of_panels([("Rod ends past those of the exact net [mm], against the offset of their rod [mm]", panels)])
-
-
-def _along_u(run: DrapeRun) -> Bools:
-    """(2m,) whether the ends are those of rods along x."""
-    return np.repeat([rod.family == "u" for rod in run.trimmed.mesh.grid.rods], 2)
 
 
 def _scatter(x: Floats, drawn: Sequence[tuple[str, str, Floats]]) -> Iterator[str]:
@@ -233,9 +229,7 @@ def _sought(run: DrapeRun) -> Floats | None:
 
 def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:
     """(2m, 2) ends of rods (m, 2) in the plane of the flat grid [m]."""
-    along, across = ends.ravel(), np.repeat([rod.offset for rod in grid.rods], 2)
-    of_u = np.repeat([rod.family == "u" for rod in grid.rods], 2)
-    return np.column_stack([np.where(of_u, along, across), np.where(of_u, across, along)])
+    return np.vstack([rod.point(cuts) for rod, cuts in zip(grid.rods, ends, strict=True)])
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ from scipy.spatial import ConvexHull
 
 from rodshell.arrays import Bools, Floats
 from rodshell.layout import GridLayout, GridMesh
+from rodshell.output.drawing import FAMILIES
+from rodshell.output.grid import family_numbers
 from rodshell.output.pictures import RIGHT, TOWARDS, UP
 from rodshell.output.schedules import csv_text
 from rodshell.output.svg import document, label, number, tag
@@ -64,7 +66,6 @@ WIDE_CASES = (
 
 
 PAPER, INK, SOFT, _BODY = "#fdfdfb", "#22282f", "#7b838a", "#e2dccd"
-FAMILY = {"u": "#1f5f8b", "v": "#a8552a"}
 FLAT, FINAL = "#2f8f4e", "#8a3fa0"  # G0, G
 PANEL, GAP, HEAD, TEXT = 230.0, 16.0, 40.0, 12.0  # drawing units
 TARGET_COLOURS = {"hemisphere": "#1f5f8b", "paraboloid": "#a8552a", "ellipsoid": "#2f8f4e"}
@@ -135,14 +136,15 @@ def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attribute
         at: (n, 2) points of its nodes in the drawing.
         near: (n,) bool, nodes in front; None: all.
     """
-    for k, rod in enumerate(mesh.grid.rods):
+    families = family_numbers(rod.family for rod in mesh.grid.rods)
+    for k in range(len(mesh.grid.rods)):
         nodes = mesh.nodes_of(k)
         seen = np.ones(len(nodes) - 1, dtype=bool) if near is None else near[nodes[1:]] & near[nodes[:-1]]
         changes = [0, *(np.flatnonzero(seen[1:] != seen[:-1]) + 1).tolist(), len(seen)]
         for first, last in pairwise(changes):
             shade = {} if seen[first] else {"stroke_opacity": FAR}
             yield tag(
-                "polyline", points=joined(at[nodes[first : last + 1]]), fill="none", stroke=FAMILY[rod.family],
+                "polyline", points=joined(at[nodes[first : last + 1]]), fill="none", stroke=FAMILIES[families[k]],
                 stroke_width=0.8, stroke_linejoin="round", **shade, **attributes,
             )  # fmt: skip
 

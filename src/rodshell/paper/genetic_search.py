@@ -21,8 +21,7 @@ from rodshell.formfinding import Stages, agreement, pop_up
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
-from rodshell.layout.flatgrid import Family
-from rodshell.layout.gridlayout import require_chebyshev
+from rodshell.layout.gridlayout import FAMILIES, require_chebyshev
 from rodshell.layout.mesh import CROWDED
 from rodshell.paper.figure import ROD
 from rodshell.paper.genetic_records import GAIN, Evaluate, Generation, Judged, StoredValues, gain
@@ -82,7 +81,7 @@ class Design:
     def footprint(self, variables: Floats) -> Footprint:
         """The flat grid of `variables` (n,), meshed as by the direct method: a node at every line of the lattice."""
         reach = variables[self.orbit].reshape(-1, 2)
-        middles = [self.layout.middle(line.family) for line in self.lines]
+        middles = [self.layout.middle(line) for line in self.lines]
         rods = [
             line.cut(middle - before, middle + after)
             for line, middle, (before, after) in zip(self.lines, middles, reach.tolist(), strict=True)
@@ -92,8 +91,8 @@ class Design:
 
     def _lattice(self, rod: FlatRod) -> list[float]:
         """Positions along a rod at which the lattice's lines cross it, without those too near its ends [m]."""
-        across: Family = "v" if rod.family == "u" else "u"
-        step, first = self.layout.spacing[0 if across == "u" else 1], self.layout.phase(across)
+        across = 1 - FAMILIES.index(rod.family)
+        step, first = self.layout.spacing[across], self.layout.phase(across)
         clear = CROWDED * self.layout.edge
         low, high = np.ceil((rod.start + clear - first) / step), np.floor((rod.end - clear - first) / step)
         return [first + step * k for k in range(int(low), int(high) + 1)]
@@ -187,7 +186,7 @@ def _orbits(target: Target, lines: tuple[FlatRod, ...], points: Floats) -> Ints:
     """
     plan, size = points[:, :2] - target.summit, target.size
     orbit = np.arange(len(points))
-    offsets = np.repeat([abs(line.offset) for line in lines], 2)
+    offsets = np.abs(np.repeat([line.offset for line in lines], 2))
     for turn in _SQUARE:
         apart = np.linalg.norm((plan @ turn.T)[:, None] - plan[None], axis=2)
         image = apart.argmin(axis=1)

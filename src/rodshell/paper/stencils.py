@@ -14,8 +14,9 @@ from rodshell.joints import Coupling, ImplicitPenalty, Linker, SharedDofs
 from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell
 from rodshell.model.elastic_rod import ElasticRod
+from rodshell.output.drawing import FAMILIES
 from rodshell.output.svg import label, tag
-from rodshell.paper.figure import FAMILY, FINAL, FLAT, INK, PANEL, ROD, SOFT, Figure, joined, rows_of_panels
+from rodshell.paper.figure import FINAL, FLAT, INK, PANEL, ROD, SOFT, Figure, joined, rows_of_panels
 from rodshell.progress import Progress
 from rodshell.rods.elements import is_bends
 from rodshell.targets import Hemisphere
@@ -91,7 +92,7 @@ def _rod(rod: ElasticRod) -> Iterator[str]:
     nodes = 0.5 * PANEL + 0.42 * PANEL * np.column_stack([np.sin(turn) / np.sin(0.9), 1.2 - 1.6 * np.cos(turn)])
     drawn = dict(enumerate(nodes)) | {NODES + k: (nodes[k] + nodes[k + 1]) / 2 for k in range(NODES - 1)}
     yield _line(nodes, INK, 1.2)
-    yield _line(np.array([drawn[block] for block in rod.elements[0].blocks[1]]), FAMILY["u"], 3.5)
+    yield _line(np.array([drawn[block] for block in rod.elements[0].blocks[1]]), FAMILIES[0], 3.5)
     for block, at in drawn.items():
         node, number = block < NODES, block % NODES + 1
         yield from _mark(at, f"x{number}" if node else f"\N{GREEK SMALL LETTER THETA}{number}", INK, hollow=not node)
@@ -106,12 +107,12 @@ def _element(shell: Shell) -> Iterator[str]:
         yield _line(np.array([drawn[block] for block in blocks[::2]]), FLAT, 3.0 if apart else 8.0, stroke_opacity=0.6)
         for k, block in enumerate(blocks[::2] if apart else ()):
             yield from _mark(drawn[block], f"x^{number + 1},{k + 1}", FLAT)
-    for rod, family in enumerate("uv"):
+    for rod in (0, 1):
         blocks = shell.node_blocks[rod * NODES : (rod + 1) * NODES]
-        yield _line(np.array([drawn[block] for block in blocks.tolist()]), FAMILY[family], 1.6)
+        yield _line(np.array([drawn[block] for block in blocks.tolist()]), FAMILIES[rod], 1.6)
         for k, block in enumerate(blocks.tolist()):
             yield from _mark(
-                drawn[block], f"x{rod + 1},{k + 1}" if apart or k != 2 else "joint" if rod else "", FAMILY[family]
+                drawn[block], f"x{rod + 1},{k + 1}" if apart or k != 2 else "joint" if rod else "", FAMILIES[rod]
             )
     for element in shell.between:
         for a, b in element.blocks.tolist():

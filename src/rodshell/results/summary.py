@@ -16,9 +16,11 @@ from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict
 from rodshell.results.wording import (
     NAMES,
     case_rows,
+    figure,
     percent,
     rounded,
     rounded_down,
+    rounding_of,
     share_of_weight,
     shown_factor,
     shown_length,
@@ -268,6 +270,8 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
         yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N unloaded; sums of {sums}"
+        if said := [f"{name} {figure(*each, rounding_of(results))}" for name, each in held.figures.items()]:
+            yield f"  support   {ends:<8}{'; '.join(said)}"
 
 
 def _loads(results: Results, length: Length) -> Iterator[str]:

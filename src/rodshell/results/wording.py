@@ -173,6 +173,15 @@ stress = stress_text
 seconds, degrees = "{:.2f} s".format, "{:.1f}\N{DEGREE SIGN}".format
 
 
+def figure(value: float | None, unit: str, rounding: Rounding = EXACT) -> str:
+    """A value in an SI unit, in the unit in which texts show it."""
+    if value is None:
+        return UNKNOWN
+    if unit == "m":
+        return millimetres(value, rounding=rounding)
+    return stress(value) if unit == "Pa" else f"{rounded(value)} {unit}".rstrip()
+
+
 def small(value: float | None) -> str:
     """A number of which the power of ten matters."""
     return UNKNOWN if value is None else f"{value:.1e}"
