@@ -545,8 +545,9 @@ def test_ends_in_the_air_are_counted_with_what_must_hold_them() -> None:
     found = verdict(changed(*shell))
     assert found.level == "check"
     assert found.headline.startswith(
-        "Check, unloaded: 2 of 4 rod ends lie up to 500 mm above the lowest: where they do not stand on the ground, an "
-        "edge beam, an arch or a ring has to hold them against forces of up to 5 N each, before own weight and loads act"
+        "Check, unloaded: 2 of 4 rod ends lie up to 500 mm above the lowest: where they do not stand on the ground, "
+        "an edge beam, an arch or a ring has to hold them against forces of up to 5 N each, before own weight and "
+        "loads act"
     )
     loads = {"winter": {"clamped": WINTER["winter"]["clamped"] | {"support_forces": forces[::-1]}}}
     assert in_the_air(changed(*shell, ("loads", loads))) == EndsInTheAir(count=2, highest=0.5, largest_force=900.0)
