@@ -159,3 +159,19 @@ def test_triangles_are_divided_the_same_without_the_compiler() -> None:
         [sys.executable, "-m", "pytest", "-q", *here], env=environment, capture_output=True, text=True, check=False
     )
     assert ran.returncode == 0, ran.stdout
+
+
+@pytest.mark.slow
+def test_areas_of_a_folded_roof_reach_across_its_crease() -> None:
+    """Two planes bent a little, in patches: off by the triangles at the crease, whose normals are those of one side."""
+    x, y = np.meshgrid(np.linspace(-4, 4, 41), np.linspace(-3, 3, 41))
+    index = np.arange(41 * 41).reshape(41, 41)
+    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
+    vertices = np.column_stack([x.ravel(), y.ravel(), (3 - 0.5 * abs(x) - 0.03 * y**2).ravel()])
+    roof = rs.Freeform.of(vertices, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]))
+    rod = rs.Rod(rs.Tube(radius=0.01, thickness=0.002), rs.Material(23e9, 1850, 0.3))
+    form = rs.find_form(roof, rs.GridLayout.orthogonal(spacing=0.8), rod, seams=[[(0, -4), (0, 4)]], ends=())
+    areas, turn = tributary_of(form.stages), np.linspace(-3, 3, 2001)
+    expected = 8 * np.trapezoid(np.sqrt(1.25 + (0.06 * turn) ** 2), turn)
+    assert areas.area.sum() == pytest.approx(expected, rel=5e-4)
+    assert areas.plan.sum() == pytest.approx(48.0, rel=1e-6)
