@@ -24,7 +24,7 @@ from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import Layout
 from rodshell.layout.cells import Pattern
-from rodshell.loads.check import LoadChecks, check_shells, unchecked
+from rodshell.loads.check import LoadChecks, check_shells, tributary_of, unchecked
 from rodshell.loads.combinations import Loads
 from rodshell.loads.strength import net_factors
 from rodshell.output.files import save, wanted_kinds
@@ -386,6 +386,8 @@ class Form:
         flat = self.flat_state
         stages = self.options.stages if flat is None or flat.lies_flat else 0  # else it is assembled in place
         settings: dict[str, Any] = {"stages": stages, "shear_weight": self._weight(self.options)}
+        if self.popped and not self.from_table:
+            settings["plan"] = tributary_of(self.stages).plan
         return check(self.stages.popped, self.rod, **settings, progress=progress)
 
     @property

@@ -65,11 +65,13 @@ def test_the_command_that_a_verdict_gives_leads_to_a_shell_with_the_reserve(
     thin = ["--rod.section.radius", "7.6 mm", "--rod.section.thickness", "1.42 mm"]
     assert main(["form", "pavilion", *thin, *coarse, "--out", "a thin one"]) == 0
     first, *_ = capsys.readouterr().out.splitlines()
-    assert first.startswith("pavilion: Check: the shell carries only 1.05 times its own weight with pinned ends")
+    assert first.startswith(
+        "pavilion: Check, unloaded: the shell carries only 1.05 times its own weight with pinned ends"
+    )
     command = shlex.split(first[first.rindex("(") + 1 : -1])
     assert command[:3] == ["rodshell", "form", str(folder / "a thin one" / "case.toml")]
     assert main([*command[1:], "--only", "csv", "--out", "next"]) == 0
-    assert capsys.readouterr().out.startswith("pavilion: Good: with pinned and clamped ends")
+    assert capsys.readouterr().out.startswith("pavilion: Good, unloaded: with pinned and clamped ends")
 
 
 @pytest.mark.slow

@@ -17,12 +17,13 @@ from rodshell.layout.cells import diagonals
 from rodshell.loads.bracing import outer_nodes, stressed
 from rodshell.loads.check import LoadedShell, _load, mechanism, tributary_of
 from rodshell.loads.laths import laid
+from rodshell.loads.nodes import LoadedNodes
 from rodshell.loads.strength import area_of, preset_limits
 from rodshell.loads.structure import Structure
-from rodshell.loads.tributary import LoadedNodes, Tributary
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load_path import load_path
 from rodshell.solve.modes import linear_buckling
+from rodshell.targets.tributary import Tributary
 from tests.loads.shells import LARCH, ROPE, TUBE, grid, one, shell
 
 

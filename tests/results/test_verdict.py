@@ -97,10 +97,11 @@ def test_a_result_without_fault_is_good_and_says_what_was_not_checked() -> None:
     found = verdict(changed())
     assert found.level == "good"
     assert found.headline == (
-        "Good: with pinned and clamped ends the shell is stable and carries at least 3 times its own weight, 1.5 being "
-        "asked for; the gap to the target is at most 1.5 % with pinned ends and 0.1 % with clamped ends, of its size"
+        "Good, unloaded: with pinned and clamped ends the shell is stable and carries at least 3 times its own weight, "
+        "1.5 being asked for; the gap to the target is at most 1.5 % with pinned ends and 0.1 % with clamped ends, of "
+        "its size"
     )
-    assert "(snow, wind, people) and imperfections were not checked" in found.reasons[-1]
+    assert "other loads (wind, drifts, people) and imperfections were not checked" in found.reasons[-1]
 
 
 @pytest.mark.parametrize("fault", [
@@ -370,8 +371,8 @@ def test_a_weight_that_one_shell_carries_does_not_lead_before_what_both_suffer()
     assert "break" in verdict(changed(LIGHT[0], *both)).headline
     alone = verdict(changed(LIGHT[0], *DETAILS))
     assert alone.headline == (
-        "Check: with pinned ends the shell does not stand under its own weight: it carries only 10 % of it; with "
-        "clamped ends it carries over 100 times its own weight"
+        "Check, unloaded: with pinned ends the shell does not stand under its own weight: it carries only 10 % of it; "
+        "with clamped ends it carries over 100 times its own weight"
     )
 
 
@@ -596,8 +597,9 @@ def test_ends_in_the_air_are_counted_with_what_must_hold_them() -> None:
     found = verdict(changed(*shell))
     assert found.level == "check"
     assert found.headline.startswith(
-        "Check: 2 of 4 rod ends lie up to 500 mm above the lowest: where they do not stand on the ground, an edge beam"
-        ", an arch or a ring has to hold them against forces of up to 5 N each, before own weight and loads act"
+        "Check, unloaded: 2 of 4 rod ends lie up to 500 mm above the lowest: where they do not stand on the ground, "
+        "an edge beam, an arch or a ring has to hold them against forces of up to 5 N each, before own weight and "
+        "loads act"
     )
     loads = {"winter": {"clamped": WINTER["winter"]["clamped"] | {"support_forces": forces[::-1]}}}
     assert in_the_air(changed(*shell, ("loads", loads))) == EndsInTheAir(count=2, highest=0.5, largest_force=900.0)

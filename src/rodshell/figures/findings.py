@@ -28,7 +28,7 @@ CODES = {
     "low_stiffness": "with the modulus that a code asks for, the shell falls under a combination of loads",
     "needs_bracing": "without its bracing the shell does not carry its own weight",
     "no_imperfections": "imperfections were not looked at",
-    "no_loads": "loads other than the own weight were not checked",
+    "no_loads": "loads other than the own weight and even snow were not checked",
     "no_mass": "no mass was given",
     "no_room": "rods pass each other so near that there is hardly any room for joints",
     "no_shear_strength": "torsion counts, and the shear strength of timber or a fibre composite was not given",

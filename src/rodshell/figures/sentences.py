@@ -63,8 +63,8 @@ SENTENCES = {
         "looked at ({offer})"
     ),
     "no_loads": (
-        "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
-        "people) and imperfections were not checked{creep}"
+        "stresses and support forces are those of the unloaded shell{snow}; other loads (wind, drifts, people) and "
+        "imperfections were not checked{creep}"
     ),
     "no_mass": (
         "no mass was given, so that it is not known what share of its own weight the shell carries: give "

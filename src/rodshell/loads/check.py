@@ -31,10 +31,10 @@ from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, Settlement, Temperature
 from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
+from rodshell.loads.nodes import LoadedNodes
 from rodshell.loads.settings import Cables, Laths
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
 from rodshell.loads.structure import NO_PAIRS, Structure
-from rodshell.loads.tributary import LoadedNodes, Tributary, tributary_areas
 from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import Duration
 from rodshell.solve.equilibrium import Equilibrium
@@ -42,6 +42,7 @@ from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.modes import LinearBuckling, linear_buckling, softest_motion
+from rodshell.targets.tributary import Tributary, tributary_areas
 from rodshell.units import shown
 
 BRACED: dict[type, Callable[..., Structure]] = {Cables: stressed, Laths: laid}

@@ -358,7 +358,11 @@ def _weight_rows(results: Results, ends: Sequence[Ends], rounding: Rounding) -> 
     whose = "the weakest patch, its seam held," if results.patches else "it"
     deflection = (("Largest deflection under its own weight", "deflection", wording.millimetres),)
     weights = [weight or SelfWeight() for weight in found]
-    return [(f"Own weight that {whose} carries", shares), *_side_by_side(deflection, weights, rounding)]
+    rows = [(f"Own weight that {whose} carries", shares), *_side_by_side(deflection, weights, rounding)]
+    if results.snow:
+        snow = [wording.snow_text(results.snow[end]) if end in results.snow else wording.UNKNOWN for end in ends]
+        rows.append(("Even snow on the plan that it carries on top, unbraced", snow))
+    return rows
 
 
 def _listed(record: Record | None, listed: tuple[Entry, ...], rounding: Rounding) -> list[Row]:

@@ -67,6 +67,7 @@ def checked_results(
         reactions=dict(checks.reactions),
         joint_loads={ends: loads.records(mesh.grid) for ends, loads in checks.joints.items()},
         self_weight=dict(checks.self_weight),
+        snow=dict(checks.snow),
         contact=Contact(**checks.contact, **({"deployment": stage} if (stage := checks.closest_stage) else {})),
         other_shapes=dict(checks.other_shapes),
         fabrication=fabricated.changed(total_mass=(fabricated.total_mass or 0.0) + len(mesh.grid.crossings) * joint),

@@ -21,6 +21,7 @@ from rodshell.figures.records import (
     FARTHEST,
     SHORTEST,
     ByEnds,
+    Flag,
     Flat,
     Number,
     Point,
@@ -86,13 +87,14 @@ class Verdict(Record, metaclass=_Refusing):
         'checked first; "unbuildable": no end condition gives a shell that can be built; "unknown": no shell was '
         "computed, as where the computation did not converge, or one that might be built was not"
     )
+    unloaded: Flag | None = key("true: of no loads but the shell's own weight; absent where loads were checked")
     reasons: Annotated[tuple[Text, ...], FailFast()] = Field(min_length=1, description="sentences, the gravest first")
     findings: Rows[Finding] = rows("what each of these sentences says, as data; empty in results of earlier versions")
 
     @property
     def headline(self) -> str:
-        """The first sentence, after the level in words."""
-        return f"{LEVELS[self.level]}: {self.reasons[0]}"
+        """The first sentence, after the level in words; of a shell without loads these say that it is unloaded."""
+        return f"{LEVELS[self.level]}{', unloaded' if self.unloaded else ''}: {self.reasons[0]}"
 
 
 # The whole
@@ -135,6 +137,9 @@ class Results(Record, metaclass=_Refusing):
     joint_loads: ByEnds[Rows[checks.JointLoad]] = by_ends("what acts at the joints")
     ends_in_the_air: checks.EndsInTheAir | None = key("rod ends that may not stand on the ground")
     self_weight: ByEnds[checks.SelfWeight] = by_ends("how much of its own weight the shell carries")
+    snow: ByEnds[Number] = by_ends(
+        "uniform snow on the plan that the unbraced shell carries on top of its weight [Pa]; null: above 10 kPa"
+    )
     strength: DesignStrength | None = key("design strengths, by which the rods are judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
     deployment: checks.Deployment | None = key("the shell from flat to popped up")

@@ -25,6 +25,7 @@ from rodshell.results.wording import (
     shown_factor,
     shown_length,
     small,
+    snow_text,
     stress,
     whole_percent,
 )
@@ -266,6 +267,8 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
         if weighed.braced_limit is not None:
             braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
             line += f"; with bracing: {share_of_weight(braced)}"
+        if ends in results.snow:
+            line += f"; even snow on top of it: {snow_text(results.snow[ends])}"
         yield line
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"

@@ -35,6 +35,7 @@ from rodshell.results.wording import (
     rounded_down,
     rounding_of,
     shown_factor,
+    snow_text,
     whole_percent,
 )
 from rodshell.rods.design_strength import RESERVED
@@ -79,10 +80,10 @@ def verdict(results: Results) -> Verdict:
     grave = [sentence for ends in in_order for sentence in faults[ends]] + deployment + [*_erection(results)]
     if results.target and results.target.flat:
         warned = [word for word in results.warnings if word.startswith(FLAT)]
-        return _verdict("unbuildable", [Said(word, said("flat").finding) for word in warned or [FLAT]])
+        return _verdict(results, "unbuildable", [Said(word, said("flat").finding) for word in warned or [FLAT]])
     failed = [] if results.status == CONVERGED else [said("not_computed", status=results.status)]
     if not shells:
-        return _verdict("unknown", failed or [said("not_computed: nothing")])
+        return _verdict(results, "unknown", failed or [said("not_computed: nothing")])
     best = _best(results, usable)
     off = 0.0 if best is None else best[1].max_relative or 0.0
     far = [_off(results, *best)] if best is not None and off > OFF else []
@@ -97,14 +98,14 @@ def verdict(results: Results) -> Verdict:
     ]  # fmt: skip
     standing, in_doubt = set(usable) - falling(results), none_stands(results, usable, lost)
     if lost and not standing and not deployment:
-        return _verdict("unknown", [*failed, *in_doubt, *to_check])
+        return _verdict(results, "unknown", [*failed, *in_doubt, *to_check])
     if not standing or deployment or off > FAR_OFF:
-        return _verdict("unbuildable", to_check)
+        return _verdict(results, "unbuildable", to_check)
     if in_doubt:
-        return _verdict("unknown", [*in_doubt, *to_check])
+        return _verdict(results, "unknown", [*in_doubt, *to_check])
     if to_check:
-        return _verdict("check", [*to_check, *_flat(results), *_assumed(results)])
-    return _verdict("good", [*_merits(results, usable), *_flat(results), *_assumed(results)])
+        return _verdict(results, "check", [*to_check, *_flat(results), *_assumed(results)])
+    return _verdict(results, "good", [*_merits(results, usable), *_flat(results), *_assumed(results)])
 
 
 def unknown_below(results: Results) -> float:
@@ -126,7 +127,7 @@ def facts(results: Results) -> list[str]:
     return [*_gaps(results), *_strength(results)]
 
 
-def _verdict(level: Level, reasons: Iterable[Said]) -> Verdict:
+def _verdict(results: Results, level: Level, reasons: Iterable[Said]) -> Verdict:
     """Each reason once, with what it says in figures; what rules out one shell is less grave where another stands."""
     once = dict[str, Finding]()
     for each in reasons:
@@ -134,7 +135,10 @@ def _verdict(level: Level, reasons: Iterable[Said]) -> Verdict:
         far = finding.code == "off_target" and (finding.figure or 0.0) > FAR_OFF
         alone = "unbuildable" if far else level_of(finding.code)
         once.setdefault(str(each), finding.changed(level=min(alone, level, key=RANKS.index)))
-    return Verdict(level=level, reasons=tuple(once), findings=tuple(once.values()))
+    stands_alone = level in ("good", "check") and not results.loads
+    return Verdict(
+        level=level, unloaded=stands_alone or None, reasons=tuple(once), findings=tuple(once.values())
+    )  # fmt: skip
 
 
 def _status(shell: PopUp | None) -> str:
@@ -471,7 +475,12 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
     )  # fmt: skip
     if not results.loads:
         known = results.strength is not None and results.strength.creep is not None
-        yield said("no_loads", creep="" if known else ", nor creep, which is not known of these rods")
+        snow = [f"{snow_text(results.snow[ends])} with {ends} ends" for ends in usable if ends in results.snow]
+        yield said(
+            "no_loads",
+            snow=f"; on top of its weight it carries even snow up to {' and '.join(snow)}" if snow else "",
+            creep="" if known else ", nor creep, which is not known of these rods",
+        )
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)

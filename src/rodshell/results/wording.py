@@ -152,6 +152,11 @@ def share_of_weight(found: SelfWeight) -> str:
     return f"at least {share}, unknown above" if found.limit == "not followed" else share
 
 
+def snow_text(found: float | None) -> str:
+    """How much snow a shell carries [Pa], never shown as more."""
+    return "10 kN/m2 or more" if found is None else f"{rounded_down(1e-3 * found)} kN/m2"
+
+
 def part_of_weight(factor: float) -> str:
     """A load factor below 1 as a percentage, never as 100 %."""
     return percent(factor) if factor < 0.995 else f"{rounded_down(100 * factor)} %"

@@ -44,6 +44,8 @@ def _checked(archive: Archive) -> Figures:
             rows.append((f"utilisation, {shape}, unloaded", wording.percent(bent.utilisation)))
     for ends, weight in results.self_weight.items():
         rows.append((f"carries, {ends}", wording.share_of_weight(weight)))
+    for ends, snow in results.snow.items():
+        rows.append((f"even snow on top, {ends}", wording.snow_text(snow)))
     return rows + _refinement(archive) + _loads(archive)
 
 
