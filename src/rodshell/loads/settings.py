@@ -175,7 +175,7 @@ class Strength:
         "of timber: 1 inside, 2 covered (default), 3 in the weather",
     ] = None
     relaxed: Annotated[
-        Share | None, "of timber: share of the unloaded shell's stress that is gone after months; default: none is"
+        Share | None, "share of timber's unloaded stress that is gone after months"
     ] = None  # fmt: skip
     hole: Annotated[Distance, "diameter of the bolts' holes through the rods at joints"] = 0.0
     slip: Annotated[Force | None, "axial force that a joint transfers before it slips"] = None
