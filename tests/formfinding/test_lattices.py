@@ -449,6 +449,9 @@ def test_strips_of_a_saddle_cross_by_slots_unless_they_are_pinned() -> None:
     assert pinned.results.fabrication.slot_depth is None
     assert slotted.results.fabrication is not None
     assert slotted.results.fabrication.slot_depth == pytest.approx(0.010)
+    said = [{finding.code for finding in kept.verdict.findings} for kept in (slotted, pinned)]
+    assert ["slots_weaken" in codes for codes in said] == [True, False]
+    assert slotted.verdict.level != "good"
     assert slotted.results.flat_state is not None
     assert slotted.results.flat_state.lies_flat
     table, widths = joints_table(slotted), dict[str, float]()

@@ -139,7 +139,7 @@ def fabricate(
     slots = _slots(mesh, rod, options, slotted)
     if len(slots) and rod.section.half_widths:
         more["slot_depth"] = rod.section.half_widths[0] + options.slot_clearance
-        warnings += _remains(mesh, rod, options, slots, more["slot_depth"])
+        warnings += (*_remains(mesh, rod, options, slots, more["slot_depth"]), said("slots_weaken"))
     mass = rod.mass_per_length * (cut + _more(mesh, rod, options))
     return Fabricated(
         end_allowance=options.end_allowance,

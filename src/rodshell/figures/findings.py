@@ -47,6 +47,7 @@ CODES = {
     "sinks": "under its own weight the shell takes another shape",
     "slip": "a joint transfers more than the force at which it slips",
     "slots": "little of a strip remains next to one of its slots",
+    "slots_weaken": "strips are weaker at their slots than they were judged",
     "snaps": "the shell snaps forward by itself during the deployment",
     "stands": "the shell carries its own weight with the reserve that is asked for",
     "stands_under_loads": "the shell carries a combination of loads",

@@ -153,6 +153,11 @@ SENTENCES = {
         "where strips meet at {angle}, slots are {width} wide, and on {place} only {left} remain next to one, less "
         "than its depth of {depth}: use thinner or lower strips (rod.section), or set them further apart"
     ),
+    "slots_weaken": (
+        "at their slots strips keep half of their height: stresses there are twice as large as shown, and four times "
+        "those of bends within the surface, which was not judged; compare them with the strength, or bolt the strips "
+        'side by side (joint.kind "pin")'
+    ),
     "snaps": "{where} of the deployment from flat the shell snaps forward by itself, by up to {by}{continues}{other}",
     "stands": (
         "with {all} ends the shell{bracing} is stable and carries {weight} times its own weight, {asked} being asked "
