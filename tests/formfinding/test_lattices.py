@@ -496,3 +496,16 @@ def test_rods_along_lines_that_run_far_past_their_last_joint_are_told_of_other_l
     form = rs.Job(LOW, rs.Curves(lines=lines, spacing=0.2), lath(0.01), joint=rs.Pin()).run(until="drape")
     (said,) = [word for word in form.warnings if "past its last joint" in word]
     assert said.endswith("; other lines may help, or leave such rods out (layout.left_out)")
+
+
+def test_curved_rods_are_laid_flat_at_the_angle_that_they_have_on_the_target() -> None:
+    """To scissor them hardly bends them: without their middle joint held they would end as a narrow bundle."""
+    lines = [[(x + 0.2 * (1 - y**2), y) for y in np.linspace(-1.3, 1.3, 9)] for x in np.arange(-0.9, 0.91, 0.3)]
+    lines += [[point[::-1] for point in line] for line in lines]
+    draped = rs.drape(rs.Curves(lines=lines, rest="curved"), lath(0.06), LOW, joint=rs.Pin())
+    found = draped.flat_state
+    assert found is not None
+    assert found.report.stable
+    grown = np.ptp(found.positions, axis=0) / np.ptp(draped.positions[:, :2], axis=0)
+    np.testing.assert_allclose(grown, np.sqrt(grown.prod()), rtol=0.02)  # both ways alike
+    assert 1.0 < grown.prod() < 1.2

@@ -85,6 +85,16 @@ def lay(
     )  # fmt: skip
 
 
+def _middle_joint(mesh: GridMesh, positions: Floats) -> tuple[int, ...]:
+    """The joint nearest to the middle, and the node next to it on either rod."""
+    joint = int(np.argmin(np.linalg.norm(positions[mesh.joint_nodes] - positions.mean(axis=0), axis=1)))
+    rows = [mesh.nodes_of(rod) for rod in mesh.grid.crossings.rods[joint]]
+    at = [row.tolist().index(mesh.joint_nodes[joint]) for row in rows]
+    return mesh.joint_nodes[joint], *(
+        int(row[k + 1 if k + 1 < len(row) else k - 1]) for row, k in zip(rows, at, strict=True)
+    )
+
+
 def _near_joints(grid: FlatGrid, rod: Rod) -> tuple[str, ...]:
     """A warning where joints of a rod are so near to each other that its laths lie on one another and holes meet."""
     rods, at = grid.crossings.rods.ravel(), grid.crossings.at.ravel()
@@ -165,12 +175,15 @@ def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progres
     chords = np.linalg.norm(np.diff(start[mesh.edges], axis=1)[:, 0], axis=1)
     start *= mesh.edge_lengths.sum() / chords.sum()
     size, plane = float(np.abs(start - start.mean(axis=0)).max()), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    first, second = mesh.edges[np.argmin(np.linalg.norm(start[mesh.edges].mean(axis=1) - start.mean(axis=0), axis=1))]
-    along = unit(start[second] - start[first])
+    middle, *next_to = _middle_joint(mesh, start)
+    if all(line.curve is None for line in mesh.grid.rods):
+        del next_to[1]  # straight rods decide the angle
     shell = Shell.of(replace(mesh, flat=start), rod, isotropic=False, twist=True)
     free = Freedom.free(len(shell.like)).with_directions(np.arange(len(shell.like)))  # frames stay upright
     free = free.with_directions(np.arange(mesh.node_count), *plane)
-    free = free.with_directions(np.array([first])).with_directions(np.array([second]), tuple(along.tolist()))
+    free = free.with_directions(np.array([middle]))
+    for node in next_to:
+        free = free.with_directions(np.array([node]), tuple(unit(start[node] - start[middle]).tolist()))
     weight = PENALTY * (size / float(mesh.edge_lengths.mean())) ** 2 / size**2
     frames = shell.frames
     assert frames is not None
