@@ -28,6 +28,8 @@ from rodshell.paper.figure import (
     Case,
     Figure,
     PanelScale,
+    Part,
+    Row,
     closed,
     dots,
     from_above,
@@ -56,7 +58,7 @@ _WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
 
 
 @dataclass(frozen=True, eq=False)
-class DrapeRun:
+class DrapeRun(Part):
     """One case by one method.
 
     Args:
@@ -81,6 +83,13 @@ class DrapeRun:
         return np.column_stack([self.net[:, 0] - self.ends[:, 0], self.ends[:, 1] - self.net[:, 1]]).ravel()
 
     @property
+    def status(self) -> str:
+        """ "converged", or that it did not come to rest."""
+        if self.draped.converged:
+            return "converged"
+        return f"({self.case.label}) by method {self.method} {self.draped.report.status.sentence}"
+
+    @property
     def rest(self) -> str:
         """Whether it is at rest, and stable, in a few words."""
         rest = self.draped.rest
@@ -95,17 +104,15 @@ class DrapeRun:
         modes = self.draped.report.negative_modes
         return ("stable" if modes == 0 else f"{modes} negative modes") + held
 
-    def row(self) -> tuple[str, ...]:
-        """Its row of the table."""
+    def rows(self) -> list[Row]:
         error = 1e3 * np.abs(self.errors)
-        return (
+        return [(
             f"({self.case.label}) {self.case.target.name}, {1e3 * self.case.spacing:g} mm",
             f"{self.case.rods[0]}x{self.case.rods[1]}", WORDS[self.method], str(self.draped.report.dofs),
             f"{self.seconds:.3g}", f"{error.max():.2f}", f"{np.sqrt(np.mean(error**2)):.2f}", self.rest,
-        )  # fmt: skip
+        )]  # fmt: skip
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json, SI."""
         rods = self.trimmed.mesh.grid.rods
         return {
             "case": self.case.label, "target": self.case.target.parameters(), "method": self.method,
@@ -237,40 +244,19 @@ class DrapeFigure(Figure):
     """Every case by every method.
 
     Args:
-        name: of the figure, such as "fig6".
-        drapes: case by case, each by every method.
+        parts: case by case, each by every method.
     """
 
     name: str
     title: str
-    drapes: tuple[DrapeRun, ...]
-    columns = COLUMNS
-
-    @property
-    def status(self) -> str:
-        """ "converged", or which drape did not come to rest."""
-        for run in self.drapes:
-            if not run.draped.converged:
-                return f"({run.case.label}) by method {run.method} {run.draped.report.status.sentence}"
-        return "converged"
-
-    def heading(self) -> str:
-        """The title."""
-        return self.title
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each case and method."""
-        return [run.row() for run in self.drapes]
-
-    def content(self) -> dict[str, Any]:
-        """The drapes."""
-        return {"drapes": [run.result() for run in self.drapes]}
+    parts: tuple[DrapeRun, ...]
+    columns, key = COLUMNS, "drapes"
 
     def pictures(self) -> dict[str, str]:
         """The paper's method in NAME.svg, each other in NAME-METHOD.svg; the ends of all in NAME-differences.svg."""
-        return {f"{self.name}-differences": _differences_svg(self.drapes)} | {
+        return {f"{self.name}-differences": _differences_svg(self.parts)} | {
             self.name if method == "paper" else f"{self.name}-{method}": rows_svg(
-                [run for run in self.drapes if run.method == method]
+                [run for run in self.parts if run.method == method]
             )
             for method in METHODS
         }

@@ -27,7 +27,7 @@ from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell
 from rodshell.output.pictures import RIGHT, UP
 from rodshell.output.svg import document, label, number, tag
-from rodshell.paper.figure import INK, PAPER, ROD, SOFT, Figure
+from rodshell.paper.figure import INK, PAPER, ROD, SOFT, Figure, Part, Row
 from rodshell.progress import Progress
 from rodshell.results.wording import nice_ticks
 from rodshell.solve.implicit_euler import Motion
@@ -47,7 +47,7 @@ _STATIC_STEPS = 60  # of such a revolution
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Part):
     """A demonstration.
 
     Args:
@@ -102,6 +102,18 @@ class Run:
     def follows(self) -> bool:
         """Whether rod 2 turns with rod 1."""
         return abs(self.rate_error) < 1e-3
+
+    def rows(self) -> list[Row]:
+        return [(
+            f"({LETTER[self.demonstration]}) {self.demonstration}", self.joint, self.coupling,
+            "statics" if self.step is None else f"{1e3 * self.step:.3g}",
+            f"{np.degrees(self.start_up_lag):.3g}", f"{np.degrees(self.steady_lag):.2g}",
+            f"{100 * self.rate_error:.2g}", "yes" if self.follows else "no",
+        )]  # fmt: skip
+
+    def result(self) -> dict[str, Any]:
+        names = ("demonstration", "joint", "coupling", "step", "start_up_lag", "steady_lag", "rate_error", "follows")
+        return {name: getattr(self, name) for name in names}
 
 
 def run_in_time(
@@ -207,54 +219,29 @@ _BIG = 1.4  # panels of the animation, against those of the instants
 class Fig4(Figure):
     """All runs of the figure. Each has whether rod 2 follows: not to follow is a result, too."""
 
-    runs: tuple[Run, ...]
-    name = "fig4"
-    columns = COLUMNS
-    status = "converged"
+    parts: tuple[Run, ...]
+    name, columns, key = "fig4", COLUMNS, "runs"
 
-    def heading(self) -> str:
+    @property
+    def title(self) -> str:
         """The motion of rod 1."""
-        turned = np.degrees(self.runs[0].prescribed[-1])
+        turned = np.degrees(self.parts[0].prescribed[-1])
         return f"Fig 4 [HQK 2.3]: rod 1 of two is driven at {RATE * 30 / np.pi:g} rpm, over {turned:.0f} degrees"
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each run."""
-        return [
-            (
-                f"({LETTER[run.demonstration]}) {run.demonstration}", run.joint, run.coupling,
-                "statics" if run.step is None else f"{1e3 * run.step:.3g}",
-                f"{np.degrees(run.start_up_lag):.3g}", f"{np.degrees(run.steady_lag):.2g}",
-                f"{100 * run.rate_error:.2g}", "yes" if run.follows else "no",
-            )
-            for run in self.runs
-        ]  # fmt: skip
-
-    def content(self) -> dict[str, Any]:
-        """The runs."""
-        runs = [
-            {
-                "demonstration": run.demonstration, "joint": run.joint, "coupling": run.coupling, "step": run.step,
-                "start_up_lag": run.start_up_lag, "steady_lag": run.steady_lag, "rate_error": run.rate_error,
-                "follows": run.follows,
-            }
-            for run in self.runs
-        ]  # fmt: skip
-        return {"runs": runs}
 
     def pictures(self) -> dict[str, str]:
         """Instants, an animation, and the lag against time."""
         shown = [self._first(demonstration, joint) for demonstration, joint in SHOWN]
-        return {"fig4": _instants_svg(shown), "fig4-animated": _animation_svg(shown), "fig4-lag": _lag_svg(self.runs)}
+        return {"fig4": _instants_svg(shown), "fig4-animated": _animation_svg(shown), "fig4-lag": _lag_svg(self.parts)}
 
     def tables(self) -> Mapping[str, Iterable[Sequence[object]]]:
         """The angles of both rods against time."""
         return {
-            f"angles-{letter}": _angles([run for run in self.runs if run.demonstration == demonstration])
+            f"angles-{letter}": _angles([run for run in self.parts if run.demonstration == demonstration])
             for demonstration, letter in LETTER.items()
         }
 
     def _first(self, demonstration: Demonstration, joint: str) -> Run:
-        return next(run for run in self.runs if (run.demonstration, run.joint) == (demonstration, joint))
+        return next(run for run in self.parts if (run.demonstration, run.joint) == (demonstration, joint))
 
 
 def _angles(runs: Sequence[Run]) -> list[Sequence[object]]:

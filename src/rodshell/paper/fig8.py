@@ -19,7 +19,20 @@ from rodshell.formfinding import Draped, Fall, drape, map_back, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import mesh_grid
 from rodshell.model import Potential, Shell
-from rodshell.paper.figure import CASES, INK, LENGTH, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
+from rodshell.paper.figure import (
+    CASES,
+    INK,
+    LENGTH,
+    ROD,
+    TARGET_COLOURS,
+    Case,
+    Chart,
+    Figure,
+    Part,
+    Row,
+    Series,
+    charts_svg,
+)
 from rodshell.progress import Progress, silent
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.newton_matrix import Banded
@@ -49,7 +62,7 @@ _SIGNS = {
 
 
 @dataclass(frozen=True)
-class Timing:
+class Timing(Part):
     """One run.
 
     Args:
@@ -75,28 +88,29 @@ class Timing:
     in_own: float = 0.0
     step_in_lapack: float = 0.0
 
-    def row(self) -> tuple[str, ...]:
-        """Its row of the table."""
-        return (
+    def rows(self) -> list[Row]:
+        return [(
             self.target, self.method, f"{1e3 * self.step:g}" if self.step else "-", f"{1e3 * self.edge:g}",
             str(self.dofs), f"{self.seconds:.3g}", str(self.steps) if self.steps else "-", str(self.factorizations),
             *(f"{timing:.1f}" if timing else "-" for timing in (self.in_lapack, self.in_own, self.step_in_lapack)),
-        )  # fmt: skip
+        )]  # fmt: skip
+
+    def result(self) -> dict[str, Any]:
+        return asdict(self)
 
 
 @dataclass(frozen=True)
 class Fig8(Figure):
     """All runs. Only times are compared: whether each came to rest does not matter."""
 
-    timings: tuple[Timing, ...]
-    name = "fig8"
-    columns = COLUMNS
-    status = "converged"
+    parts: tuple[Timing, ...]
+    name, columns, key = "fig8", COLUMNS, "timings"
+    title = f"Fig 8 [HQK 3.3]: processor time; {FALLING:g} s of fall in the paper's scheme"
 
     def ratios(self) -> dict[str, float]:
         """Time of the paper's explicit scheme at `USUAL_STEP` over ours with the same mesh, by target [-]."""
-        ours = {(timing.target, timing.edge): timing for timing in self.timings if timing.method == "ours"}
-        paper = [timing for timing in self.timings if timing.method == "explicit" and timing.step == USUAL_STEP]
+        ours = {(timing.target, timing.edge): timing for timing in self.parts if timing.method == "ours"}
+        paper = [timing for timing in self.parts if timing.method == "explicit" and timing.step == USUAL_STEP]
         return {timing.target: timing.seconds / ours[timing.target, timing.edge].seconds for timing in paper}
 
     def slopes(self) -> dict[str, dict[str, float]]:
@@ -104,18 +118,10 @@ class Fig8(Figure):
         return {
             method: {
                 target: _slope([float(run.dofs) for run in same], [run.seconds for run in same])
-                for target, same in _by_target(of_sizes(self.timings, method)).items()
+                for target, same in _by_target(of_sizes(self.parts, method)).items()
             }
             for method in ("explicit", "ours")
         }
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each run."""
-        return [timing.row() for timing in self.timings]
-
-    def heading(self) -> str:
-        """What was timed."""
-        return f"Fig 8 [HQK 3.3]: processor time; {FALLING:g} s of fall in the paper's scheme"
 
     def footing(self) -> str:
         """The ratios, and the slopes."""
@@ -128,12 +134,11 @@ class Fig8(Figure):
 
     def content(self) -> dict[str, Any]:
         """The runs, the ratios and the slopes."""
-        timings = [asdict(timing) for timing in self.timings]
-        return {"falling": FALLING, "timings": timings, "ratios": self.ratios(), "slopes": self.slopes()}
+        return {"falling": FALLING, **super().content(), "ratios": self.ratios(), "slopes": self.slopes()}
 
     def pictures(self) -> dict[str, str]:
         """Both charts."""
-        return {"fig8": _times_svg(self.timings)}
+        return {"fig8": _times_svg(self.parts)}
 
 
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float = FALLING) -> Fig8:

@@ -287,37 +287,58 @@ Row = tuple[str, ...]
 VERSION = 1  # of the keys of a figure's result.json
 
 
+class Part(ABC):
+    """What a figure has several of: a shell, a run, a line of its table."""
+
+    @property
+    def status(self) -> str:
+        """ "converged", or what did not converge."""
+        return "converged"
+
+    @abstractmethod
+    def rows(self) -> list[Row]:
+        """Its rows of the table, mostly one."""
+
+    @abstractmethod
+    def result(self) -> dict[str, Any]:
+        """Its entry in result.json, SI."""
+
+
 class Figure(ABC):
     """A figure or a study of the paper, computed.
 
     Attributes:
         name: such as "fig6".
         columns: heads of the table's columns.
+        key: of the parts in result.json.
     """
 
     name: str
     columns: Row
+    key: str
+    parts: tuple[Part, ...]
 
     @property
     @abstractmethod
-    def status(self) -> str:
-        """ "converged", or what did not converge."""
-
-    @abstractmethod
-    def heading(self) -> str:
-        """A line above the table."""
-
-    @abstractmethod
-    def rows(self) -> list[Row]:
-        """The table."""
-
-    @abstractmethod
-    def content(self) -> dict[str, Any]:
-        """The figure's part of result.json, SI."""
+    def title(self) -> str:
+        """The line above the table."""
 
     @abstractmethod
     def pictures(self) -> dict[str, str]:
         """SVG drawings by name."""
+
+    @property
+    def status(self) -> str:
+        """ "converged", or that of the first part that did not converge."""
+        return next((part.status for part in self.parts if part.status != "converged"), "converged")
+
+    def rows(self) -> list[Row]:
+        """The table."""
+        return [row for part in self.parts for row in part.rows()]
+
+    def content(self) -> dict[str, Any]:
+        """The figure's part of result.json, SI."""
+        return {self.key: [part.result() for part in self.parts]}
 
     def tables(self) -> Mapping[str, Iterable[Sequence[object]]]:
         """Further tables with their heads, by name."""
@@ -333,7 +354,7 @@ class Figure(ABC):
 
     def summary(self) -> str:
         """The table as text."""
-        parts = (self.heading(), _aligned(self.columns, self.rows()), self.footing())
+        parts = (self.title, _aligned(self.columns, self.rows()), self.footing())
         return "\n\n".join(part for part in parts if part)
 
     def result(self) -> dict[str, Any]:
