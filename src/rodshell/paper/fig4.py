@@ -27,7 +27,7 @@ from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell
 from rodshell.output.pictures import RIGHT, UP
 from rodshell.output.svg import document, label, number, tag
-from rodshell.paper.figure import INK, PAPER, ROD, SOFT, Figure, Part, Row
+from rodshell.paper.figure import INK, PAPER, ROD, SOFT, Figure, Part, Row, joined
 from rodshell.progress import Progress
 from rodshell.results.wording import nice_ticks
 from rodshell.solve.implicit_euler import Motion
@@ -130,14 +130,7 @@ def run_in_time(
         until: end of the motion [s].
         step: of the record [s]; with explicit ties the time step divides it until it is stable.
     """
-    shell = _shell(joint, coupling)
-    motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE))
-    start = shell.state(shell.mesh.flat)
-    every = 1
-    if isinstance(coupling, ExplicitPenalty):
-        every = int(np.ceil(step / (_SAFE * step_limit(motion, start))))
-    series = simulate(motion, start, until=until, step=step / every, every=every)
-    return _record(shell, demonstration, joint, coupling, step / every, series.times, series.states)
+    return _run(demonstration, joint, coupling, until, step)
 
 
 def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, *, until: float = 2 * pi / RATE) -> Run:
@@ -146,17 +139,29 @@ def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, 
     Args:
         until: end of the motion [s].
     """
-    shell = _shell(joint, coupling)
-    motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE / SLOW))
-    step = SLOW * 2 * pi / RATE / _STATIC_STEPS
-    series = simulate(motion, shell.state(shell.mesh.flat), until=SLOW * until, step=step)
-    return _record(shell, demonstration, joint, coupling, None, series.times / SLOW, series.states)
+    return _run(demonstration, joint, coupling, until, 2 * pi / RATE / _STATIC_STEPS, slower=SLOW)
 
 
-def _shell(joint: Joint, coupling: Coupling) -> Shell:
-    half = LENGTH / 2
+def _run(
+    demonstration: Demonstration, joint: Joint, coupling: Coupling, until: float, step: float, slower: float = 1.0
+) -> Run:
+    """The motion, so many times slower; statics unless that is 1."""
+    half, statics = LENGTH / 2, slower != 1.0
     grid = straight_rods([[[half, 0], [-half, 0]], [[0, -half], [0, half]]])
-    return Shell.of(mesh_grid(grid, EDGE), ROD, joint=joint, coupling=coupling, twist=True)
+    shell = Shell.of(mesh_grid(grid, EDGE), ROD, joint=joint, coupling=coupling, twist=True)
+    motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE / slower))
+    start, every = shell.state(shell.mesh.flat), 1
+    if isinstance(coupling, ExplicitPenalty) and not statics:
+        every = int(np.ceil(step / (_SAFE * step_limit(motion, start))))
+    series = simulate(motion, start, until=slower * until, step=slower * step / every, every=every)
+    times, states = series.times / slower, series.states
+    nodes = states[:, shell.node_blocks].reshape(len(times), 2, NODES, 3)
+    twists = states[:, shell.first_angle : shell.first_angle + NODES - 1, 0]
+    second = nodes[:, 1, -1] - nodes[:, 1, 0]
+    axis = np.array([-1.0, 0.0, 0.0] if demonstration == "twisting" else [0.0, 0.0, 1.0])  # rod 1, or the normal
+    angles = np.unwrap(np.arctan2(dot(axis, cross(second[0], second)), dot(second[0], second)))
+    recorded = None if statics else step / every
+    return Run(demonstration, joint.name, coupling.name, recorded, times, angles, nodes, twists)
 
 
 def _support(shell: Shell, demonstration: Demonstration, rate: float) -> Callable[[float], Supports]:
@@ -173,23 +178,6 @@ def _support(shell: Shell, demonstration: Demonstration, rate: float) -> Callabl
         return Supports(free, moved, goals)
 
     return at
-
-
-def _record(
-    shell: Shell,
-    demonstration: Demonstration,
-    joint: Joint,
-    coupling: Coupling,
-    step: float | None,
-    times: Floats,
-    states: Floats,
-) -> Run:
-    nodes = states[:, shell.node_blocks].reshape(len(times), 2, NODES, 3)
-    twists = states[:, shell.first_angle : shell.first_angle + NODES - 1, 0]
-    second = nodes[:, 1, -1] - nodes[:, 1, 0]
-    axis = np.array([-1.0, 0.0, 0.0] if demonstration == "twisting" else [0.0, 0.0, 1.0])  # rod 1, or the normal
-    angles = np.unwrap(np.arctan2(dot(axis, cross(second[0], second)), dot(second[0], second)))
-    return Run(demonstration, joint.name, coupling.name, step, times, angles, nodes, twists)
 
 
 _DEMONSTRATIONS: tuple[Demonstration, ...] = ("twisting", "bending")
@@ -435,13 +423,9 @@ def _names(run: Run) -> list[str]:
     return parts
 
 
-def _points(points: Floats) -> str:
-    return " ".join(f"{number(x)},{number(y)}" for x, y in points)
-
-
 def _polyline(points: Floats, colour: str, *children: str, width: float = 4.0, dash: str = "none") -> str:
     return tag(
-        "polyline", *children, points=_points(points), fill="none", stroke=colour, stroke_width=width,
+        "polyline", *children, points=joined(points), fill="none", stroke=colour, stroke_width=width,
         stroke_linecap="round", stroke_linejoin="round", stroke_dasharray=dash,
     )  # fmt: skip
 
@@ -451,5 +435,5 @@ def _dots(points: Floats, colour: str) -> str:
 
 
 def _moves(drawn: Sequence[Floats], seconds: str) -> str:
-    values = ";".join(_points(points) for points in drawn)
+    values = ";".join(joined(points) for points in drawn)
     return tag("animate", attributeName="points", values=values, dur=seconds, repeatCount="indefinite")
