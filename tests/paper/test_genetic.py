@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Footprint, Stages, find_stages
 from rodshell.paper import genetic, genetic_search
 from rodshell.paper.figure import CASES, Case
-from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
+from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored
 from rodshell.paper.genetic_search import Design
 from rodshell.progress import silent
 from tests.formfinding.falls import HEMISPHERE, PAPER_ROD
@@ -367,15 +367,12 @@ def test_the_kept_searches_converged_and_their_best_pop_up_again_nearer_than_the
     assert design(case).error(history.variables) == pytest.approx(best[-1], rel=3e-3)
     assert best[-1] < direct(case).agreement["pinned"].rms
     assert best[0] > 5 * direct(case).agreement["pinned"].rms  # they began far from the direct answer
-    footprint = stored_footprint(case.target.name)
-    assert footprint is not None
-    np.testing.assert_allclose(footprint, design(case).footprint(history.variables).points, atol=1e-7)
+    np.testing.assert_allclose(history.footprint, design(case).footprint(history.variables).points, atol=1e-7)
     assert history.rods == tuple(rod.name for rod in direct(case).footprint.rods)
 
 
 def test_a_target_without_a_kept_search_has_none() -> None:
     assert stored("cap") is None
-    assert stored_footprint("cap") is None
 
 
 def test_a_history_is_read_as_it_was_written(whole: History) -> None:

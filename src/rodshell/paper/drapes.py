@@ -37,7 +37,7 @@ from rodshell.paper.figure import (
     rows_of_panels,
     standing,
 )
-from rodshell.paper.genetic_records import stored_footprint
+from rodshell.paper.genetic_records import stored
 from rodshell.progress import Progress
 from rodshell.results.wording import nice_ticks
 
@@ -129,13 +129,7 @@ class DrapeRun(Part):
 def drape_all(
     cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[MethodName] = METHODS
 ) -> tuple[DrapeRun, ...]:
-    """Every case by every method, the falls with the settings `fall`.
-
-    Args:
-        progress: is called at each iteration.
-        fall: settings of the paper's method.
-        methods: by which each case is draped.
-    """
+    """Every case by every method, the falls with the settings `fall`."""
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
 
@@ -179,11 +173,7 @@ def _panels(run: DrapeRun) -> list[list[str]]:
 
 
 def _differences_svg(drapes: Sequence[DrapeRun]) -> str:
-    """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm.
-
-    Args:
-        drapes: case by case, each by every method.
-    """
+    """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm."""
     panels = []
     for name in dict.fromkeys(run.case.label for run in drapes if run.draped.converged):
         same = [run for run in drapes if run.case.label == name and run.draped.converged]
@@ -230,8 +220,8 @@ def _plan(run: DrapeRun) -> list[str]:
 
 def _sought(run: DrapeRun) -> Floats | None:
     """(2m, 2) G0 by the genetic algorithm [m], if a search has been stored for this target with these rods."""
-    found = stored_footprint(run.case.target.name)
-    return found if found is not None and len(found) == 2 * sum(run.case.rods) else None
+    found = stored(run.case.target.name)
+    return found.footprint if found is not None and len(found.rods) == sum(run.case.rods) else None
 
 
 def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:

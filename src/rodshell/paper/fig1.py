@@ -120,12 +120,7 @@ class Fig1(Figure):
 
 
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, edge: float = EDGE) -> Fig1:
-    """Form and pop up all `cases` with edges of the length `edge` [m], the first twice: compilation does not count.
-
-    Args:
-        progress: is called at each iteration.
-        edge: length of the edges [m].
-    """
+    """Form and pop up all `cases` with edges of the length `edge` [m], the first twice: compilation does not count."""
     _popped(replace(cases[0], edge=edge), progress)
     return Fig1(tuple(_popped(replace(case, edge=edge), progress) for case in cases))
 

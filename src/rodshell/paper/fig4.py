@@ -244,12 +244,7 @@ def _angles(runs: Sequence[Run]) -> list[Sequence[object]]:
 
 
 def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
-    """All runs, over so many revolutions (`turns`).
-
-    Args:
-        progress: is called before each run.
-        turns: revolutions of rod 1 [-].
-    """
+    """All runs, over so many revolutions (`turns`) of rod 1."""
     until = turns * 2 * np.pi / RATE
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
     cases: list[tuple[Joint, Coupling]] = [(Linker(), coupling) for coupling in couplings]
@@ -312,11 +307,7 @@ def _animation_svg(runs: Sequence[Run]) -> str:
 
 
 def _lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
-    """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows.
-
-    Args:
-        until: end of the time axis [s].
-    """
+    """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows."""
     shown = [run for run in runs if run.step is not None and run.follows]
     looks = dict(zip(dict.fromkeys(run.name for run in shown), _LOOKS, strict=False))
     lags = np.concatenate([np.degrees(run.lag[run.times <= until]) for run in shown])

@@ -142,12 +142,7 @@ class Fig8(Figure):
 
 
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float = FALLING) -> Fig8:
-    """Time everything, falls of `falling` seconds; the first run of each kind, which compiles, does not count.
-
-    Args:
-        progress: is called at each time step.
-        falling: simulated time of each fall [s].
-    """
+    """Time everything, falls of `falling` seconds; the first run of each kind, which compiles, does not count."""
     couplings: tuple[Coupling, ...] = (ExplicitPenalty(C1=C1), SharedDofs(), ImplicitPenalty())
     for coupling in couplings:
         _fall(cases[0], coupling, USUAL_STEP, 0.05, silent)
@@ -190,12 +185,9 @@ def _by_target(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
 def _timed_fall(
     case: Case, coupling: Coupling, step: float, falling: float, progress: Progress, *, counted: bool = True
 ) -> Timing:
-    """A fall in the paper's scheme, of `falling` seconds with the time step `step` [s]; without its bare solves.
+    """A fall of `falling` seconds in the paper's scheme, with the time step `step` [s]; without its bare solves.
 
     Args:
-        step: time step [s].
-        falling: simulated time [s].
-        progress: is called at each time step.
         counted: whether explicit ties are counted in bare solves.
     """
     bare = BareSolves(case, coupling, step) if counted and isinstance(coupling, ExplicitPenalty) else None

@@ -130,12 +130,7 @@ def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool =
 
 
 def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attributes: Any) -> Iterator[str]:
-    """Every rod by its nodes' points `at` (n, 2); pale where a node of an edge is not `near` (n,).
-
-    Args:
-        at: (n, 2) points of its nodes in the drawing.
-        near: (n,) bool, nodes in front; None: all.
-    """
+    """Every rod by its nodes' points `at` (n, 2) in the drawing; pale where a node of an edge is not `near` (n,)."""
     families = family_numbers(rod.family for rod in mesh.grid.rods)
     for k in range(len(mesh.grid.rods)):
         nodes = mesh.nodes_of(k)
@@ -150,22 +145,13 @@ def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attribute
 
 
 def dots(at: Floats, colour: str, radius: float = 2.2) -> Iterator[str]:
-    """Dots at the points `at` (n, 2).
-
-    Args:
-        at: (n, 2) points in the drawing.
-        radius: [drawing units].
-    """
+    """Dots at the points `at` (n, 2) in the drawing."""
     for x, y in at.tolist():
         yield tag("circle", cx=x, cy=y, r=radius, fill=colour)
 
 
 def closed(at: Floats, colour: str, **attributes: Any) -> str:
-    """A closed curve through the points `at` (n, 2), in the order of their angle about their middle.
-
-    Args:
-        at: (n, 2) points in the drawing.
-    """
+    """A closed curve through the points `at` (n, 2) in the drawing, in the order of their angle about their middle."""
     apart = at - at.mean(axis=0)
     order = np.argsort(np.arctan2(apart[:, 1], apart[:, 0]))
     look = {"fill": "none", "stroke_width": 1.0} | attributes

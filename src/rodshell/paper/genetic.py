@@ -166,11 +166,7 @@ def find(
     case: Case, folder: Path, *, seed: int, jobs: int = 1, population: int = POPULATION, most: int = MOST,
     progress: Progress = silent,
 ) -> History:  # fmt: skip
-    """A whole search (see `search`), whose values are written to `folder`.
-
-    Args:
-        seed, jobs, population, most, progress: see `search`.
-    """
+    """A whole search, whose values are written to `folder`; all else is as of `search`."""
     times = []
     for _ in range(REPEATS):
         begun = process_time()
@@ -178,10 +174,11 @@ def find(
         times.append(process_time() - begun)
     design, name = Design.of(direct), case.target.name
     file = folder / f"{name}-seed{seed}.json"
-    found = search(design, file, seed=seed, jobs=jobs, population=population, most=most, progress=progress)
-    rods = tuple(line.name for line in design.lines)
-    footprint = design.footprint(found.variables).points
-    return History(name, seed, population, found.generations, found.variables, rods, footprint, min(times))
+    generations, variables = search(
+        design, file, seed=seed, jobs=jobs, population=population, most=most, progress=progress
+    )
+    rods, footprint = tuple(line.name for line in design.lines), design.footprint(variables).points
+    return History(name, seed, population, generations, variables, rods, footprint, min(times))
 
 
 def compare(case: Case, history: History) -> Comparison:

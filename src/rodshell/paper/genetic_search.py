@@ -102,9 +102,6 @@ class Design:
 
         None if a rod has too few joints, or after `patience` iterations. Always from flat: a shell has other stable
         states than the one that it reaches from there.
-
-        Args:
-            variables: (n,) distances of the rod ends from the middle of their rods [m].
         """
         footprint = self.footprint(variables)
         if footprint.mesh.grid.joint_counts().min() < FEWEST_JOINTS:
@@ -131,9 +128,6 @@ class Design:
         The distance is that of nodes and of the middles of edges. A shell that is not stable counts as one at the
         distance of the target's size: a rod with fewer than three joints, no stable state with the ends on G, or none
         within `PATIENCE` iterations.
-
-        Args:
-            variables: (n,) distances of the rod ends from the middle of their rods [m].
         """
         popped = self.pop_up(variables, patience=PATIENCE)
         if popped is None or not popped.report.stable:
@@ -144,9 +138,6 @@ class Design:
         """(count, n) random footprints, smooth except for a share `roughness` of the bounds at every end.
 
         Along each side of each family the share of the bounds is a parabola of Bernstein form with random coefficients.
-
-        Args:
-            roughness: share of the bounds that is random at every end [-].
         """
         sides = np.array([[f"{line.family}-", f"{line.family}+"] for line in self.lines]).ravel()
         offsets = np.repeat([line.offset for line in self.lines], 2)
@@ -205,18 +196,10 @@ _SQUARE = [
 # The run
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """The generations of a search and its best variables (n,) [m]."""
-
-    generations: tuple[Generation, ...]
-    variables: Floats
-
-
 def search(
     design: Design, file: Path, *, seed: int, jobs: int = 1, population: int = POPULATION, most: int = MOST,
     progress: Progress,
-) -> Found:  # fmt: skip
+) -> tuple[tuple[Generation, ...], Floats]:  # fmt: skip
     """Search from the random footprints of a seed, or continue, until the best gains less than `GAIN` in `WINDOW`
     generations.
 
@@ -226,7 +209,9 @@ def search(
         file: of all values, written after each generation and when interrupted; the search continues from it.
         jobs: number of processes; the result does not depend on it.
         most: generations after which a search that has not converged ends.
-        progress: is called after each value.
+
+    Returns:
+        The generations, and the best variables (n,) [m].
 
     Raises:
         InputError: pymoo is not installed; the file is broken or of a different search.
@@ -251,7 +236,7 @@ def search(
         raise KeyboardInterrupt(f"{file} has the values found so far; the same command continues from there") from None
     progress(stage, "done", 0.0)
     points, errors = algorithm.survivors
-    return Found(tuple(generations), points[int(np.argmin(errors[:, 0]))])
+    return tuple(generations), points[int(np.argmin(errors[:, 0]))]
 
 
 def _generation(

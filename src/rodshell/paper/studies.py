@@ -104,11 +104,7 @@ def make(progress: Progress) -> Studies:
 
 
 def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Line]:
-    """E, r, g, EA and EI by gravity statics.
-
-    Args:
-        progress: is called before each drape.
-    """
+    """E, r, g, EA and EI by gravity statics."""
     base = drape(layout, ROD, TARGET, method=Gravity())
     for changed, (powers, given) in _PARAMETERS.items():
         for factor in (10.0**power for power in powers):
@@ -119,12 +115,7 @@ def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Lin
 
 
 def of_height(progress: Progress, *, factors: tuple[float, ...] = HEIGHTS) -> Iterator[Line]:
-    """H, by falls.
-
-    Args:
-        progress: is called before each fall.
-        factors: heights over the paper's [-].
-    """
+    """H, by falls; `factors` are heights over the paper's."""
     base = _fallen(Fall(drag=DRAG))
     for factor in factors:
         height = HEIGHT * factor
