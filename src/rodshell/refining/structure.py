@@ -63,19 +63,20 @@ class Structure:
         by_stiffness = self.weight * STANDARD_GRAVITY * self.rod.mass_per_length / self.rod.stretch_stiffness
         return replace(edges, weight=np.full(len(table), by_stiffness)) if self.weight else edges
 
+    def load_on(self, shell: Shell) -> Floats:
+        """(N, 3) weight and dead loads of a shell with the same nodes [N]."""
+        nodes, load = slice(0, shell.first_angle), np.zeros((len(shell.like), 3))
+        if self.weight:
+            load[nodes, 2] = -self.weight * STANDARD_GRAVITY * shell.mass[nodes, 2]
+        if self.dead_loads is not None:
+            load[: len(self.dead_loads)] += self.dead_loads
+        return load
+
     @cached_property
     def constant_load(self) -> Floats:
         """(N, 3) the load that does not change with a design: the weight of joints, and the dead loads [N]."""
-        shell, edges = self.popped.shell, self.edges
-        result = np.zeros((len(shell.like), 3))
-        nodes = slice(0, shell.first_angle)
-        if self.weight:
-            result[nodes, 2] = (
-                -self.weight * STANDARD_GRAVITY * shell.mass[nodes, 2] - edges.load(len(result))[nodes, 2]
-            )
-        if self.dead_loads is not None:
-            result[: len(self.dead_loads)] += self.dead_loads
-        return result
+        load = self.load_on(self.popped.shell)
+        return load - self.edges.load(len(load))
 
     def load(self, edges: EdgeProperties) -> Floats | None:
         """(N, 3) the load on a design [N]; None: none."""
