@@ -228,10 +228,7 @@ class Point:
         return np.asarray(-forces * lengths * flexible / np.pi**2)
 
     def tried(self, values: Floats, change: Change) -> "tuple[Point | None, int]":
-        """The equilibrium of another design, from this one's by first order.
-
-        Args:
-            values: (n,) the other design.
+        """The equilibrium of another design of values (n,), from this one's by first order.
 
         Returns:
             The point, or None where Newton's method does not lead to a stable equilibrium next to the prediction; and
