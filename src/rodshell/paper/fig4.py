@@ -207,14 +207,9 @@ _BIG = 1.4  # panels of the animation, against those of the instants
 class Fig4(Figure):
     """All runs of the figure. Each has whether rod 2 follows: not to follow is a result, too."""
 
+    title: str
     parts: tuple[Run, ...]
     name, columns, key = "fig4", COLUMNS, "runs"
-
-    @property
-    def title(self) -> str:
-        """The motion of rod 1."""
-        turned = np.degrees(self.parts[0].prescribed[-1])
-        return f"Fig 4 [HQK 2.3]: rod 1 of two is driven at {RATE * 30 / np.pi:g} rpm, over {turned:.0f} degrees"
 
     def pictures(self) -> dict[str, str]:
         """Instants, an animation, and the lag against time."""
@@ -256,7 +251,9 @@ def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
         for joint, coupling in cases[:2]:
             progress(f"{demonstration}, {joint.name}, {coupling.name}", "statics", 0.0)
             runs.append(run_statics(demonstration, joint, coupling, until=until))
-    return Fig4(tuple(runs))
+    turned = np.degrees(runs[0].prescribed[-1])
+    title = f"Fig 4 [HQK 2.3]: rod 1 of two is driven at {RATE * 30 / np.pi:g} rpm, over {turned:.0f} degrees"
+    return Fig4(title, tuple(runs))
 
 
 # Pictures

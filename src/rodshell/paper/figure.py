@@ -295,19 +295,16 @@ class Figure(ABC):
 
     Attributes:
         name: such as "fig6".
+        title: the line above the table.
         columns: heads of the table's columns.
         key: of the parts in result.json.
     """
 
     name: str
+    title: str
     columns: Row
     key: str
     parts: tuple[Part, ...]
-
-    @property
-    @abstractmethod
-    def title(self) -> str:
-        """The line above the table."""
 
     @abstractmethod
     def pictures(self) -> dict[str, str]:
