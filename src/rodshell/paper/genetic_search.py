@@ -16,7 +16,7 @@ from time import process_time
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.errors import InputError
+from rodshell.errors import needs_package
 from rodshell.formfinding import Stages, agreement, pop_up
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
@@ -251,10 +251,8 @@ def _generation(
 def _algorithm(design: Design, seed: int, population: int) -> AskTell:
     """Ready to be asked."""
     first = design.random(np.random.default_rng(seed), population, ROUGHNESS)
-    try:
+    with needs_package("the genetic algorithm", "pymoo", "paper"):
         return AskTell(design.lower, design.upper, first, seed=seed)
-    except ImportError as error:
-        raise InputError('the genetic algorithm needs the package pymoo: pip install "rodshell[paper]"') from error
 
 
 @contextmanager
