@@ -1,8 +1,7 @@
-"""Figure 4: does rod 2 follow, and with what lag? Both demonstrations, every coupling, linkers and pins [HQK 2.3].
+"""Figure 4: of two rods that cross at one joint the first is twisted or turned at a constant rate; does rod 2 follow,
+and with what lag? Both demonstrations, every coupling, linkers and pins [HQK 2.3].
 
 The pictures are instants in the paper's layout, an animation, and the lag against time.
-
-Two rods that cross at one joint, of which the first is twisted or turned at a constant rate [HQK 2.3, Fig 4].
 
 Rods of 5 nodes and 4 edges, the paper's section and material. Rod 1 runs from (L/2, 0, 0) to (-L/2, 0, 0), so that
 its first node starts where Eq 7 puts it; rod 2 along y.
@@ -273,7 +272,7 @@ def _instants_svg(runs: Sequence[Run]) -> str:
             panel = [
                 *_scene(run),
                 *(_polyline(_projected(run.nodes[k, rod]), colour) for rod, colour in enumerate(RODS)),
-                *_directors(run, k),
+                *(_polyline(_tick(run, k, edge), RODS[0], width=1.6) for edge in _ticked(run)),
                 *(_dots(_projected(run.nodes[k, rod]), colour) for rod, colour in enumerate(RODS)),
                 *(_names(run) if across == 0 else ()),
                 label(caption, PANEL / 2, top + height + 18, TEXT, fill=INK, text_anchor="middle"),
@@ -292,9 +291,7 @@ def _animation_svg(runs: Sequence[Run]) -> str:
         frames = np.unique(np.linspace(0, len(run.times) - 1, FRAMES).round().astype(int))
         seconds = f"{number(float(run.times[-1]), 3)}s"
         lines = [([_projected(run.nodes[k, rod]) for k in frames], RODS[rod], 4.0) for rod in range(2)]
-        if run.demonstration == "twisting":
-            ticks = [[_tick(run, k, edge) for k in frames] for edge in range(run.twists.shape[1])]
-            lines += [(tick, RODS[0], 1.6) for tick in ticks]
+        lines += [([_tick(run, k, edge) for k in frames], RODS[0], 1.6) for edge in _ticked(run)]
         moving = [_polyline(drawn[0], colour, _moves(drawn, seconds), width=wide) for drawn, colour, wide in lines]
         left = GAP + across * (_BIG * PANEL + GAP)
         panels.append(tag("g", *_title(run), transform=f"translate({number(left)} 0)"))
@@ -387,18 +384,17 @@ def _scene(run: Run) -> list[str]:
     return still + [_polyline(_projected(run.nodes[0, rod]), _FAINT, width=3.0) for rod in moving]
 
 
+def _ticked(run: Run) -> range:
+    """Edges of rod 1 whose directors are drawn: they turn where it is twisted."""
+    return range(run.twists.shape[1] if run.demonstration == "twisting" else 0)
+
+
 def _tick(run: Run, k: int, edge: int) -> Floats:
     """(2, 2) the first director of an edge of rod 1, which lies along -x as long as it is only twisted."""
     middle = run.nodes[k, 0, edge : edge + 2].mean(axis=0)
     angle = run.twists[k, edge]
     director = np.array([0.0, np.sin(angle), np.cos(angle)])
     return _projected(np.array([middle, middle + 0.55 * EDGE * director]))
-
-
-def _directors(run: Run, k: int) -> list[str]:
-    if run.demonstration != "twisting":
-        return []
-    return [_polyline(_tick(run, k, edge), RODS[0], width=1.6) for edge in range(run.twists.shape[1])]
 
 
 def _names(run: Run) -> list[str]:

@@ -114,14 +114,15 @@ class Fig8(Figure):
         return {timing.target: timing.seconds / ours[timing.target, timing.edge].seconds for timing in paper}
 
     def slopes(self) -> dict[str, dict[str, float]]:
-        """Exponents of the unknowns in the times of the sizes, by method and target [-]."""
-        return {
-            method: {
-                target: _slope([float(run.dofs) for run in same], [run.seconds for run in same])
-                for target, same in _by_target(of_sizes(self.parts, method)).items()
-            }
-            for method in ("explicit", "ours")
-        }
+        """Exponents of the unknowns in the times of the sizes, by least squares of logarithms; by method and target."""
+        slopes = dict[str, dict[str, float]]()
+        for method in ("explicit", "ours"):
+            runs = of_sizes(self.parts, method)
+            for target in dict.fromkeys(run.target for run in runs):
+                same = [run for run in runs if run.target == target]
+                slope = np.polyfit(np.log([run.dofs for run in same]), np.log([run.seconds for run in same]), 1)[0]
+                slopes.setdefault(method, {})[target] = float(slope)
+        return slopes
 
     def footing(self) -> str:
         """The ratios, and the slopes."""
@@ -167,19 +168,9 @@ def sizes_of(case: Case) -> list[Case]:
     return sizes
 
 
-def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """Exponent of x in y, by least squares of their logarithms."""
-    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
-
-
 def of_sizes(timings: Sequence[Timing], method: str) -> list[Timing]:
     """The runs of a method at all sizes."""
     return [run for run in timings if run.method == method and run.step in (0.0, _SIZE_STEP)]
-
-
-def _by_target(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
-    names = dict.fromkeys(timing.target for timing in timings)
-    return {name: [timing for timing in timings if timing.target == name] for name in names}
 
 
 def _timed_fall(

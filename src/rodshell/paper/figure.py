@@ -125,7 +125,8 @@ def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool =
     near = np.ones(len(positions), dtype=bool)
     if hides:
         near = target.contact(positions).normal @ TOWARDS >= 0
-    filled = tag("polygon", points=joined(_hull(to_panel(_from_aside(body)))), fill=_BODY, stroke="none")
+    outline = to_panel(_from_aside(body))
+    filled = tag("polygon", points=joined(outline[ConvexHull(outline).vertices]), fill=_BODY, stroke="none")
     return [filled, *rod_lines(mesh, to_panel(_from_aside(positions)), near)]
 
 
@@ -176,10 +177,6 @@ def _body(target: Target) -> Floats:
     ground = points.copy()
     ground[:, 2] = target.base
     return np.vstack([points, ground])
-
-
-def _hull(points: Floats) -> Floats:
-    return points[ConvexHull(points).vertices]
 
 
 # Logarithmic charts

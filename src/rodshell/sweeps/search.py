@@ -148,7 +148,7 @@ def _generation(plan: SearchPlan, number: int, algorithm: AskTell, computation: 
         except InputError as error:  # values that no case can have together
             names.append(f"no case {json.dumps(values[1:])}")
             store.record(names[-1], "refused", {"status": str(error), "seconds": 0.0})
-    store.add(zip(designs, names, strict=True))
+    store.plan(zip(designs, names, strict=True), more=True)
     computation.compute(wanted, f"generation {number} of {plan.generations}", len(wanted))
     found = [_judged(plan, store.outcome(name), store.row(name)) for name in names]
     algorithm.tell(np.array([values for values, _ in found]), np.array([violations for _, violations in found]))
