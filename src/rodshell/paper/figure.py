@@ -130,7 +130,7 @@ def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool =
     return [filled, *rod_lines(mesh, to_panel(_from_aside(positions)), near)]
 
 
-def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attributes: Any) -> Iterator[str]:
+def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None) -> Iterator[str]:
     """Every rod by its nodes' points `at` (n, 2) in the drawing; pale where a node of an edge is not `near` (n,)."""
     families = family_numbers(rod.family for rod in mesh.grid.rods)
     for k in range(len(mesh.grid.rods)):
@@ -141,7 +141,7 @@ def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attribute
             shade = {} if seen[first] else {"stroke_opacity": FAR}
             yield tag(
                 "polyline", points=joined(at[nodes[first : last + 1]]), fill="none", stroke=FAMILIES[families[k]],
-                stroke_width=0.8, stroke_linejoin="round", **shade, **attributes,
+                stroke_width=0.8, stroke_linejoin="round", **shade,
             )  # fmt: skip
 
 

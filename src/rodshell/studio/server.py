@@ -87,7 +87,7 @@ def studio_app(settings: Settings) -> ASGIApp:
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        jobs.resume()
+        jobs.run_next()
         yield
         sessions.end()
         jobs.end()
