@@ -1,15 +1,12 @@
 """The genetic search of an inverse design: what is sought, and the run, seeded and in several processes."""
 
-import os
-import signal
-import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import repeat
 from math import inf
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from pathlib import Path
 from time import process_time
 
@@ -29,6 +26,7 @@ from rodshell.progress import Progress
 from rodshell.rods.supports import PINNED
 from rodshell.sweeps.asktell import AskTell
 from rodshell.targets import Target
+from rodshell.threads import work_for_parent
 
 PATIENCE = 100  # Newton iterations of a pop-up from flat; smooth footprints mostly need 25 to 60
 SAME = 1e-4  # times the size: ends of G are much further apart
@@ -261,24 +259,11 @@ def _evaluators(design: Design, jobs: int) -> Iterator[Evaluate]:
     if jobs == 1:
         yield lambda individuals: (_judge(design, variables) for variables in individuals)
         return
-    pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_follow_parent)
+    pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=work_for_parent)
     try:
         yield lambda individuals: pool.map(_judge, repeat(design), individuals)
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _follow_parent() -> None:
-    """End together with the parent process, however it ends; Ctrl-C, which reaches every process, is ignored."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 def _judge(design: Design, variables: Floats) -> Judged:
