@@ -241,7 +241,7 @@ def pop_up_rows() -> Iterator[Row]:
 
 def genetic_rows() -> Iterator[Row]:
     """The kept searches, their best popped up again, and the beginning of one made again."""
-    for one in genetic.make(silent).comparisons:
+    for one in genetic.make(silent).parts:
         name, history, best = one.case.target.name, one.history, one.best
         assert best is not None
         course = [generation.best for generation in history.generations]

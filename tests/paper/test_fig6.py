@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -30,7 +31,7 @@ def figure() -> DrapeFigure:
 
 
 def by(method: str) -> DrapeRun:
-    return next(one for one in figure().drapes if one.method == method)
+    return next(one for one in figure().parts if one.method == method)
 
 
 @pytest.mark.slow
@@ -83,7 +84,7 @@ def test_the_files_hold_tables_and_one_picture_a_method(tmp_path: Path) -> None:
 
 def test_the_differences_show_every_rod_end_by_every_method(monkeypatch: pytest.MonkeyPatch) -> None:
     """Dots at the heights of the errors: their spread is that of the table's rows, in one scale."""
-    monkeypatch.setattr(drapes, "stored_footprint", lambda name: None)
+    monkeypatch.setattr(drapes, "stored", lambda name: None)
     root = ElementTree.fromstring(figure().pictures()["fig6-differences"])
     heights = [float(dot.get("cy", "nan")) for dot in root.findall(".//{http://www.w3.org/2000/svg}circle")]
     errors = np.concatenate([by(method).errors for method in METHODS])
@@ -103,8 +104,10 @@ def test_a_fall_that_does_not_rest_is_the_status_of_the_figure() -> None:
 def test_a_footprint_that_was_sought_is_drawn_where_its_rods_are_those_of_the_case(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def curves(found: np.ndarray | None) -> int:
-        monkeypatch.setattr(drapes, "stored_footprint", lambda name: found)
+    def curves(ends: np.ndarray | None) -> int:
+        rods = ("a rod",) * (len(ends) // 2) if ends is not None else ()
+        found = None if ends is None else SimpleNamespace(rods=rods, footprint=ends)
+        monkeypatch.setattr(drapes, "stored", lambda name: found)
         return drapes.rows_svg([by("bound")]).count("<polygon")
 
     around = np.column_stack([np.cos(np.arange(28)), np.sin(np.arange(28))])

@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Footprint, Stages, find_stages
 from rodshell.paper import genetic, genetic_search
 from rodshell.paper.figure import CASES, Case
-from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
+from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored
 from rodshell.paper.genetic_search import Design
 from rodshell.progress import silent
 from tests.formfinding.falls import HEMISPHERE, PAPER_ROD
@@ -300,7 +300,7 @@ def test_the_table_the_picture_and_the_files_tell_the_search(tmp_path: Path) -> 
     made = genetic.make(silent, seed=SEED, generations=1, cases=[SMALL], folder=tmp_path / "kept")
     assert made.status == "the search on the hemisphere has not converged: 1 of at least 21 generations"
     made.save(tmp_path / "genetic")
-    found, by_direct = made.comparisons[0], made.rows()[0]
+    found, by_direct = made.parts[0], made.rows()[0]
     assert float(by_direct[5]) == pytest.approx(1e3 * direct(SMALL).agreement["pinned"].rms, abs=6e-4)
     assert by_direct[3] == "1"
     row = made.rows()[1]
@@ -367,15 +367,12 @@ def test_the_kept_searches_converged_and_their_best_pop_up_again_nearer_than_the
     assert design(case).error(history.variables) == pytest.approx(best[-1], rel=3e-3)
     assert best[-1] < direct(case).agreement["pinned"].rms
     assert best[0] > 5 * direct(case).agreement["pinned"].rms  # they began far from the direct answer
-    footprint = stored_footprint(case.target.name)
-    assert footprint is not None
-    np.testing.assert_allclose(footprint, design(case).footprint(history.variables).points, atol=1e-7)
+    np.testing.assert_allclose(history.footprint, design(case).footprint(history.variables).points, atol=1e-7)
     assert history.rods == tuple(rod.name for rod in direct(case).footprint.rods)
 
 
 def test_a_target_without_a_kept_search_has_none() -> None:
     assert stored("cap") is None
-    assert stored_footprint("cap") is None
 
 
 def test_a_history_is_read_as_it_was_written(whole: History) -> None:

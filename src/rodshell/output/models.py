@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.errors import InputError
+from rodshell.errors import needs_package
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.drawings.flat import FlatPlan
@@ -148,10 +148,8 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
     Raises:
         InputError: rhino3dm is not installed.
     """
-    try:
+    with needs_package("a 3dm file", "rhino3dm", "rhino"):
         import rhino3dm as r
-    except ImportError as error:
-        raise InputError('a 3dm file needs the package rhino3dm: pip install "rodshell[rhino]"') from error
 
     model: Any = r.File3dm()
     model.Settings.ModelUnitSystem = r.UnitSystem.Millimeters

@@ -28,6 +28,8 @@ from rodshell.paper.figure import (
     Case,
     Figure,
     PanelScale,
+    Part,
+    Row,
     closed,
     dots,
     from_above,
@@ -35,7 +37,7 @@ from rodshell.paper.figure import (
     rows_of_panels,
     standing,
 )
-from rodshell.paper.genetic_records import stored_footprint
+from rodshell.paper.genetic_records import stored
 from rodshell.progress import Progress
 from rodshell.results.wording import nice_ticks
 
@@ -56,7 +58,7 @@ _WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
 
 
 @dataclass(frozen=True, eq=False)
-class DrapeRun:
+class DrapeRun(Part):
     """One case by one method.
 
     Args:
@@ -81,6 +83,13 @@ class DrapeRun:
         return np.column_stack([self.net[:, 0] - self.ends[:, 0], self.ends[:, 1] - self.net[:, 1]]).ravel()
 
     @property
+    def status(self) -> str:
+        """ "converged", or that it did not come to rest."""
+        if self.draped.converged:
+            return "converged"
+        return f"({self.case.label}) by method {self.method} {self.draped.report.status.sentence}"
+
+    @property
     def rest(self) -> str:
         """Whether it is at rest, and stable, in a few words."""
         rest = self.draped.rest
@@ -95,17 +104,15 @@ class DrapeRun:
         modes = self.draped.report.negative_modes
         return ("stable" if modes == 0 else f"{modes} negative modes") + held
 
-    def row(self) -> tuple[str, ...]:
-        """Its row of the table."""
+    def rows(self) -> list[Row]:
         error = 1e3 * np.abs(self.errors)
-        return (
+        return [(
             f"({self.case.label}) {self.case.target.name}, {1e3 * self.case.spacing:g} mm",
             f"{self.case.rods[0]}x{self.case.rods[1]}", WORDS[self.method], str(self.draped.report.dofs),
             f"{self.seconds:.3g}", f"{error.max():.2f}", f"{np.sqrt(np.mean(error**2)):.2f}", self.rest,
-        )  # fmt: skip
+        )]  # fmt: skip
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json, SI."""
         rods = self.trimmed.mesh.grid.rods
         return {
             "case": self.case.label, "target": self.case.target.parameters(), "method": self.method,
@@ -122,13 +129,7 @@ class DrapeRun:
 def drape_all(
     cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[MethodName] = METHODS
 ) -> tuple[DrapeRun, ...]:
-    """Every case by every method, the falls with the settings `fall`.
-
-    Args:
-        progress: is called at each iteration.
-        fall: settings of the paper's method.
-        methods: by which each case is draped.
-    """
+    """Every case by every method, the falls with the settings `fall`."""
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
 
@@ -172,11 +173,7 @@ def _panels(run: DrapeRun) -> list[list[str]]:
 
 
 def _differences_svg(drapes: Sequence[DrapeRun]) -> str:
-    """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm.
-
-    Args:
-        drapes: case by case, each by every method.
-    """
+    """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm."""
     panels = []
     for name in dict.fromkeys(run.case.label for run in drapes if run.draped.converged):
         same = [run for run in drapes if run.case.label == name and run.draped.converged]
@@ -223,8 +220,8 @@ def _plan(run: DrapeRun) -> list[str]:
 
 def _sought(run: DrapeRun) -> Floats | None:
     """(2m, 2) G0 by the genetic algorithm [m], if a search has been stored for this target with these rods."""
-    found = stored_footprint(run.case.target.name)
-    return found if found is not None and len(found) == 2 * sum(run.case.rods) else None
+    found = stored(run.case.target.name)
+    return found.footprint if found is not None and len(found.rods) == sum(run.case.rods) else None
 
 
 def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:
@@ -237,40 +234,19 @@ class DrapeFigure(Figure):
     """Every case by every method.
 
     Args:
-        name: of the figure, such as "fig6".
-        drapes: case by case, each by every method.
+        parts: case by case, each by every method.
     """
 
     name: str
     title: str
-    drapes: tuple[DrapeRun, ...]
-    columns = COLUMNS
-
-    @property
-    def status(self) -> str:
-        """ "converged", or which drape did not come to rest."""
-        for run in self.drapes:
-            if not run.draped.converged:
-                return f"({run.case.label}) by method {run.method} {run.draped.report.status.sentence}"
-        return "converged"
-
-    def heading(self) -> str:
-        """The title."""
-        return self.title
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each case and method."""
-        return [run.row() for run in self.drapes]
-
-    def content(self) -> dict[str, Any]:
-        """The drapes."""
-        return {"drapes": [run.result() for run in self.drapes]}
+    parts: tuple[DrapeRun, ...]
+    columns, key = COLUMNS, "drapes"
 
     def pictures(self) -> dict[str, str]:
         """The paper's method in NAME.svg, each other in NAME-METHOD.svg; the ends of all in NAME-differences.svg."""
-        return {f"{self.name}-differences": _differences_svg(self.drapes)} | {
+        return {f"{self.name}-differences": _differences_svg(self.parts)} | {
             self.name if method == "paper" else f"{self.name}-{method}": rows_svg(
-                [run for run in self.drapes if run.method == method]
+                [run for run in self.parts if run.method == method]
             )
             for method in METHODS
         }

@@ -16,7 +16,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, Stages, agreement, find_stages
-from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
+from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Part, Row, Series, charts_svg
 from rodshell.paper.genetic_records import WINDOW, History, stored
 from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
 from rodshell.progress import Progress, silent
@@ -33,7 +33,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Part):
     """One target by both methods.
 
     Args:
@@ -71,8 +71,8 @@ class Comparison:
             return f"{outcome}: {count}"
         return f"{outcome}: {_percent(history.last_gain)} gained in the last {WINDOW} of {count}"
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Its two rows of the table."""
+    def rows(self) -> list[Row]:
+        """One for each method."""
         name, history, apart = self.case.target.name, self.history, 1e3 * self.apart
         off = (f"{apart.max():.2f}", f"{np.sqrt(np.mean(apart**2)):.2f}")
         direct = (name, "direct method", "-", "1", f"{history.direct_seconds:.2g}", *_shape(self.direct), "-", "-", "-")
@@ -83,7 +83,6 @@ class Comparison:
         return [direct, found]
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json, SI."""
         history, best = self.history, self.best
         return {
             "target": self.case.target.parameters(), "seed": history.seed, "status": self.status,
@@ -100,45 +99,27 @@ class Comparison:
 class Genetic(Figure):
     """All targets."""
 
-    comparisons: tuple[Comparison, ...]
-    name = "genetic"
-    columns = COLUMNS
-
-    @property
-    def status(self) -> str:
-        """ "converged", or the first problem."""
-        problems = (comparison.status for comparison in self.comparisons if comparison.status != "converged")
-        return next(problems, "converged")
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, two rows for each target."""
-        return [row for comparison in self.comparisons for row in comparison.rows()]
-
-    def heading(self) -> str:
-        """What is compared."""
-        return "The genetic algorithm [HQK 3.2] and the direct method: ends pinned, 15 mm edges, every run from flat"
+    parts: tuple[Comparison, ...]
+    name, columns, key = "genetic", COLUMNS, "comparisons"
+    title = "The genetic algorithm [HQK 3.2] and the direct method: ends pinned, 15 mm edges, every run from flat"
 
     def footing(self) -> str:
         """The gains."""
         gains = (
             f"{comparison.case.target.name} {comparison.direct.rms / comparison.best.rms:.2f}, "
             f"for {comparison.history.runs} times the runs"
-            for comparison in self.comparisons
+            for comparison in self.parts
             if comparison.best is not None
         )
         return f"rms of the direct method over that of the genetic algorithm: {'; '.join(gains)}"
 
-    def content(self) -> dict[str, Any]:
-        """The comparisons."""
-        return {"comparisons": [comparison.result() for comparison in self.comparisons]}
-
     def pictures(self) -> dict[str, str]:
         """The convergence."""
-        return {"genetic": convergence_svg(self.comparisons)}
+        return {"genetic": convergence_svg(self.parts)}
 
     def texts(self) -> dict[str, str]:
         """Each history."""
-        return {f"{comparison.case.target.name}.json": comparison.history.json() for comparison in self.comparisons}
+        return {f"{comparison.case.target.name}.json": comparison.history.json() for comparison in self.parts}
 
 
 def make(
@@ -185,11 +166,7 @@ def find(
     case: Case, folder: Path, *, seed: int, jobs: int = 1, population: int = POPULATION, most: int = MOST,
     progress: Progress = silent,
 ) -> History:  # fmt: skip
-    """A whole search (see `search`), whose values are written to `folder`.
-
-    Args:
-        seed, jobs, population, most, progress: see `search`.
-    """
+    """A whole search, whose values are written to `folder`; all else is as of `search`."""
     times = []
     for _ in range(REPEATS):
         begun = process_time()
@@ -197,10 +174,11 @@ def find(
         times.append(process_time() - begun)
     design, name = Design.of(direct), case.target.name
     file = folder / f"{name}-seed{seed}.json"
-    found = search(design, file, seed=seed, jobs=jobs, population=population, most=most, progress=progress)
-    rods = tuple(line.name for line in design.lines)
-    footprint = design.footprint(found.variables).points
-    return History(name, seed, population, found.generations, found.variables, rods, footprint, min(times))
+    generations, variables = search(
+        design, file, seed=seed, jobs=jobs, population=population, most=most, progress=progress
+    )
+    rods, footprint = tuple(line.name for line in design.lines), design.footprint(variables).points
+    return History(name, seed, population, generations, variables, rods, footprint, min(times))
 
 
 def compare(case: Case, history: History) -> Comparison:

@@ -127,12 +127,6 @@ def stored(target: str) -> History | None:
     return History.of(file.read_text(encoding="utf-8")) if file.is_file() else None
 
 
-def stored_footprint(target: str) -> Floats | None:
-    """(2m, 2) G0 by the genetic algorithm [m], start and end of each rod in turn; None without a stored search."""
-    history = stored(target)
-    return None if history is None else history.footprint
-
-
 @dataclass
 class StoredValues:
     """The values of all generations of a search, the last perhaps incomplete, and the file that holds them.

@@ -16,7 +16,7 @@ from rodshell.model import Shell
 from rodshell.model.elastic_rod import ElasticRod
 from rodshell.output.drawing import FAMILIES
 from rodshell.output.svg import label, tag
-from rodshell.paper.figure import FINAL, FLAT, INK, PANEL, ROD, SOFT, Figure, joined, rows_of_panels
+from rodshell.paper.figure import FINAL, FLAT, INK, PANEL, ROD, SOFT, Figure, Part, Row, joined, rows_of_panels
 from rodshell.progress import Progress
 from rodshell.rods.elements import is_bends
 from rodshell.targets import Hemisphere
@@ -28,33 +28,28 @@ Drawn = dict[int, Floats]  # of blocks, in a panel
 
 
 @dataclass(frozen=True)
+class Counted(Part):
+    """The unknowns and stencils of one drawing, as the table shows them."""
+
+    cells: Row
+
+    def rows(self) -> list[Row]:
+        return [self.cells]
+
+    def result(self) -> dict[str, Any]:
+        return dict(zip(COLUMNS, self.cells, strict=True))
+
+
+@dataclass(frozen=True)
 class Stencils(Figure):
     """A rod, and the basic element with shared and with separate unknowns."""
 
+    parts: tuple[Counted, ...]
     rod: ElasticRod
     shared: Shell
     separate: Shell
-    name = "stencils"
-    columns = COLUMNS
-    status = "converged"
-
-    def heading(self) -> str:
-        """What is counted."""
-        return "Figs 2, 3, 5 [HQK]: unknowns and stencils, of a rod of 5 nodes and of two such rods with two linkers"
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table."""
-        rod = ("Fig 2", f"rod of N = {NODES} nodes, 4N - 1", str(self.rod.freedom().size), str(NODES - 2), "-", "-")
-        return [
-            rod,
-            ("Fig 3 (a)", "two rods and linkers on shared unknowns", *_counts(self.shared)),
-            ("Fig 3 (b)", "the same as rods of their own", *_counts(self.separate)),
-            ("Fig 5", "node in contact", "2 of 3", "-", "-", "-"),
-        ]
-
-    def content(self) -> dict[str, Any]:
-        """The table."""
-        return {"rows": [dict(zip(COLUMNS, row, strict=True)) for row in self.rows()]}
+    name, columns, key = "stencils", COLUMNS, "rows"
+    title = "Figs 2, 3, 5 [HQK]: unknowns and stencils, of a rod of 5 nodes and of two such rods with two linkers"
 
     def pictures(self) -> dict[str, str]:
         """Both rows of panels."""
@@ -70,7 +65,14 @@ class Stencils(Figure):
 def make(_: Progress) -> Stencils:
     """The rod and the elements."""
     line = np.linspace([0.0, 0.0, 0.0], [(NODES - 1) * EDGE, 0.0, 0.0], NODES)
-    return Stencils(ElasticRod.of(line, ROD), _shell(SharedDofs()), _shell(ImplicitPenalty()))
+    rod, shared, separate = ElasticRod.of(line, ROD), _shell(SharedDofs()), _shell(ImplicitPenalty())
+    rows = (
+        ("Fig 2", f"rod of N = {NODES} nodes, 4N - 1", str(rod.freedom().size), str(NODES - 2), "-", "-"),
+        ("Fig 3 (a)", "two rods and linkers on shared unknowns", *_counts(shared)),
+        ("Fig 3 (b)", "the same as rods of their own", *_counts(separate)),
+        ("Fig 5", "node in contact", "2 of 3", "-", "-", "-"),
+    )
+    return Stencils(tuple(map(Counted, rows)), rod, shared, separate)
 
 
 def _shell(coupling: Coupling) -> Shell:
@@ -79,7 +81,7 @@ def _shell(coupling: Coupling) -> Shell:
     return Shell.of(mesh_grid(grid, EDGE), ROD, joint=Linker(), coupling=coupling, twist=True)
 
 
-def _counts(shell: Shell) -> tuple[str, ...]:
+def _counts(shell: Shell) -> Row:
     bends = sum(len(element.blocks) for element in shell.elements if element.blocks.shape[1] == NODES)
     nodes = shell.like < shell.mesh.node_count
     of_nodes = [bool(nodes[tie[0]]) for element in shell.between for tie in element.blocks]

@@ -74,7 +74,6 @@ def gates(
         form: the design, popped up with one end condition.
         all_of_them: try the others too after a gate has refused it.
         span_error: largest error of each span as it is built [m]; None: `SPAN_ERROR` of the target's size.
-        progress: called as progress(stage, detail, residual).
     """
     passed, first, factorizations = dict[str, bool](), "", 0
     for name in GATES:
@@ -141,7 +140,6 @@ def worst_with_errors(form: Stages, span_error: float, progress: Progress = sile
     Args:
         form: the design, popped up with one end condition.
         span_error: largest error of each span's length [m].
-        progress: called as progress(stage, detail, residual).
 
     Returns:
         None in place of the gap where one of them has no stable state nearby.

@@ -13,7 +13,6 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.figures.records import Ends
-from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, Stages, agreement
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
@@ -324,13 +323,7 @@ def loaded_gap(stages: Stages, design: Point, ends: Ends) -> Agreement:
     Args:
         design: of which it is built, with its loaded equilibrium.
     """
-    popped, here, structure = stages.popped[ends], design.equilibrium, design.structure
-    load = np.zeros_like(popped.state)
-    nodes = slice(0, popped.shell.first_angle)
-    if structure.weight:
-        load[nodes, 2] = -structure.weight * STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
-    if structure.dead_loads is not None:
-        load[: len(structure.dead_loads)] += structure.dead_loads
-    shell = popped.shell.with_frames_of(here.elements)
+    popped, here = stages.popped[ends], design.equilibrium
+    load, shell = design.structure.load_on(popped.shell), popped.shell.with_frames_of(here.elements)
     problem = replace(popped.equilibrium.problem, elements=shell.elements, load=load)
     return agreement(replace(popped, equilibrium=find_equilibrium(problem, here.state, here.forces)), stages.target)
