@@ -23,7 +23,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
-from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.grid import (
     STAGE,
     Shape,
@@ -142,7 +142,7 @@ def compas_json(archive: Archive, state: str) -> str:
     return json.dumps({"rods": lines, "grid": graph}, ensure_ascii=False) + "\n"
 
 
-def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
+def rhino_bytes(archive: Archive) -> bytes:
     """The whole model.
 
     Raises:
@@ -174,6 +174,7 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
             result.Add(x, y, z)
         return result
 
+    plan = flat_plan(archive)
     mm = plan.rounding.mm
     for rod, course in zip(plan.rods, plan.courses, strict=True):
         figures = {"length_mm": mm(rod.length), "cut_length_mm": mm(rod.cut_length)}

@@ -136,22 +136,9 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
     return picture_document(picture(archive, state, colour))
 
 
+@made_once
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
     """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format."""
-    kept = _pictures(archive)
-    if (state, colour) not in kept:
-        kept[state, colour] = _laid_out(archive, state, colour)
-    return kept[state, colour]
-
-
-@made_once
-def _pictures(archive: Archive) -> dict[tuple[str, Colour], Drawing]:
-    """The pictures of the archive that were asked for so far."""
-    return {}
-
-
-def _laid_out(archive: Archive, state: str, colour: Colour) -> Drawing:
-    """A picture, see `picture`."""
     shape = shape_of(archive, state)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)
