@@ -211,9 +211,9 @@ def _png(archive: Archive) -> Files:
 
     for name in _meshed(archive, *(name for name in shape_names(archive) if name in ("flat", archive.final))):
         shape = shape_of(archive, name)
-        if shape.gap is not None or shape.stress is None:
+        if shape.gap is not None or "stress" not in shape.known:
             yield f"pictures/{name}.png", drawing_png(picture(archive, name, "gap"))
-        if shape.stress is not None:
+        if "stress" in shape.known:
             yield f"pictures/{name}-stress.png", drawing_png(picture(archive, name, "stress"))
     if {"history", "rod_nodes"} <= archive.states.keys():
         yield "pictures/pop_up.png", drawing_png(deployment_picture(archive))

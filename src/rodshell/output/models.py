@@ -86,9 +86,9 @@ def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
 def _known(shape: Shape, nodes: Ints) -> Iterator[tuple[str, Floats]]:
     if shape.gap is not None and np.isfinite(shape.gap).all():
         yield "gap", shape.gap[nodes]
-    for key, values in (("stress", shape.stress), ("curvature", shape.curvature)):
-        if values is not None:
-            yield key, np.asarray(values, dtype=np.float64)
+    for key in ("stress", "curvature"):
+        if key in shape.known:
+            yield key, np.asarray(shape.known[key], dtype=np.float64)
 
 
 def _data_array(name: str, values: NDArray[np.generic], **attributes: str) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.blanks import Blank, blanks_of
@@ -60,7 +60,8 @@ class FlatPlan:
         cuts: (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
         courses: (k, 2) of each rod along it, from cut to cut [mm].
         marks: (c, 2) the joints, in the order of `joints` [mm].
-        footprint: closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
+        outlines: rod ends around the grid and around each opening, see `outlines_of`.
+        footprint: closed curves (f, 2) through them [mm].
         boundary: closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if
             they are not known.
         rounding: how finely lengths are shown.
@@ -75,6 +76,7 @@ class FlatPlan:
     cuts: Floats
     courses: list[Floats]
     marks: Floats
+    outlines: list[Ints]
     footprint: list[Floats]
     boundary: list[Floats]
     rounding: Rounding
@@ -160,9 +162,9 @@ def flat_plan(archive: Archive) -> FlatPlan:
     marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
     footprint = np.array(archive.results.footprint or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
     boundary = np.array(archive.results.boundary, dtype=float).reshape(-1, 3)
-    loops = outlines_of(rods)
+    loops = outlines_of(archive)
     return FlatPlan(
-        rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks,
+        rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks, loops,
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
         rounding_of(archive.results), laths_text(archive.results), blanks_of(archive),
@@ -232,8 +234,8 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
 
 def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
     """Each rod's label at its ends, on its line; in an opening, around it."""
-    names, outlines = [rod.id for rod in plan.rods], outlines_of(plan.rods)
-    inside = [loop for loop in outlines if opens(plan.lines.reshape(-1, 2)[loop])]
+    names = [rod.id for rod in plan.rods]
+    inside = [loop for loop in plan.outlines if opens(plan.lines.reshape(-1, 2)[loop])]
     outside = np.ones(2 * len(names), dtype=bool)
     outside[[end for loop in inside for end in loop]] = False
     labels, room = place(names, plan.cuts, text, at=outside.reshape(-1, 2)), Room(4 * text)

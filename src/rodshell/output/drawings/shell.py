@@ -95,7 +95,7 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     pen = Pen(INK, 0.04 * text)
     drawn = meshed_rods(archive)
     ways, thin = 1e3 * history[:, end_nodes(drawn), :2], Pen(SOFT, 0.05 * text)
-    loops = [loop for loop in outlines_of(drawn) if len(loop) > 1]
+    loops = [loop for loop in outlines_of(archive) if len(loop) > 1]
     for stage, loop in product(ways[:-1], loops):
         pencil.line(stage[loop], "DIM", closed=True, pen=thin)
     for way in ways.transpose(1, 0, 2):
@@ -195,9 +195,9 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
         room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
     lines = segments(_thinned(_thinned(curve)) for curve in curves)  # what names keep clear of
     alone = ~np.isin(names, list(_sewn(archive)))
-    for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
+    for seam in (run for loop in outlines_of(archive) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
-    walks, left_out = list(_walks(outlines_of(drawn), ends, alone)), 0
+    walks, left_out = list(_walks(outlines_of(archive), ends, alone)), 0
     for walk in walks:
         if len(walk) > 1:
             pencil.line(ends[walk], "BOUNDARY-FINAL", closed=True)
