@@ -17,7 +17,7 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.blanks import Blank, blanks_of
-from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
+from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil, Text
 from rodshell.output.grid import GridJoint, GridRod, family_numbers, joints_of, opens, outlines_of, rods_of
 from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, segments, spread, take
 from rodshell.output.schedules import Show
@@ -218,14 +218,11 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
     for joint, mark, note in zip(plan.joints, plan.marks, plan.notes, strict=True):
         pencil.mark(mark, radius, "MARK", note=note)
         size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
-        for clear_of, corner in product((both, lines), CORNERS if size >= SMALL * text else ()):
-            off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
-            label = Label(joint.id, mark + off * corner, 0.0, mark, moved=False)
-            written = label.written(size)
-            box = written.box()
-            if not lines_meet(box, clear_of) and room.claim(box):
-                pencil.texts.append(written)
-                break
+        off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
+        labels = [Label(joint.id, mark + off * corner, 0.0, mark, moved=False).written(size) for corner in CORNERS]
+        tried = product((both, lines), labels if size >= SMALL * text else ())
+        if written := room.first(label for clear_of, label in tried if not lines_meet(label.box(), clear_of)):
+            pencil.texts.append(written)
         else:
             left_out += 1
     pencil.leave_out(left_out, len(plan.joints), "joint ids (named by the rods that cross)")
@@ -290,11 +287,12 @@ def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float
     pencil.line([a, b], "DIM", pen=Pen("#b08a2e", 0.05 * text, (1.5 * text, 0.5 * text, 0.3 * text, 0.5 * text)))
     words, angle = plan.rounding.mm(1e-3 * float(np.linalg.norm(along))), float(np.arctan2(along[1], along[0]))
     shares = sorted(np.linspace(0.1, 0.9, 81).tolist(), key=lambda share: abs(share - 0.33))
-    for size, share in ((size, share) for size in (text, SMALL * text) for share in shares):
-        pencil.write(words, a + share * along, size, "DIM", anchor="middle", angle=angle, colour="#8a6a1c")
-        if room.claim(pencil.texts[-1].box()):
-            return
-        pencil.texts.pop()
+    tried = (
+        Text(words, a + share * along, size, "DIM", "middle", angle, colour="#8a6a1c")
+        for size, share in product((text, SMALL * text), shares)
+    )
+    if written := room.first(tried):
+        pencil.texts.append(written)
 
 
 def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:

@@ -257,12 +257,12 @@ def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None
     size, left_out = SMALL * text, 0
     for number, meeting in seam_meetings(archive.results):
         at = 1e3 * np.array(meeting.point[:2])
-        for corner in ((0.5, 0.4), (-0.5, 0.4), (0.5, -1.1), (-0.5, -1.1)):
-            anchor = "start" if corner[0] > 0 else "end"
-            pencil.write(number, at + text * np.array(corner), size, "LABEL", anchor=anchor)
-            if room.claim(pencil.texts[-1].box()):
-                break
-            pencil.texts.pop()
+        tried = (
+            Text(number, at + text * np.array([side, up]), size, "LABEL", "start" if side > 0 else "end")
+            for up, side in product((0.4, -1.1), (0.5, -0.5))
+        )
+        if written := room.first(tried):
+            pencil.texts.append(written)
         else:
             left_out += 1
     pencil.leave_out(left_out, sum(1 for _ in seam_meetings(archive.results)), "numbers of meetings (table Seams)")
