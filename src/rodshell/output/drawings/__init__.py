@@ -134,7 +134,7 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, 
         "supports": (partial(supports_drawing, archive, plan), above),
         "elevations": (partial(elevations_drawing, archive), both_sides),
     }
-    if archive.results.fabrication and archive.results.fabrication.bracing:
+    if archive.results.bracing:
         makers["bracing"] = (partial(bracing_drawing, archive), above)
     if "history" in archive.states and archive.results.deployment:
         makers["erection"] = (partial(erection_drawing, archive), above)

@@ -283,8 +283,7 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     joints = joint_places(archive, archive.states[final])
     supports = [f"{rod.id}.{end}" for rod in archive.results.rods for end in (0, 1)]
     joints |= {name: np.array(place) for name, place in zip(supports, archive.results.boundary, strict=False)}
-    known = archive.results.fabrication.bracing if archive.results.fabrication else ()
-    braces = [brace for brace in known if {brace.start, brace.end} <= joints.keys()]
+    braces = [brace for brace in archive.results.bracing if {brace.start, brace.end} <= joints.keys()]
     ends = 1e3 * np.array([[joints[end][:2] for end in (brace.start, brace.end)] for brace in braces])
     ends = ends.reshape(-1, 2, 2)
     pen = Pen("#b08a2e", 0.07 * text)
