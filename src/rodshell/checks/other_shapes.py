@@ -9,7 +9,7 @@ is a shape of the shell; that nothing is found proves nothing, so the search say
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from scipy.sparse import coo_array, csgraph
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from rodshell.arrays import Floats
@@ -202,9 +202,10 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     """
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]
-    springs = coo_array((1.0 / mesh.edge_lengths, tuple(joined[mesh.edges].T)), shape=2 * (mesh.node_count,))
+    ends, signs = joined[mesh.edges].ravel(), np.tile([-1.0, 1.0], len(mesh.edges))
+    pulled = csr_array((signs, ends, 2 * np.arange(len(mesh.edges) + 1)), shape=(len(mesh.edges), mesh.node_count))
     inner = np.setdiff1d(joined, joined[mesh.ends])
-    stiffness = csgraph.laplacian(springs, symmetrized=True).tocsr()[inner]
+    stiffness = csr_array(pulled.T @ diags_array(1.0 / mesh.edge_lengths) @ pulled)[inner]
     result = positions.copy()
     result[inner] -= spsolve(stiffness[:, inner].tocsc(), stiffness @ positions)
     return np.asarray(result[joined])

@@ -223,7 +223,7 @@ def made_once(make: Callable[Concatenate[Archive, P], T]) -> Callable[Concatenat
     """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods."""
 
     @wraps(make)
-    def kept(archive: Archive, *args: P.args, **options: P.kwargs) -> T:
+    def kept(archive: Archive, /, *args: P.args, **options: P.kwargs) -> T:
         key = make, args, *options.items()
         if key not in archive._made:
             archive._made[key] = make(archive, *args, **options)

@@ -213,8 +213,8 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
     radius = min(0.25 * text, 0.04 * plan.spacing, 1.0)
     clear = max(radius, 0.5 * ROD * text) + GAP * text
     room, both, left_out = Room(plan.spacing), np.concatenate([lines, across]), 0
-    for written in pencil.texts:
-        room.take(written.box())
+    for there in pencil.texts:
+        room.take(there.box())
     for joint, mark, note in zip(plan.joints, plan.marks, plan.notes, strict=True):
         pencil.mark(mark, radius, "MARK", note=note)
         size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
