@@ -38,7 +38,7 @@ def rows() -> Iterator[Row]:
             shell, found = popped.shell, popped.equilibrium
             twin, held = LoadedTwin(popped, rod), reactions(shell, found)
             yield from unloaded_rows(f"{name}, {ends}", twin, held, popped.report.negative_modes)
-            weighed = self_weight(shell, found, most=HIGH)
+            weighed, _ = self_weight(shell, found, most=HIGH)
             if rod is ROD and target is HEMISPHERE:
                 low, high = BOUNDS[ends]
                 yield Row(f"{name}, {ends}", "load factor on the own weight", _at_least(weighed), high)
@@ -49,7 +49,7 @@ def rows() -> Iterator[Row]:
         _, target, layout, anchor = random_case(seed)
         popped = rs.find_form(target, layout, ROD, anchor=anchor).popped[held_by]  # type: ignore[index]
         yield from _loaded(
-            f"random {seed}, {held_by}", LoadedTwin(popped, ROD), self_weight(popped.shell, popped.equilibrium)
+            f"random {seed}, {held_by}", LoadedTwin(popped, ROD), self_weight(popped.shell, popped.equilibrium)[0]
         )
 
 

@@ -14,7 +14,7 @@ from rodshell.checks.contact import contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy_grids, reached_by_turning
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import snow_carried, weighed
+from rodshell.checks.self_weight import self_weight, snow_carried
 from rodshell.errors import OutOfTimeError
 from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, Stage
 from rodshell.figures.findings import Said, said
@@ -259,13 +259,13 @@ def _long_checks(
     missing += [*(["the deployment from flat"] if upright else []), "other stable shapes"]
     try:
         for ends, shape in done.items():
-            following = partial(_weighing, ends, progress)
-            weights[ends], whole = weighed(shape.shell, shape.equilibrium, progress=following)
+            following = partial(_loading, progress, "self-weight", ends, 100.0, "% of the weight")
+            weights[ends], whole = self_weight(shape.shell, shape.equilibrium, progress=following)
             missing.pop(0)
             if plan is None:
                 continue
             if whole is not None:
-                snow[ends] = snow_carried(whole, plan, partial(_snowing, ends, progress))
+                snow[ends] = snow_carried(whole, plan, partial(_loading, progress, "snow", ends, 1.0, "kPa"))
             elif weights[ends].limit not in ("not followed", "no mass"):
                 snow[ends] = 0.0
             missing.pop(0)
@@ -328,10 +328,8 @@ def _starting(ends: Ends, progress: Progress, start: int) -> None:
     progress("other shapes", f"{ends} ends, start {start}", 0.0)
 
 
-def _snowing(ends: Ends, progress: Progress, count: int, factor: float) -> None:
-    progress("snow", f"{ends} ends, {factor:.3g} kPa, {count} of at most {MOST_FACTORIZATIONS} factorisations", 0.0)
-
-
-def _weighing(ends: Ends, progress: Progress, count: int, factor: float) -> None:
+def _loading(
+    progress: Progress, stage: str, ends: Ends, times: float, unit: str, count: int, factor: float
+) -> None:  # fmt: skip
     done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
-    progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
+    progress(stage, f"{ends} ends, {times * factor:.3g} {unit}, {done}", 0.0)

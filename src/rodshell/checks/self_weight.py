@@ -27,19 +27,6 @@ def shown_limit(limit: Limit) -> str:
 
 
 def self_weight(
-    shell: Shell,
-    found: Equilibrium,
-    *,
-    mass: Floats | None = None,
-    gravity: float = STANDARD_GRAVITY,
-    most: float = MOST,
-    progress: Callable[[int, float], None] = lambda count, factor: None,
-) -> SelfWeight:
-    """How much of its own weight a shell carries: as `weighed`, without the equilibrium."""
-    return weighed(shell, found, mass=mass, gravity=gravity, most=most, progress=progress)[0]
-
-
-def weighed(
     shell: Shell, found: Equilibrium, *, mass: Floats | None = None, gravity: float = STANDARD_GRAVITY,
     most: float = MOST, progress: Callable[[int, float], None] = lambda count, factor: None,
 ) -> tuple[SelfWeight, Equilibrium | None]:  # fmt: skip

@@ -120,29 +120,34 @@ class GridMesh:
         return np.asarray(self.stations[self.edge_entries + 1] - self.stations[self.edge_entries])
 
     @cached_property
-    def _bend_entries(self) -> Ints:
+    def bend_entries(self) -> Ints:
         """(b,) entry of `rod_nodes` in the middle of each bend."""
-        return np.delete(np.arange(len(self.rod_nodes)), np.append(self.rod_start, self.rod_stop - 1))
+        return np.delete(np.arange(len(self.rod_nodes)), self.end_entries)
 
     @cached_property
     def bends(self) -> Ints:
         """(b, 3) nodes of each pair of consecutive edges of a rod."""
-        return np.asarray(self.rod_nodes[self._bend_entries[:, None] + [-1, 0, 1]])
+        return np.asarray(self.rod_nodes[self.bend_entries[:, None] + [-1, 0, 1]])
 
     @cached_property
     def bend_rods(self) -> Ints:
         """(b,) rod of each bend."""
-        return self.rod_of[self._bend_entries]
+        return self.rod_of[self.bend_entries]
 
     @cached_property
     def voronoi_lengths(self) -> Floats:
         """(b,) half the rest length of the two edges of each bend [m] [HQK Eq 1b, of the rest state: see ERRATA]."""
-        return np.asarray(0.5 * (self.stations[self._bend_entries + 1] - self.stations[self._bend_entries - 1]))
+        return np.asarray(0.5 * (self.stations[self.bend_entries + 1] - self.stations[self.bend_entries - 1]))
+
+    @cached_property
+    def end_entries(self) -> Ints:
+        """(2m,) entries of `rod_nodes` at the start and the end of each rod in turn."""
+        return np.column_stack([self.rod_start, self.rod_stop - 1]).ravel()
 
     @cached_property
     def ends(self) -> Ints:
         """(m, 2) first and last node of each rod."""
-        return np.column_stack([self.rod_nodes[self.rod_start], self.rod_nodes[self.rod_stop - 1]])
+        return np.asarray(self.rod_nodes[self.end_entries].reshape(-1, 2))
 
     @property
     def joint_pairs(self) -> Ints:

@@ -163,7 +163,7 @@ def check_shells(
                 missing.pop(0)
             if len(braced):
                 following = partial(_following, partial(_said, progress, f"own weight, {ends} ends"), "")
-                weighed[ends] = self_weight(
+                weighed[ends], _ = self_weight(
                     structure.shell, structure.equilibrium, mass=structure.mass, progress=following
                 )
     except OutOfTimeError as late:

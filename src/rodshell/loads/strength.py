@@ -358,7 +358,7 @@ class Spans:
     def of(mesh: GridMesh) -> "Spans":
         """The spans of a mesh."""
         stops = _at_joints(mesh)
-        stops[mesh.rod_start] = stops[mesh.rod_stop - 1] = True
+        stops[mesh.end_entries] = True
         entries = np.flatnonzero(stops)
         rods = mesh.rod_of[entries]
         same = rods[1:] == rods[:-1]

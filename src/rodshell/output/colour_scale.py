@@ -70,12 +70,8 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
             there is no target.
     """
     nodes = archive.states["rod_nodes"]
-    if colour == "stress":
-        return None if shape.stress is None else _stress_scale(archive, shape)
-    if colour == "curvature":
-        return None if shape.curvature is None else _curvature_scale(archive, shape)
-    if colour == "force":
-        return None if shape.force is None else _force_scale(archive, shape)
+    if colour != "gap":
+        return _SCALES[colour](archive, shape, shape.known[colour]) if colour in shape.known else None
     if shape.gap is not None:
         return gap_scale(shape.gap[nodes], _largest_of_all_gaps(archive))
     if shape.flat or archive.results.target:
@@ -118,9 +114,8 @@ def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, Floats]]:
             yield name, values
 
 
-def _stress_scale(archive: Archive, shape: Shape) -> Scale:
+def _stress_scale(archive: Archive, shape: Shape, stress: Floats) -> Scale:
     """Utilisation where the strength is known and the stress alone decides, else the stress in a unit of its size."""
-    assert shape.stress is not None
     bending, final = archive.results.bending, is_shell(shape.name)
     strength = bending.strength if bending and not by_code(archive.results) else None
     erection = (bending.erection_strength if bending else None) or strength
@@ -134,23 +129,24 @@ def _stress_scale(archive: Archive, shape: Shape) -> Scale:
         top = max(largest for _, largest in known)
         unit, name = next((entry for entry in PRESSURES if top >= entry[0]), PRESSURES[-1])
         caption, top = f"stress in {name}", top / unit
-    values = shape.stress / unit
+    values = stress / unit
     return _scale(values, max(top, FINEST), STRESS, f"{caption}, here up to {float(np.max(values)):.3g}")
 
 
-def _curvature_scale(archive: Archive, shape: Shape) -> Scale:
-    assert shape.curvature is not None
+def _curvature_scale(archive: Archive, _: Shape, curvature: Floats) -> Scale:
     top = max(float(np.max(values)) for _, values in _of_all_shapes(archive, "curvature"))
-    caption = f"curvature in 1/m, here up to {float(np.max(shape.curvature)):.3g}"
-    return _scale(np.asarray(shape.curvature, dtype=float), max(top, FINEST), STRESS, caption)
+    caption = f"curvature in 1/m, here up to {float(np.max(curvature)):.3g}"
+    return _scale(np.asarray(curvature, dtype=float), max(top, FINEST), STRESS, caption)
 
 
-def _force_scale(archive: Archive, shape: Shape) -> Scale:
+def _force_scale(archive: Archive, _: Shape, force: Floats) -> Scale:
     """Normal forces; signed as gaps are, so that rods without a force are drawn in ink."""
-    assert shape.force is not None
     top = max(float(np.abs(values).max()) for _, values in _of_all_shapes(archive, "force"))
     unit, name = (1e3, "kN") if top >= 1e3 else (1.0, "N") if top >= 1.0 else (1e-3, "mN")
-    return _scale(shape.force / unit, max(top / unit, FINEST), SIGNED, f"normal force in {name}, + tension")
+    return _scale(force / unit, max(top / unit, FINEST), SIGNED, f"normal force in {name}, + tension")
+
+
+_SCALES = {"stress": _stress_scale, "curvature": _curvature_scale, "force": _force_scale}
 
 
 def _scale(values: Floats, largest: float, colours: tuple[str, ...], caption: str) -> Scale:

@@ -12,7 +12,6 @@ from markupsafe import Markup
 from rodshell.figures.loads import LoadedShell, Utilisations
 from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
-from rodshell.output.schedules import loaded_shells
 from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
 from rodshell.results.wording import millimetres, percent, rounded, rounded_down, rounding_of, shown_factor, stress
@@ -49,7 +48,7 @@ SEAMS = (
 def loads_page(archive: Archive) -> dict[str, Any] | None:
     """What the page shows; None where no loads were checked."""
     results = archive.results
-    shells = list(loaded_shells(results))
+    shells = list(results.loaded_shells())
     if not shells:
         return None
     pictures = [
@@ -237,10 +236,9 @@ def _joints(shell: LoadedShell) -> Row:
 
 def _bracing(results: Results, shell: LoadedShell) -> Row:
     forces = np.array([force for force in shell.bracing if force is not None])
-    braces = results.fabrication.bracing if results.fabrication else ()
     pull, push = max(0.0, float(forces.max(initial=0.0))), max(0.0, -float(forces.min(initial=0.0)))
     where = int(np.argmax([abs(force or 0.0) for force in shell.bracing]))
-    most = f"{braces[where].start} to {braces[where].end}" if where < len(braces) else ""
+    most = f"{results.bracing[where].start} to {results.bracing[where].end}" if where < len(results.bracing) else ""
     before = [force for force in shell.bracing_unloaded if force is not None]
     return {
         "Braces": str(len(forces)),

@@ -23,7 +23,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import needs_package
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
-from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.grid import (
     STAGE,
     Shape,
@@ -86,9 +86,9 @@ def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
 def _known(shape: Shape, nodes: Ints) -> Iterator[tuple[str, Floats]]:
     if shape.gap is not None and np.isfinite(shape.gap).all():
         yield "gap", shape.gap[nodes]
-    for key, values in (("stress", shape.stress), ("curvature", shape.curvature)):
-        if values is not None:
-            yield key, np.asarray(values, dtype=np.float64)
+    for key in ("stress", "curvature"):
+        if key in shape.known:
+            yield key, np.asarray(shape.known[key], dtype=np.float64)
 
 
 def _data_array(name: str, values: NDArray[np.generic], **attributes: str) -> str:
@@ -142,7 +142,7 @@ def compas_json(archive: Archive, state: str) -> str:
     return json.dumps({"rods": lines, "grid": graph}, ensure_ascii=False) + "\n"
 
 
-def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
+def rhino_bytes(archive: Archive) -> bytes:
     """The whole model.
 
     Raises:
@@ -172,6 +172,7 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
             result.Add(x, y, z)
         return result
 
+    plan = flat_plan(archive)
     mm = plan.rounding.mm
     for rod, course in zip(plan.rods, plan.courses, strict=True):
         figures = {"length_mm": mm(rod.length), "cut_length_mm": mm(rod.cut_length)}

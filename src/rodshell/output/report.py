@@ -5,7 +5,7 @@ and draws nothing between them.
 """
 
 import base64
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -15,8 +15,8 @@ from rodshell.figures.checks import OTHER_SHAPES, Clearance, Reactions, SelfWeig
 from rodshell.figures.fabrication import Stock
 from rodshell.figures.form import Agreement, Drape, Gate, PopUp
 from rodshell.figures.records import Ends, Record
-from rodshell.output.drawing import Drawing
-from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.drawings import drawing_set, drawing_svgs
+from rodshell.output.drawings.flat import FlatPlan, flat_plan
 from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
 from rodshell.output.grid import caption_of, shape_names
 from rodshell.output.loads_page import loads_page
@@ -46,8 +46,8 @@ GUIDED = "; between {start} and {stop} of the deployment it has to be guided, an
 NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between are not known."
 
 
-def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing], files: Mapping[str, str]) -> str:
-    """The whole page; `plan`, `drawings` and the same as SVG `files` are the archive's."""
+def report_html(archive: Archive) -> str:
+    """The whole page."""
     environment = Environment(
         loader=PackageLoader("rodshell.output", "templates"),
         autoescape=True,
@@ -59,7 +59,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     def shown(svg: str) -> Markup:
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
-    results = archive.results
+    results, plan, drawings, files = archive.results, flat_plan(archive), drawing_set(archive), drawing_svgs(archive)
     shown_as = ("flat", *shells_among(archive.states))
     states = [name for name in shape_names(archive) if name in shown_as and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(

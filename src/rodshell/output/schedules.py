@@ -17,10 +17,9 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.figures.checks import JointLoad
-from rodshell.figures.fabrication import Brace, Stock
+from rodshell.figures.fabrication import Stock
 from rodshell.figures.form import Meeting, Stiffness
-from rodshell.figures.loads import LoadedShell
-from rodshell.figures.records import Ends, printable
+from rodshell.figures.records import printable
 from rodshell.geometry.frames import unit
 from rodshell.output.blanks import boards_of
 from rodshell.output.grid import GridJoint, GridRod, end_nodes, joints_of, lies_flat, node_stations, rods_of
@@ -245,8 +244,7 @@ def bracing_table(archive: Archive) -> Table:
     which leave it slack.
     """
     results, rounding = archive.results, rounding_of(archive.results)
-    mm = rounding.mm
-    braces = _bracing_of(archive)
+    mm, braces = rounding.mm, results.bracing
     table = {
         "from": [brace.start for brace in braces],
         "to": [brace.end for brace in braces],
@@ -259,9 +257,9 @@ def bracing_table(archive: Archive) -> Table:
         fine = 1e3 * min(shortened) < OF_SHORTENING * rounding.step
         to_cut = Rounding(min(FINE, rounding.step)) if fine else rounding
         table["cut_mm"] = [to_cut.mm(brace.cut) for brace in braces]
-        for ends, shell in {ends: shell for _, ends, shell in loaded_shells(results) if shell.bracing_unloaded}.items():
-            table[f"stress_to_N_{ends}"] = [_six(force) for force in shell.bracing_unloaded]
-    loaded = {(name, ends): shell.bracing for name, ends, shell in loaded_shells(results) if shell.bracing}
+        before = {ends: shell.bracing_unloaded for _, ends, shell in results.loaded_shells() if shell.bracing_unloaded}
+        table |= {f"stress_to_N_{ends}": [_six(force) for force in forces] for ends, forces in before.items()}
+    loaded = {(name, ends): shell.bracing for name, ends, shell in results.loaded_shells() if shell.bracing}
     for (name, ends), forces in loaded.items():
         table[f"force_N_{ends}_{name}"] = [_six(force) for force in forces]
     if loaded and cables:
@@ -278,18 +276,11 @@ def foundations_table(archive: Archive) -> Table:
     results = archive.results
     table = {"id": [f"{rod.id}.{end}" for rod in rods_of(archive) for end in (0, 1)]}
     table |= _by_axis("", "_mm", results.boundary, rounding_of(results).mm)
-    for name, ends, shell in loaded_shells(results):
+    for name, ends, shell in results.loaded_shells():
         table |= _by_axis("force_", f"_N_{ends}_{name}", shell.support_forces, _six)
         if np.nan_to_num(shell.support_moments).any():
             table |= _by_axis("moment_", f"_Nm_{ends}_{name}", shell.support_moments, _six)
     return table
-
-
-def loaded_shells(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
-    """Every combination of loads with each end condition, and the shell under it."""
-    for name, by_ends in results.loads.items():
-        for ends, shell in by_ends.items():
-            yield name, ends, shell
 
 
 def stock_table(archive: Archive) -> Table:
@@ -421,10 +412,6 @@ def _stock_of(archive: Archive) -> Stock | None:
     return archive.results.fabrication.stock if archive.results.fabrication else None
 
 
-def _bracing_of(archive: Archive) -> Sequence[Brace]:
-    return archive.results.fabrication.bracing if archive.results.fabrication else ()
-
-
 SCHEDULES = {
     "rods": Schedule(
         "Rods", rods_table, ("family", "offset_mm", "start_mm", "end_mm", "max_*_curvature_per_m", "max_twist_*",
@@ -432,7 +419,7 @@ SCHEDULES = {
     ),
     "joints": Schedule("Joints", joints_table, ("rod_?", "flat_?_mm", "final_state", "scissor_deg", "*_N", "*_Nm")),
     "supports": Schedule("Supports", supports_table, ("rod", "end", "force_*", "moment_*"), ("tangent_*",)),
-    "bracing": Schedule("Bracing", bracing_table, ("force_*",), known=lambda archive: bool(_bracing_of(archive))),
+    "bracing": Schedule("Bracing", bracing_table, ("force_*",), known=lambda archive: bool(archive.results.bracing)),
     "foundations": Schedule("Foundations", foundations_table, known=lambda archive: bool(archive.results.loads)),
     "stock": Schedule("Stock", stock_table, known=lambda archive: _stock_of(archive) is not None),
     "sections": Schedule(

@@ -252,5 +252,4 @@ def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) ->
     known = {
         frozenset((names[a], names[b])): force for (a, b), force in zip(braced.tolist(), forces.tolist(), strict=True)
     }
-    rows = results.fabrication.bracing if results.fabrication else ()
-    return tuple(known.get(frozenset((brace.start, brace.end))) for brace in rows) if known else ()
+    return tuple(known.get(frozenset((brace.start, brace.end))) for brace in results.bracing) if known else ()

@@ -14,13 +14,14 @@ from pydantic import FailFast, Field, ValidationError
 
 from rodshell.errors import InputError, OutputError
 from rodshell.figures import checks, form
-from rodshell.figures.fabrication import Fabrication
+from rodshell.figures.fabrication import Brace, Fabrication
 from rodshell.figures.findings import Finding, Level
-from rodshell.figures.loads import DesignStrength, LoadCases
+from rodshell.figures.loads import DesignStrength, LoadCases, LoadedShell
 from rodshell.figures.records import (
     FARTHEST,
     SHORTEST,
     ByEnds,
+    Ends,
     Flag,
     Flat,
     Number,
@@ -180,6 +181,15 @@ class Results(Record, metaclass=_Refusing):
         """The text of result.json."""
         return json_text(self.plain())
 
+    @property
+    def bracing(self) -> tuple[Brace, ...]:
+        """All diagonals; none where there is no fabrication."""
+        return self.fabrication.bracing if self.fabrication else ()
+
+    def loaded_shells(self) -> Iterator[tuple[str, Ends, LoadedShell]]:
+        """Every combination of loads with each end condition, and the shell under it."""
+        return ((name, ends, shell) for name, found in self.loads.items() for ends, shell in found.items())
+
 
 def read_results(path: Path) -> Results:
     """The content of a result.json, every value checked.
@@ -267,14 +277,12 @@ def contradictions(results: Results) -> Iterator[str]:
     counts: dict[str, Sized] = {name: getattr(results, name) for name in ("footprint", "boundary", "end_tangents")}
     for support, held in results.reactions.items():
         counts |= {f"reactions.{support}.forces": held.forces, f"reactions.{support}.moments": held.moments}
-    for name, supported in results.loads.items():
-        for support, loaded in supported.items():
-            where = f"loads.{name}.{support}"
-            counts |= {f"{where}.reactions": loaded.reactions, f"{where}.support_forces": loaded.support_forces}
-            counts[f"{where}.support_moments"] = loaded.support_moments
-            braces = len(results.fabrication.bracing) if results.fabrication else 0
-            if len(loaded.bracing) not in (0, braces):
-                yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
+    for name, support, loaded in results.loaded_shells():
+        where, braces = f"loads.{name}.{support}", len(results.bracing)
+        counts |= {f"{where}.reactions": loaded.reactions, f"{where}.support_forces": loaded.support_forces}
+        counts[f"{where}.support_moments"] = loaded.support_moments
+        if len(loaded.bracing) not in (0, braces):
+            yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
     needed = [name for name in counts if name.startswith("reactions.") or name.endswith("support_forces")]
     for name, entries in counts.items():
         if len(entries) not in (2 * len(ids), *([] if name in needed else [0])):
@@ -303,11 +311,10 @@ def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
             yield from ((f"joint_loads.{support}[{k}].rods", name) for name in load.rods)
     bent = results.bending.shapes() if results.bending else {}
     yield from ((f"bending.{shape}.rod", worst.rod) for shape, worst in bent.items() if worst.rod is not None)
-    for name, supported in results.loads.items():
-        for support, loaded in supported.items():
-            for what, where in (("governs", loaded.governs), ("euler_at", loaded.euler_at)):
-                if where is not None:
-                    yield f"loads.{name}.{support}.{what}.rod", where.rod
+    for name, support, loaded in results.loaded_shells():
+        for what, where in (("governs", loaded.governs), ("euler_at", loaded.euler_at)):
+            if where is not None:
+                yield f"loads.{name}.{support}.{what}.rod", where.rod
     for shape, nearest in results.contact.shapes().items() if results.contact else ():
         yield from ((f"contact.{shape}.rods", name) for name in nearest.rods or ())
 

@@ -279,27 +279,26 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
 
 def _loads(results: Results, length: Length) -> Iterator[str]:
     """What each combination of loads does, a line for each end condition."""
-    for name, by_ends in results.loads.items():
-        for ends, found in by_ends.items():
-            limit = f"up to {shown_factor(found.limit_factor)} times the loads ({found.limit_kind})"
-            if found.limit_factor is None and found.limit_kind == "none":
-                limit = "beyond 100 times the loads"
-            line = f"  loads     {ends:<8}{name}: stable {limit}"
-            if found.linear_factor is not None:
-                line += f", linear {shown_factor(found.linear_factor)}"
-            if found.imperfect_factor is not None:
-                line += f", with imperfections {shown_factor(found.imperfect_factor)}"
-            at = "" if found.at_factor == 1 else f" at {rounded_down(found.at_factor or 0.0)} times"
-            line += f"; deflection{at} {length(found.max_deflection)}"
-            if found.utilisation is not None:
-                worst = found.governs
-                of = f"the design strength{f' ({worst.by}, {worst.rod})' if worst and worst.by else ''}"
-                if worst and worst.by in ("slip", "slip_unloaded"):
-                    of = f"the force at which a joint slips ({worst.rod})"
-                if worst and worst.by in UNLOADED:
-                    of += " before loads act"
-                line += f", {percent(found.utilisation)} of {of}"
-            yield line
+    for name, ends, found in results.loaded_shells():
+        limit = f"up to {shown_factor(found.limit_factor)} times the loads ({found.limit_kind})"
+        if found.limit_factor is None and found.limit_kind == "none":
+            limit = "beyond 100 times the loads"
+        line = f"  loads     {ends:<8}{name}: stable {limit}"
+        if found.linear_factor is not None:
+            line += f", linear {shown_factor(found.linear_factor)}"
+        if found.imperfect_factor is not None:
+            line += f", with imperfections {shown_factor(found.imperfect_factor)}"
+        at = "" if found.at_factor == 1 else f" at {rounded_down(found.at_factor or 0.0)} times"
+        line += f"; deflection{at} {length(found.max_deflection)}"
+        if found.utilisation is not None:
+            worst = found.governs
+            of = f"the design strength{f' ({worst.by}, {worst.rod})' if worst and worst.by else ''}"
+            if worst and worst.by in ("slip", "slip_unloaded"):
+                of = f"the force at which a joint slips ({worst.rod})"
+            if worst and worst.by in UNLOADED:
+                of += " before loads act"
+            line += f", {percent(found.utilisation)} of {of}"
+        yield line
 
 
 def _deployment(results: Results) -> Iterator[str]:

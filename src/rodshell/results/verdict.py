@@ -176,9 +176,8 @@ UNLOADED = ("permanent", "slip_unloaded")  # of these no load is the cause
 def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
     """Combinations of loads under which the shell falls or breaks, and what is too much before they act."""
     unloaded = dict[str, Said]()
-    for name, by_ends in results.loads.items():
-        found = by_ends.get(ends)
-        if found is None:
+    for name, end, found in results.loaded_shells():
+        if end != ends:
             continue
         limit, used = found.limit_factor, found.utilisation
         if found.limit_kind == "unstable unloaded":
@@ -493,7 +492,7 @@ def _assumed(results: Results) -> Iterator[Said]:
     """What was taken where nothing was given or is known: the perfect shell, a service class, no creep; and how cables
     are to be stressed."""
     strength = results.strength
-    if any(found.imperfect_kind is None for by_ends in results.loads.values() for found in by_ends.values()):
+    if any(found.imperfect_kind is None for _, _, found in results.loaded_shells()):
         offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
         yield said("no_imperfections", offers=(offer,), offer=offer)
     if strength is not None and strength.code and strength.service_class is None:
@@ -505,8 +504,8 @@ def _assumed(results: Results) -> Iterator[Said]:
 
 def _cables(results: Results) -> Iterator[Said]:
     """That lengths do not decide the forces of cables which are hardly shortened, and what scatter of them does."""
-    braces = results.fabrication.bracing if results.fabrication else ()
-    shortened = [final - cut for brace in braces if (cut := brace.cut) and (final := brace.final) and final > cut]
+    known = ((brace.cut, brace.final) for brace in results.bracing if brace.cut and brace.final)
+    shortened = [final - cut for cut, final in known if final > cut]
     if not shortened or min(shortened) >= SURE * SCATTER or width(results) <= LARGE:
         return
     least, most = min(shortened), max(shortened)

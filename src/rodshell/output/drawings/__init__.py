@@ -40,17 +40,19 @@ from rodshell.output.drawings.shell import (
 from rodshell.output.grid import lies_flat, supported
 from rodshell.output.schedules import SCHEDULES
 from rodshell.output.settings import PAPERS
+from rodshell.output.svg import drawing_svg
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.states import DRAPED, POPPED
 from rodshell.rods.supports import clamped_among, finals_first
 
-__all__ = ["drawing_set", "sheet_set"]
+__all__ = ["drawing_set", "drawing_svgs", "sheet_set"]
 
 
 FINER = {"bracing": 0.5}  # smallest texts of a drawing at 1:1 over those of the plan, where more of them find room
 
 
+@made_once
 def drawing_set(archive: Archive) -> dict[str, Drawing]:
     """Every drawing that the archive has content for, at 1:1 with a title block, by name."""
     plan = flat_plan(archive)
@@ -59,6 +61,12 @@ def drawing_set(archive: Archive) -> dict[str, Drawing]:
     first = {"plan": drawings.pop("plan")} if "plan" in drawings else {}
     first["strips"] = strips_drawing(plan, plan.text)
     return {name: with_title(drawing, block) for name, drawing in (first | drawings).items()}
+
+
+@made_once
+def drawing_svgs(archive: Archive) -> dict[str, str]:
+    """The same as SVG files."""
+    return {name: drawing_svg(drawing) for name, drawing in drawing_set(archive).items()}
 
 
 def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
@@ -126,7 +134,7 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, 
         "supports": (partial(supports_drawing, archive, plan), above),
         "elevations": (partial(elevations_drawing, archive), both_sides),
     }
-    if archive.results.fabrication and archive.results.fabrication.bracing:
+    if archive.results.bracing:
         makers["bracing"] = (partial(bracing_drawing, archive), above)
     if "history" in archive.states and archive.results.deployment:
         makers["erection"] = (partial(erection_drawing, archive), above)

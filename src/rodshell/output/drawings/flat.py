@@ -13,11 +13,11 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.blanks import Blank, blanks_of
-from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
+from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil, Text
 from rodshell.output.grid import GridJoint, GridRod, family_numbers, joints_of, opens, outlines_of, rods_of
 from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, segments, spread, take
 from rodshell.output.schedules import Show
@@ -60,7 +60,8 @@ class FlatPlan:
         cuts: (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
         courses: (k, 2) of each rod along it, from cut to cut [mm].
         marks: (c, 2) the joints, in the order of `joints` [mm].
-        footprint: closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
+        outlines: rod ends around the grid and around each opening, see `outlines_of`.
+        footprint: closed curves (f, 2) through them [mm].
         boundary: closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if
             they are not known.
         rounding: how finely lengths are shown.
@@ -75,6 +76,7 @@ class FlatPlan:
     cuts: Floats
     courses: list[Floats]
     marks: Floats
+    outlines: list[Ints]
     footprint: list[Floats]
     boundary: list[Floats]
     rounding: Rounding
@@ -160,9 +162,9 @@ def flat_plan(archive: Archive) -> FlatPlan:
     marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
     footprint = np.array(archive.results.footprint or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
     boundary = np.array(archive.results.boundary, dtype=float).reshape(-1, 3)
-    loops = outlines_of(rods)
+    loops = outlines_of(archive)
     return FlatPlan(
-        rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks,
+        rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks, loops,
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
         rounding_of(archive.results), laths_text(archive.results), blanks_of(archive),
@@ -211,19 +213,16 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
     radius = min(0.25 * text, 0.04 * plan.spacing, 1.0)
     clear = max(radius, 0.5 * ROD * text) + GAP * text
     room, both, left_out = Room(plan.spacing), np.concatenate([lines, across]), 0
-    for written in pencil.texts:
-        room.take(written.box())
+    for there in pencil.texts:
+        room.take(there.box())
     for joint, mark, note in zip(plan.joints, plan.marks, plan.notes, strict=True):
         pencil.mark(mark, radius, "MARK", note=note)
         size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
-        for clear_of, corner in product((both, lines), CORNERS if size >= SMALL * text else ()):
-            off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
-            label = Label(joint.id, mark + off * corner, 0.0, mark, moved=False)
-            written = label.written(size)
-            box = written.box()
-            if not lines_meet(box, clear_of) and room.claim(box):
-                pencil.texts.append(written)
-                break
+        off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
+        labels = [Label(joint.id, mark + off * corner, 0.0, mark, moved=False).written(size) for corner in CORNERS]
+        tried = product((both, lines), labels if size >= SMALL * text else ())
+        if written := room.first(label for clear_of, label in tried if not lines_meet(label.box(), clear_of)):
+            pencil.texts.append(written)
         else:
             left_out += 1
     pencil.leave_out(left_out, len(plan.joints), "joint ids (named by the rods that cross)")
@@ -232,8 +231,8 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
 
 def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
     """Each rod's label at its ends, on its line; in an opening, around it."""
-    names, outlines = [rod.id for rod in plan.rods], outlines_of(plan.rods)
-    inside = [loop for loop in outlines if opens(plan.lines.reshape(-1, 2)[loop])]
+    names = [rod.id for rod in plan.rods]
+    inside = [loop for loop in plan.outlines if opens(plan.lines.reshape(-1, 2)[loop])]
     outside = np.ones(2 * len(names), dtype=bool)
     outside[[end for loop in inside for end in loop]] = False
     labels, room = place(names, plan.cuts, text, at=outside.reshape(-1, 2)), Room(4 * text)
@@ -288,11 +287,12 @@ def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float
     pencil.line([a, b], "DIM", pen=Pen("#b08a2e", 0.05 * text, (1.5 * text, 0.5 * text, 0.3 * text, 0.5 * text)))
     words, angle = plan.rounding.mm(1e-3 * float(np.linalg.norm(along))), float(np.arctan2(along[1], along[0]))
     shares = sorted(np.linspace(0.1, 0.9, 81).tolist(), key=lambda share: abs(share - 0.33))
-    for size, share in ((size, share) for size in (text, SMALL * text) for share in shares):
-        pencil.write(words, a + share * along, size, "DIM", anchor="middle", angle=angle, colour="#8a6a1c")
-        if room.claim(pencil.texts[-1].box()):
-            return
-        pencil.texts.pop()
+    tried = (
+        Text(words, a + share * along, size, "DIM", "middle", angle, colour="#8a6a1c")
+        for size, share in product((text, SMALL * text), shares)
+    )
+    if written := room.first(tried):
+        pencil.texts.append(written)
 
 
 def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
