@@ -63,7 +63,7 @@ class Tails:
     def on(self, structure: Structure) -> Stations:
         """The change of the tail at the start and the end of each rod."""
         mesh = structure.mesh
-        points, ends = moved_points(mesh), _end_entries(mesh)
+        points, ends = moved_points(mesh), mesh.end_entries
         inner = points[np.searchsorted(points, ends) + np.tile([1, -1], len(mesh.rod_start))]
         tails = np.abs(mesh.stations[ends] - mesh.stations[inner])
         span, outward = usual_span(mesh), np.tile([-1.0, 1.0], len(mesh.rod_start))
@@ -133,14 +133,9 @@ def usual_span(mesh: GridMesh) -> float:
     return float(np.median(np.diff(mesh.stations[entries])[same]))
 
 
-def _end_entries(mesh: GridMesh) -> Ints:
-    """(2m,) entries of `rod_nodes` at which each rod starts and ends."""
-    return np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
-
-
 def moved_points(mesh: GridMesh) -> Ints:
     """Entries of `rod_nodes` that variables move, ascending: joints and ends of rods."""
-    return np.unique(np.append(mesh.at_crossings, _end_entries(mesh)))
+    return np.unique(np.append(mesh.at_crossings, mesh.end_entries))
 
 
 def between(mesh: GridMesh) -> csr_array:
@@ -162,7 +157,7 @@ def _restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
         across: (m,) growth of the rods' offsets [m].
     """
     stations = mesh.stations + along
-    ends = stations[_end_entries(mesh)].reshape(-1, 2)
+    ends = stations[mesh.end_entries].reshape(-1, 2)
     rods = tuple(
         rod.cut(float(start), float(end), float(by))
         for rod, (start, end), by in zip(mesh.grid.rods, ends, across, strict=True)
