@@ -509,3 +509,9 @@ def test_curved_rods_are_laid_flat_at_the_angle_that_they_have_on_the_target() -
     grown = np.ptp(found.positions, axis=0) / np.ptp(draped.positions[:, :2], axis=0)
     np.testing.assert_allclose(grown, np.sqrt(grown.prod()), rtol=0.02)  # both ways alike
     assert 1.0 < grown.prod() < 1.2
+
+
+def test_joints_that_are_nearer_than_a_lath_is_broad_are_said() -> None:
+    (said,) = rs.drape(rs.Geodesic(spacing=0.3, families=3), lath(0.04), HIGH, joint=rs.Pin()).warnings
+    assert "pairs of neighbouring joints on a rod are nearer than its breadth of 40 mm" in said
+    assert not rs.drape(rs.Geodesic(spacing=0.3), lath(0.04), HIGH, joint=rs.Pin()).warnings

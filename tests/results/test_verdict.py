@@ -551,10 +551,11 @@ def test_a_code_asks_for_less_stiffness_in_stability() -> None:
 
 
 def test_what_was_taken_where_nothing_is_known_is_said_without_making_a_result_worse() -> None:
-    codes = {"assumed_class", "creep_unknown"}
+    codes = {"assumed_class", "creep_unknown", "relaxed"}
     by_code = {"permanent": 1e7, "creep": 0.0, "code": "EN 1995-1-1"}
     for strength, told in (
         (by_code, {"assumed_class"}), (by_code | {"service_class": 3}, set()), ({"permanent": 1e7}, {"creep_unknown"}),
+        (by_code | {"service_class": 3, "relaxed": 0.4}, {"relaxed"}),
     ):  # fmt: skip
         found = verdict(changed(("loads", WINTER), ("strength", strength)))
         assert found.level == "good"

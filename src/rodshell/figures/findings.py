@@ -43,6 +43,7 @@ CODES = {
     "not_spliced": "rods cannot be spliced from the stock",
     "off_target": "the shell deviates from the target",
     "other_shape": "another stable shape is near",
+    "relaxed": "strengths count on stress that relaxes",
     "reserve": "the shell carries its own weight, but not with the reserve that is asked for",
     "sinks": "under its own weight the shell takes another shape",
     "slip": "a joint transfers more than the force at which it slips",
@@ -67,7 +68,7 @@ Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
 GOOD = frozenset({
     "assumed_class", "cables_short", "creep_unknown", "in_place", "lies_flat", "no_imperfections", "no_loads",
-    "not_nested", "stands", "stands_under_loads",
+    "not_nested", "relaxed", "stands", "stands_under_loads",
 })  # fmt: skip
 FAULTS = frozenset({
     "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",

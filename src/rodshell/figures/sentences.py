@@ -142,6 +142,10 @@ SENTENCES = {
         "with {ends} ends the shell has another stable shape, {distance} of its size away at {energy} times the "
         "energy: check on site that it takes the intended one"
     ),
+    "relaxed": (
+        "permanent strength counts on {share} of the unloaded shell's stress to be gone after months, as given "
+        "(strength.relaxed), which wood and moisture decide"
+    ),
     "reserve": "the shell{bracing} carries only {weights}, and {asked}{others}{advice}",
     "sinks": (
         "with {ends} ends the shell moves by {depth} ({share} of its size) under its own weight{further}, so that it "

@@ -20,6 +20,7 @@ from rodshell.targets import Target
 from rodshell.units import length_text
 
 FAMILIES = "uvw"
+SHORTEST = 3.0  # spacings: a shorter rod in a corner has too few joints not to swing
 PLACES = 24  # on an outermost rod at which room next to it is looked for
 MOVED = 1e-3  # of the size: lines that lie further off the target are said to be moved
 
@@ -151,7 +152,7 @@ def _fill_corners(target: Target, law: Law, families: list[_Family], rods: Surfa
     """Add rods on both sides of families, where the target continues next to the curves that set them out.
 
     Along each part of an outermost rod that has room next to it, a rod is laid a spacing away, where there is most. One
-    that is shorter than two spacings is left out.
+    that is shorter than three spacings would swing, and is left out.
 
     Args:
         rods: of the families, one after the other.
@@ -180,7 +181,7 @@ def _fill_corners(target: Target, law: Law, families: list[_Family], rods: Surfa
         x, along = across.at(of * PLACES + place, spacing[of])
         tangents = _off(target, x, -outward[of] * along, law)
         rods = trace(target, law, x, tangents)
-        outer = np.flatnonzero(np.diff(rods.ends)[:, 0] > 2.0 * spacing[of])
+        outer = np.flatnonzero(np.diff(rods.ends)[:, 0] > SHORTEST * spacing[of])
         family, last = family[of[outer]], last[of[outer]]
         for k, end, point, tangent in zip(family, last, x[outer], tangents[outer], strict=True):
             families[k], added = families[k].with_rod(bool(end), point, tangent), True

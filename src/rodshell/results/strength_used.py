@@ -2,6 +2,7 @@
 
 from rodshell.figures.checks import OTHER_SHAPES, WorstBent
 from rodshell.results.results import Results
+from rodshell.results.wording import percent
 
 THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
 
@@ -20,7 +21,9 @@ def strength_name(results: Results, shape: str) -> str:
     if not by_design_strength(results):
         return f"{preset}'s strength, which is characteristic and short-term"
     what = "design strength for erection" if shape in OTHER_SHAPES else "permanent design strength"
-    return f"{preset}'s {what}{by_code(results)}"
+    gone = results.strength.relaxed if results.strength and shape not in OTHER_SHAPES else None
+    relaxed = f", once {percent(gone)} of the stress is gone" if gone else ""
+    return f"{preset}'s {what}{by_code(results)}{relaxed}"
 
 
 def by_code(results: Results) -> str:

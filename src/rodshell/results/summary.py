@@ -264,11 +264,11 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
         line = f"  weight    {ends:<8}{what}: {share_of_weight(weighed)}{least}"
         if weighed.deflection is not None:
             line += f"; deflection under it: {length(weighed.deflection)}"
+        if ends in results.snow:
+            line += f"; even snow on top of it: {snow_text(results.snow[ends])}"
         if weighed.braced_limit is not None:
             braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
             line += f"; with bracing: {share_of_weight(braced)}"
-        if ends in results.snow:
-            line += f"; even snow on top of it: {snow_text(results.snow[ends])}"
         yield line
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"

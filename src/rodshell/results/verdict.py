@@ -489,14 +489,16 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
 
 
 def _assumed(results: Results) -> Iterator[Said]:
-    """What was taken where nothing was given or is known: the perfect shell, a service class, no creep; and how cables
-    are to be stressed."""
+    """What was taken where nothing was given or is known: the perfect shell, a service class, no creep; what strengths
+    count on; and how cables are to be stressed."""
     strength = results.strength
     if any(found.imperfect_kind is None for _, _, found in results.loaded_shells()):
         offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
         yield said("no_imperfections", offers=(offer,), offer=offer)
     if strength is not None and strength.code and strength.service_class is None:
         yield said("assumed_class")
+    if strength is not None and strength.relaxed:
+        yield said("relaxed", None, strength.relaxed, share=percent(strength.relaxed))
     if results.loads and (strength is None or strength.creep is None):
         yield said("creep_unknown")
     yield from _cables(results)
