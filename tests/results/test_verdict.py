@@ -482,6 +482,9 @@ def test_of_braced_shells_the_reserve_is_asked_with_the_bracing() -> None:
         assert any(words in reason for reason in found.reasons)
         summary = summary_text(changed(*both))
         assert (f"without bracing: 2 times; with bracing: {factor} times" in summary) == (factor in (1.5, 1.4))
+    snowed = summary_text(changed(*both, ("snow", {"pinned": 310.0, "clamped": None})))  # of the shell without bracing
+    assert "without bracing: 2 times; even snow on top of it: 0.31 kN/m2" in snowed
+    assert "even snow on top of it: 10 kN/m2 or more" in snowed
 
 
 def test_a_shell_that_falls_under_its_own_weight_with_every_support_cannot_be_built() -> None:
