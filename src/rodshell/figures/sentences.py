@@ -38,11 +38,11 @@ SENTENCES = {
     "imperfect: unloaded": "with {ends} ends and imperfections the shell is unstable before the loads of {place} act",
     "in_place": (
         "the rods cannot be laid out flat: there they would bend within the plane by up to {bent}, and withstand "
-        "{withstood} during erection; bring rod by rod to its place over a scaffold, by the holes of its strip"
+        "{withstood} during erection; bring rod by rod to its place over a scaffold, by the joints on its strip"
     ),
     "in_place: unstable": (
-        "the rods cannot be laid out flat, since no stable state in the plane was found; bring rod by rod to its place "
-        "over a scaffold, by the holes of its strip"
+        "no stable state of the rods in the plane was found, in which they could be laid out flat; bring rod by rod to "
+        "its place over a scaffold, by the joints on its strip"
     ),
     "lies_flat": (
         "the rods can be laid out flat: there they bend within the plane by up to {bent}, and withstand {withstood} "
