@@ -10,3 +10,11 @@ Ints = NDArray[np.intp]
 Longs = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 State = Annotated[Floats, "(N, 3) node positions [m] and twist angles [rad]"]
+MIRRORED = 1e-6  # of the largest value: others so near are mirror images of it, and which is larger is chance
+
+
+def largest_at(values: Floats) -> int:
+    """The entry with the largest value (k,) of places that a user is shown: the first of those that are mirror images of
+    each other, so that all machines name the same."""
+    most = float(np.nanmax(values))
+    return int(np.argmax(values >= most - MIRRORED * abs(most)))

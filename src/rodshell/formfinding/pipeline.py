@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, largest_at
 from rodshell.errors import InputError
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings
@@ -93,7 +93,7 @@ def agreement(popped: PopUp, target: Target) -> Agreement:
     nodes, mesh = popped.positions, popped.footprint.mesh
     points = np.concatenate([nodes, edge_middles(mesh, nodes)])
     gaps = target.distance(points) - np.concatenate([mesh.heights, mesh.heights[mesh.edges[:, 0]]])
-    k = int(np.abs(gaps).argmax())
+    k = largest_at(np.abs(gaps))
     x, y, z = points[k].tolist()
     return Agreement(gaps[: len(nodes)], abs(float(gaps[k])), sqrt((gaps * gaps).mean()), (x, y, z), target.size)
 

@@ -87,8 +87,7 @@ class GridMesh:
 
     def rod_slice(self, rod: int) -> slice:
         """The entries of `rod_nodes` and `stations` that belong to a rod."""
-        stop = self.rod_start[rod + 1] if rod + 1 < len(self.rod_start) else len(self.rod_nodes)
-        return slice(int(self.rod_start[rod]), int(stop))
+        return slice(int(self.rod_start[rod]), int(self.rod_stop[rod]))
 
     def nodes_of(self, rod: int) -> Ints:
         """Nodes along one rod, from its start to its end."""

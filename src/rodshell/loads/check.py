@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 from pydantic import Field
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.checks.bending import require_known_stress
 from rodshell.checks.self_weight import self_weight, shown_limit
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
@@ -329,13 +329,13 @@ def loaded_shell(
         utilisation=None if used.governs is None else used.largest[used.governs[0]],
         utilisations=Utilisations(**used.largest),
         euler=float(used.euler.max()),
-        euler_at=_place(mesh, int(np.argmax(used.euler))),
+        euler_at=_place(mesh, largest_at(used.euler)),
         governs=None if used.governs is None else _place(mesh, used.governs[1], used.governs[0]),
         bracing_forces=structure.bracing_forces(found),
         bracing_before=structure.bracing_forces(unloaded),
         bracing_utilisation=_of_bracing(structure, found, loads, limits, duration),
         joint_moments=moments,
-        joint_moment_at=names[int(np.argmax(np.abs(moments)))] if len(moments) else None,
+        joint_moment_at=names[largest_at(np.abs(moments))] if len(moments) else None,
         slipping=tuple(names[k] for k in _slipping(mesh, used)),
         modes=shapes,
         mode_factors=factors,

@@ -28,7 +28,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from rodshell.arrays import Bools, Floats, Ints, State
+from rodshell.arrays import Bools, Floats, Ints, State, largest_at
 from rodshell.checks.bending import VON_MISES, Bending, bending_of, fibre_modulus
 from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
@@ -217,7 +217,7 @@ class Utilisation:
     def governs(self) -> tuple[By, int] | None:
         """What is used most, and where; None: nothing is known."""
         by = max(self.uses, key=lambda by: float(self.uses[by].max()), default=None)
-        return None if by is None else (by, int(np.argmax(self.uses[by])))
+        return None if by is None else (by, largest_at(self.uses[by]))
 
     def with_permanent(self, permanent: "Utilisation") -> "Utilisation":
         """The same, where the erected shell's own utilisation counts too, by the permanent strength, and the slip of

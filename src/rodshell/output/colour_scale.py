@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import document, label, number, tag
@@ -91,7 +91,7 @@ def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
     """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too."""
     assert shape.gap is not None
     points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
-    worst = int(np.argmax(np.abs(gaps)))
+    worst = largest_at(np.abs(gaps))
     found = next((gap for ends, gap in archive.results.agreement.items() if shape.name == f"popped_{ends}"), None)
     if found is None or found.where is None or found.max is None:
         return float(gaps[worst]), points[worst]

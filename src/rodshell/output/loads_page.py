@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from rodshell.arrays import largest_at
 from rodshell.figures.loads import LoadedShell, Utilisations
 from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
@@ -204,14 +205,14 @@ def _foundation(results: Results, shell: LoadedShell) -> Row:
     sums = (shell.load_sum, shell.reaction_sum)
     load, held = (np.zeros(3) if total is None else np.nan_to_num(total) for total in sums)
     across = np.linalg.norm(forces[:, :2], axis=1)
-    down = int(np.argmax(forces[:, 2]))
+    down = largest_at(forces[:, 2])
     names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
-    lifted = f"{_kilo(shell.uplift)} at {names[int(np.argmin(forces[:, 2]))]}" if shell.uplift else "none"
+    lifted = f"{_kilo(shell.uplift)} at {names[largest_at(-forces[:, 2])]}" if shell.uplift else "none"
     return {
         "Loads x, y, z": ", ".join(map(_kilo, load)),
         "Reactions x, y, z": ", ".join(map(_kilo, held)),
         "Largest vertical": f"{_kilo(forces[down, 2])} at {names[down]}",
-        "Largest horizontal": f"{_kilo(across.max())} at {names[int(np.argmax(across))]}",
+        "Largest horizontal": f"{_kilo(across.max())} at {names[largest_at(across)]}",
         "Largest uplift": lifted,
     }
 

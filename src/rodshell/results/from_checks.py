@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.checks import Checks
 from rodshell.checks.bending import Bending as BendingCheck
 from rodshell.checks.bending import worst
@@ -143,7 +143,7 @@ class _Withstood:
 
     def worst_place(self, bent: BendingCheck) -> dict[str, Any]:
         """The most stressed place: the rod, and how far along it [m]."""
-        at = int(np.argmax(self.stressed(bent)))
+        at = largest_at(self.stressed(bent))
         return dict(zip(("rod", "at"), self.mesh.place(at), strict=True))
 
     def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:

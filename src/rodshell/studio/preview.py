@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.form import Form
 from rodshell.layout import GridMesh
 from rodshell.output.colour_scale import Colour, gap_scale
@@ -46,7 +46,7 @@ class Preview:
         if draped is None:
             return b""
         gaps = target.gap(draped).distance - mesh.heights
-        worst = int(np.abs(gaps).argmax())
+        worst = largest_at(np.abs(gaps))
         where, largest = {"draped": draped[worst]}, {"draped": abs(float(gaps[worst]))}
         shapes = [Shape("draped", CAPTIONS["draped"], draped, gaps), Shape("flat", CAPTIONS["flat"], mesh.flat)]
         for ends, shell in form.popped.items():
