@@ -49,12 +49,12 @@ form = Job.of_case(case).run(until="pop-up")
 told("solve")
 archive = form.archive()
 told("checks")
-from rodshell.output.files import Content, DEFAULT, KINDS, save
-content = Content(archive)
-content.drawings
+from rodshell.output.files import DEFAULT, KINDS, save
+from rodshell.output.drawings import drawing_set
+drawing_set(archive)
 told("drawings")
 for kind in DEFAULT:
-    list(KINDS[kind](content))
+    list(KINDS[kind](archive))
     told(kind)
 with tempfile.TemporaryDirectory() as folder:
     save(archive, folder + "/a", [])

@@ -44,8 +44,8 @@ COMPARED = {  # what the paper shows in this place
     "counts.",
     "genetic": 'The paper: a hemispherical gridshell "may take approximately" 100 generations of 500 individuals, or '
     "50,000 forward simulations, where its direct method needs one. It shows the algorithm's G0 for the paraboloid and "
-    "the ellipsoid, from reference 30, as a line in its figure, without numbers. There are searches from five seeds for "
-    "each target, kept with the package; the best shape of each is popped up again with the present solver. A search is "
+    "the ellipsoid, from reference 30, as a line in its figure, without numbers. Searches from five seeds for each "
+    "target are kept with the package; the best shape of each is popped up again with the present solver. A search is "
     "judged by the popped shape, so that two may end in different G0: how far they are from that of the direct method "
     "stands in the table. One of another seed takes some ten thousand pop-ups (`rodshell paper genetic --seed 6`).",
     "studies": 'The paper: H, E, r and g "do not significantly influence the actuated shape" of soft, inextensible '

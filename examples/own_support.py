@@ -25,15 +25,15 @@ class Posts(rs.Support):
         ways = outwards(points)
         return [rs.LocalEnergy(ends[:, None], lambda x: self.stiffness / 2 * ((x[:, 0] - points) * ways).sum(1) ** 2)]
 
+    def figures(self, moved, forces):  # in result.json, in the summary and in the report
+        return {**super().figures(moved, forces), "work of the posts": (-np.sum(moved * forces) / 2, "J")}
+
 
 rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=25e9, density=1900))
 layout = rs.GridLayout.orthogonal(rods=(9, 9), spacing=0.045, length="auto", edge=0.015)
-ends = ["pinned", Posts("stiff", stiffness=1e6), Posts("posts"), Posts("soft", stiffness=100.0)]
-form = rs.find_form(rs.Hemisphere(radius=0.2), layout, rod, ends=ends)
-ways = outwards(form.boundary.points)
-push = {name: -(found.forces * ways).sum(axis=1) for name, found in form.checks.reactions.items()}  # of each end [N]
-for name, forces in push.items():
-    print(f"{name:>6}: the rods push with {forces.sum():.2f} N; {form.popped[name]}")
-    assert form.popped[name].report.stable
-assert np.allclose(push["stiff"], push["pinned"], rtol=0, atol=0.01 * push["pinned"].max())
-assert push["pinned"].sum() > push["posts"].sum() > push["soft"].sum() > 0
+form = rs.find_form(rs.Hemisphere(0.2), layout, rod, ends=["pinned", Posts("stiff", stiffness=1e6), Posts("soft")])
+print(form.summary())
+push = {name: -np.sum(held.forces * outwards(form.boundary.points)) for name, held in form.checks.reactions.items()}
+assert all(popped.report.stable for popped in form.popped.values())
+assert np.isclose(push["stiff"], push["pinned"], rtol=1e-3)
+assert push["pinned"] > push["soft"] > 0

@@ -8,7 +8,7 @@ factors = []
 for families in (2, 3):
     layout = rs.Geodesic(spacing=0.3, families=families)
     form = rs.find_form(target, layout, lath, joint=rs.Pin(), ends="pinned")
-    factor = form.checks.self_weight["pinned"].at_least
+    factor = form.checks.self_weight["pinned"].load_factor or 0.0
     factors.append(factor)
     print(f"{len(form.footprint.rods)} laths carry {factor:.1f} times their weight: {form.agreement['pinned']}")
     assert form.popped["pinned"].report.stable

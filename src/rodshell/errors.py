@@ -1,5 +1,8 @@
 """The errors that rodshell raises. Each message says what is wrong, with which value, and what to do."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class RodshellError(Exception):
     """Base of all errors that rodshell raises; `exit_code` is that of the command line."""
@@ -59,3 +62,12 @@ class ConvergenceError(RodshellError):
     def __init__(self, message: str, report: object = None) -> None:
         super().__init__(message)
         self.report = report
+
+
+@contextmanager
+def needs_package(what: str, package: str, extra: str) -> Iterator[None]:
+    """InputError where a package that an extra of rodshell brings is not installed."""
+    try:
+        yield
+    except ImportError as error:
+        raise InputError(f'{what} needs the package {package}: pip install "rodshell[{extra}]"') from error

@@ -15,6 +15,7 @@ from rodshell.case import Case
 from rodshell.checks import Checks, check
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
+from rodshell.fabrication.settings import has_slots
 from rodshell.figures.form import FlatState
 from rodshell.figures.records import Ends
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PopUp, Stages, Trimmed
@@ -23,7 +24,7 @@ from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import Layout
 from rodshell.layout.cells import Pattern
-from rodshell.loads.check import LoadChecks, check_shells, unchecked
+from rodshell.loads.check import LoadChecks, check_shells, tributary_of, unchecked
 from rodshell.loads.combinations import Loads
 from rodshell.loads.strength import net_factors
 from rodshell.output.files import save, wanted_kinds
@@ -189,11 +190,11 @@ class Form:
         if found is None:
             return None
         limits, material = self.options.limits(self.rod, self.case.strength), self.rod.material
-        strength = limits.erection or self.options.judged_by(self.rod).strength
+        strength = limits.erection or limits.counted
         limit = strength / material.youngs_modulus if strength and material else THIN
         return FlatState(
             lies_flat=found.report.stable and (found.strain or 0.0) <= limit, in_plane_strain=found.strain, limit=limit,
-            negative_modes=found.report.negative_modes,
+            negative_modes=None if found.strain is None else found.report.negative_modes,
         )  # fmt: skip
 
     # Checks, fabrication, verdict
@@ -217,7 +218,17 @@ class Form:
             pattern=Pattern.of(getattr(self.case.bracing, "pattern", "both")),
             prestrain=getattr(self.case.bracing, "prestrain", None),
             to_supports=getattr(self.case.bracing, "ends_at", "joints") == "supports",
+            slotted=() if shape is None else self._slotted(shape),
         )
+
+    def _slotted(self, final: Floats) -> tuple[Floats, ...]:
+        """The shapes (n, 3) in which strips fit into each other's slots: the final one and, where they are laid out in
+        the plane first, that."""
+        upright = not self.stages.from_table and self.stages.layout.upright
+        if not has_slots(upright, self.rod, self.joint):
+            return ()
+        flat = self.flat_state
+        return (final, self.footprint.mesh.flat) if flat and flat.lies_flat else (final,)
 
     @cached_property
     def loaded(self) -> LoadChecks | None:
@@ -368,13 +379,15 @@ class Form:
         return {"flat": self.footprint.mesh.flat} | {ends: shell.positions for ends, shell in self.popped.items()}
 
     def _weight(self, options: OutputOptions) -> float:
-        return options.judged_by(self.rod).shear_weight
+        return options.limits(self.rod, self.case.strength).shear_weight
 
     def _checked(self, progress: Progress) -> Checks:
         self.options.require_known_stress(self.rod, self.joint)
         flat = self.flat_state
         stages = self.options.stages if flat is None or flat.lies_flat else 0  # else it is assembled in place
         settings: dict[str, Any] = {"stages": stages, "shear_weight": self._weight(self.options)}
+        if self.popped and not self.from_table:
+            settings["plan"] = tributary_of(self.stages).plan
         return check(self.stages.popped, self.rod, **settings, progress=progress)
 
     @property
@@ -385,7 +398,7 @@ class Form:
 
     @cached_property
     def _archive(self) -> Archive:
-        checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
+        checks, style = self.checks, self.options.drawings
         results = self.results()
         if self.stages.seams is not None:
             results = with_seam_forces(results, self.stages.seams, checks)
@@ -393,7 +406,6 @@ class Form:
         results = checked_results(
             results, mesh, checks, self.fabrication,
             limits=self.options.limits(self.rod, asked), net=net_factors(mesh, self.rod.section, asked.hole),
-            shear_strength=strengths.shear_strength, strength=strengths.strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         if self.loaded is not None:
             results = loaded_results(results, self.footprint.mesh, self.loaded)

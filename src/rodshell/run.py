@@ -38,8 +38,8 @@ STAGES: dict[str, tuple[str, ...]] = {
     "pop-up": ("pop_up",),
     "refine": ("refine",),
     "checks": ("checks",),
-    "fabrication": ("fabrication", "bracing"),
-    "loads": ("loads", "combinations", "locked_joints", "stability", "strength"),
+    "fabrication": ("fabrication", "bracing", "strength"),
+    "loads": ("loads", "combinations", "locked_joints", "stability"),
     "files": ("drawings",),
 }
 """The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""
@@ -107,6 +107,7 @@ class Run:
         ends: RodEnds = case.target.held.value
         fit, stages = Fit.between(ends.lengths, ends.final), None
         rod = case.rod.held.value if case.rod.held else case.rod.build(lambda: fit, strength=case.permanent_strength)
+        case.require_slots(rod, upright=False)
         require_likely_sizes(fit.width, min(ends.grid.span, fit.width), rod.section)  # flat, rods may be longer
         if self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, self._table_stages)
@@ -128,7 +129,7 @@ class Run:
             rod: provisional, of which the first shell is made.
             stages_of: the shells of a rod.
         """
-        fit, weight, before = estimate, self.options.judged_by(rod).shear_weight, self._sized_before()
+        fit, weight, before = estimate, self.options.limits(rod, self.asked.strength).shear_weight, self._sized_before()
         rod = before or rod
         assert rod.material is not None
         strength, stages = self.asked.permanent_strength(rod.material), stages_of(rod)

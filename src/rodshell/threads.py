@@ -1,7 +1,10 @@
-"""Work that threads share. Kernels declared with `nogil` run at the same time; results never depend on the threads."""
+"""Work that threads share, and processes that work for another. Kernels declared with `nogil` run at the same time;
+results never depend on the threads."""
 
 import os
+import signal
 from collections.abc import Callable
+from multiprocessing import parent_process
 from threading import Thread
 
 _PROCESSORS = os.cpu_count() or 1  # asked once: the answer takes as long as a small front
@@ -46,3 +49,16 @@ def in_threads(work: Callable[[int, int], object], count: int, *, most: int | No
         other.join()
     if failures:
         raise failures[0]
+
+
+def work_for_parent() -> None:
+    """End together with the process that started this one, however it ends; it decides what Ctrl-C, which reaches both,
+    ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    if (parent := parent_process()) is not None:
+        parent.join()
+        os._exit(1)

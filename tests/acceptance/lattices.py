@@ -16,7 +16,10 @@ from rodshell.geometry.frames import cross, unit
 from rodshell.layout import GridMesh
 from rodshell.nets.surface_curves import SurfaceCurves, geodesic, trace
 from rodshell.nets.surface_lattice import surface_net
+from rodshell.solve.equilibrium import find_stable
+from rodshell.solve.problem import Problem
 from tests.acceptance.lattices_gallery import gallery_rows
+from tests.acceptance.lattices_twin import twin_rows
 from tests.acceptance.rows import Row, print_table
 from tests.targets.meshes import lattice
 
@@ -165,6 +168,33 @@ def strip_rows() -> Iterator[Row]:
     yield Row("strips, dome", "not refused with the place", float("at (0, 0, 2) m" not in refused), 0, "", refused[:60])
 
 
+# Rods along given lines
+
+
+def curve_rows() -> Iterator[Row]:
+    """Straight lines in plan are circles of a sphere; broad laths follow a slant grid if they are cut curved."""
+    lines = [[(x, -3.0), (x, 3.0)] for x in np.arange(-1.5, 1.51, 0.25)]
+    lines += [[point[::-1] for point in line] for line in lines]
+    curves, size = surface_net(CAP, rs.Curves(lines=lines)).curves, CAP.size
+    worst, lengths = 0.0, np.diff(curves.ends)[:, 0]
+    for k, line in enumerate(lines):
+        points, _ = curves.at(np.full(200, k), np.linspace(*curves.ends[k], 200))
+        offset = min(line[0], key=abs)
+        worst = max(worst, float(np.abs(points[:, line[0].index(offset)] - offset).max()))
+        radius = np.sqrt(CAP.radius**2 - offset**2)
+        lengths[k] -= 2.0 * radius * np.arccos(CAP.base / radius)  # the arc up to the base
+    yield Row("curves, circles of a sphere", "off their planes, over the size", worst / size, 1e-9)
+    yield Row("curves, circles of a sphere", "off their lengths, over the size", np.abs(lengths).max() / size, 1e-9)
+    for width in (0.040, 0.100):
+        rod = rs.Rod(rs.RectangularSection(width=THIN, height=width), LATH)
+        form = rs.find_form(CAP, rs.Curves(lines=lines, rest="curved"), rod, joint=rs.Pin(), ends="pinned")
+        report = form.popped["pinned"].report
+        off = 100 * form.agreement["pinned"].max_relative if report.stable else np.inf
+        case = f"curves, cut curved, 2 x {1e3 * width:.0f} mm"
+        yield Row(case, "pinned gap over the size", off, 0.5, "%", report.sentence)
+        yield Row(case, "factorisations", report.factorizations, 60)
+
+
 # The flat state
 
 
@@ -212,9 +242,53 @@ def flat_rows() -> Iterator[Row]:
         off = np.inf if found.strain is None else abs(found.strain / other - 1)
         yield Row(f"flat state, low cap, {1e3 * width:.0f} mm", "strain off independent code", off, 0.02, "", note)
         yield Row(f"flat state, low cap, {1e3 * width:.0f} mm", "negative modes", found.report.negative_modes, 0)
+    yield from finding_rows()
 
 
-ROWS = (geodesic_rows, straight_rows, shell_rows, family_rows, strip_rows, flat_rows, gallery_rows)
+def finding_rows() -> Iterator[Row]:
+    """What is said of the flat state, by the strain that the material withstands, and the way up from there."""
+    low, high, gfrp = rs.Cap(radius=2.0, base=1.6), CAP, rs.Material.preset("gfrp")
+    for name, target, width, said in (
+        ("low", low, 0.010, "lies_flat"), ("low", low, 0.020, "in_place"), ("high", high, 0.010, "in_place")
+    ):  # fmt: skip
+        rod = rs.Rod(rs.RectangularSection(width=THIN, height=width), gfrp)
+        form = rs.find_form(target, rs.Geodesic(spacing=0.3), rod, joint=rs.Pin(), ends="pinned")
+        codes = {finding.code for finding in form.verdict.findings} & {"lies_flat", "in_place"}
+        assert form.flat_state is not None
+        note = f"{form.flat_state.in_plane_strain} of {form.flat_state.limit:.3g}"
+        yield Row(f"flat state, {name} cap, {1e3 * width:.0f} mm", f"not {said}", float(codes != {said}), 0, "", note)
+        if said == "lies_flat":
+            off = up_from_flat(form)
+            yield Row("low cap, from flat", "off the popped-up shape, over the size", off, 1e-6)
+
+
+def up_from_flat(form: rs.Form) -> float:
+    """The shape to which the ends lead from the first lift, in equal steps of their way, less that of the pop-up."""
+    popped, deployment = form.popped["pinned"], form.checks.deployment
+    assert deployment is not None
+    (shell, state), first = deployment.shells[0], float(deployment.share[1])
+    ends = shell.ends
+    last = popped.positions[ends]
+    flat = deployment.positions[0][ends]
+    for share in np.linspace(first, 1.0, 30)[1:]:
+        goals = (1.0 - share) * flat + share * last
+        found = find_stable(Problem.of_shell(shell, last, goals=goals), state, np.zeros(len(shell.mesh.edges)))
+        shell = shell.with_elements(tuple(element.refreshed(found.state) for element in shell.elements))
+        state = found.state
+    return float(np.abs(state[: shell.mesh.node_count] - popped.positions).max() / form.target.size)
+
+
+ROWS = (
+    geodesic_rows,
+    straight_rows,
+    shell_rows,
+    family_rows,
+    strip_rows,
+    curve_rows,
+    flat_rows,
+    twin_rows,
+    gallery_rows,
+)
 
 
 def main() -> int:

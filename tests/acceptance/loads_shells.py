@@ -1,4 +1,4 @@
-"""Shells under loads: areas, balance, work, the two bare shells against the twin, bracing, cables, bad input."""
+"""Shells under loads: balance, work, the two bare shells against the twin, bracing, cables, bad input."""
 
 import contextlib
 import io
@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,8 @@ import numpy as np
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.loads.check import _load, _locked, tributary_of
+from rodshell.loads.nodes import LoadedNodes
 from rodshell.loads.structure import Structure
-from rodshell.loads.tributary import LoadedNodes, tributary_areas
 from rodshell.rods.cable import CableStretch
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.imperfection import imperfect
@@ -59,20 +58,6 @@ def nodes_of(form: rs.Form, ends: str) -> LoadedNodes:
     popped = form.popped[ends]  # type: ignore[index]
     mass = popped.shell.mass[: popped.shell.node_count, 2]
     return LoadedNodes(popped.positions, mass, tributary_of(form.patches[0]), min(form.layout.spacing))
-
-
-def area_rows() -> Iterator[Row]:
-    """Sums of tributary areas against the surface and its plan."""
-    steep = pi * 8 / (6 * 4**2) * ((8**2 + 4 * 4**2) ** 1.5 - 8**3)
-    for name, target, surface, plan in (
-        ("hemisphere", rs.Hemisphere(0.2), 2 * pi * 0.04, pi * 0.04),
-        ("cap", rs.Cap(10.0, 4.0), 120 * pi, 84 * pi),
-        ("paraboloid", rs.Paraboloid(8.0, 4.0), steep, 64 * pi),
-    ):
-        xy = 0.5 * target.size * np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]])
-        found = tributary_areas(target, target.lift(xy), anchor=(0.0, 0.0), rotate=0.2, spacing=target.size / 8)
-        yield Row(name, "tributary areas off the surface", 100 * abs(found.area.sum() / surface - 1), 0.1, "%")
-        yield Row(name, "the same, of the plan", 100 * abs(found.plan.sum() / plan - 1), 0.1, "%")
 
 
 def balance_rows() -> Iterator[Row]:
@@ -285,5 +270,5 @@ def bad_rows() -> Iterator[Row]:
 
 
 def all_rows() -> Iterator[Row]:
-    for rows in (area_rows, cable_rows, bad_rows, work_rows, balance_rows, locked_rows, bare_rows, braced_rows):
+    for rows in (cable_rows, bad_rows, work_rows, balance_rows, locked_rows, bare_rows, braced_rows):
         yield from rows()

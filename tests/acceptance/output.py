@@ -16,7 +16,8 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.checks.bending import bending
-from rodshell.layout import FlatGrid, FlatRod, mesh_grid, straight_rods
+from rodshell.layout import FlatGrid, mesh_grid, straight_rods
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.output.files import export
 from rodshell.results import Archive
 from tests.acceptance.cases import ELLIPSOID, HEMISPHERE, ROD, R, ridge_formula
@@ -124,7 +125,7 @@ def reaction_rows(name: str) -> Iterator[Row]:
 
 def circle_rows() -> Iterator[Row]:
     """A rod bent to a circle, edges a 25th of its radius."""
-    mesh = mesh_grid(FlatGrid.of([FlatRod.u("U01", 0.0, 0.0, 0.5)]), R / 25)
+    mesh = mesh_grid(FlatGrid.of([lattice_rod(0, "U01", 0.0, 0.0, 0.5)]), R / 25)
     angle = np.concatenate([[0.0], np.cumsum(2 * np.arcsin(mesh.edge_lengths / (2 * R)))])
     positions = np.empty((mesh.node_count, 3))
     positions[mesh.rod_nodes] = R * np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])

@@ -241,7 +241,7 @@ def pop_up_rows() -> Iterator[Row]:
 
 def genetic_rows() -> Iterator[Row]:
     """The kept searches, their best popped up again, and the beginning of one made again."""
-    for one in genetic.make(silent).comparisons:
+    for one in genetic.make(silent).parts:
         name = f"{one.case.target.name}, genetic"
         yield Row(name, "seeds kept, at least", -len(one.searches), -5, "", one.spread())
         for sought in one.searches:

@@ -19,6 +19,7 @@ from tests.acceptance import (
     loads_stability,
     paper,
     refine_derivatives,
+    signed,
     verdict_drawings,
     verdict_layers,
     verdict_levels,
@@ -43,7 +44,8 @@ CHEAP: dict[str, tuple[Rows, ...]] = {
     "house": (house.tree_rows,),
     "joints": (joints.structure_rows, joints.lattice_rows, joints.symmetry_rows),
     "lattices": (
-        lattices.geodesic_rows, lattices.straight_rows, lattices.shell_rows, lattices.family_rows, lattices.flat_rows,
+        lattices.geodesic_rows, lattices.straight_rows, lattices.shell_rows, lattices.family_rows, lattices.curve_rows,
+        lattices.flat_rows, lattices.twin_rows,
         partial(lattices.gallery_rows, ("garden pavilion", "saddle")),
     ),
     "loads": (
@@ -52,6 +54,7 @@ CHEAP: dict[str, tuple[Rows, ...]] = {
     ),
     "paper": (paper.tail_rows, paper.pop_up_rows),
     "refine": tuple(partial(refine_derivatives.adjoint_rows, *case, laths=False) for case in EVERY[:2]),
+    "signed": (signed.section_rows, signed.preset_rows),
     "verdict": (
         verdict_drawings.hostile_rows, verdict_layers.lath_rows, verdict_layers.thick_rows,
         partial(verdict_levels.rows, ("strength exceeded", "the paper's hemisphere")), verdict_paths.work_rows,

@@ -37,8 +37,8 @@ def rows() -> Iterator[Row]:
         for ends, popped in form.popped.items():
             shell, found = popped.shell, popped.equilibrium
             twin, held = LoadedTwin(popped, rod), reactions(shell, found)
-            yield from _unloaded(f"{name}, {ends}", twin, held, popped.report.negative_modes)
-            weighed = self_weight(shell, found, most=HIGH)
+            yield from unloaded_rows(f"{name}, {ends}", twin, held, popped.report.negative_modes)
+            weighed, _ = self_weight(shell, found, most=HIGH)
             if rod is ROD and target is HEMISPHERE:
                 low, high = BOUNDS[ends]
                 yield Row(f"{name}, {ends}", "load factor on the own weight", _at_least(weighed), high)
@@ -49,7 +49,7 @@ def rows() -> Iterator[Row]:
         _, target, layout, anchor = random_case(seed)
         popped = rs.find_form(target, layout, ROD, anchor=anchor).popped[held_by]  # type: ignore[index]
         yield from _loaded(
-            f"random {seed}, {held_by}", LoadedTwin(popped, ROD), self_weight(popped.shell, popped.equilibrium)
+            f"random {seed}, {held_by}", LoadedTwin(popped, ROD), self_weight(popped.shell, popped.equilibrium)[0]
         )
 
 
@@ -60,7 +60,8 @@ def _at_least(weighed: SelfWeight) -> float:
     return inf if weighed.limit == "none" else 0.0
 
 
-def _unloaded(case: str, twin: LoadedTwin, held: Reactions, negative_modes: int) -> Iterator[Row]:
+def unloaded_rows(case: str, twin: LoadedTwin, held: Reactions, negative_modes: int) -> Iterator[Row]:
+    """Equilibrium, reactions and inertia of a popped-up shell."""
     largest = float(np.linalg.norm(held.forces, axis=1).max())
     forces, _ = twin.reactions(twin.state)
     residual = twin.residual(twin.state)[: len(twin.free) - len(twin.angles)]

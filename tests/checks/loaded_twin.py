@@ -4,6 +4,7 @@ plain Newton with elastic edges, steps of the load that halve, inertia by the si
 Of a form it takes geometry alone: the mesh's connectivity and rest lengths, where the ends and the clamps' directions
 are, and the rods' EA, EI, GJ and mass per length; nothing of the library's energies, models and solvers. Rods bend
 alike in all directions, or they are laths with a twist angle for each edge. Joints are balls.
+Laths may be curved at rest.
 """
 
 from itertools import pairwise
@@ -28,7 +29,7 @@ class LoadedTwin:
         self.nodes, ends, n = mesh.node_count, mesh.ends.ravel(), mesh.node_count
         ghosts = np.arange(len(ends)) + n if popped.ends == "clamped" else np.arange(0)
         first = n + len(ghosts)
-        edges, rest, bends, voronoi, pairs, at = [], [], [], [], [], 0
+        edges, rest, bends, voronoi, pairs, at, at_rest = [], [], [], [], [], 0, []
         for k, s in enumerate(stations):
             row, lengths = list(mesh.nodes_of(k)), list(np.diff(s))
             edges += pairwise(row)
@@ -39,6 +40,9 @@ class LoadedTwin:
                 reach = [lengths[0] / 2, *reach, lengths[-1] / 2]
             bends += zip(row[:-2], row[1:-1], row[2:], strict=True)
             voronoi += reach
+            curve = mesh.grid.rods[k].curve
+            places = s[1:-1] if len(reach) == len(s) - 2 else s
+            at_rest += [0.0] * len(reach) if curve is None else np.interp(places, *curve).tolist()
             pairs += [(at + j, at + j + 1) for j in range(len(reach))]
             at += len(row) - 1
         self.edges, self.rest = np.array(edges), np.array(rest)
@@ -59,7 +63,7 @@ class LoadedTwin:
             self.terms.append((axial.bend_energies, _coordinates(self.bends), 3))
         else:
             angles = at
-            lath = LathBends(self.x, self.bends, np.array(pairs), self.voronoi, rod)
+            lath = LathBends(self.x, self.bends, np.array(pairs), self.voronoi, rod, at_rest)
             index = np.hstack([_coordinates(self.bends), 3 * first + np.array(pairs)])
             self.terms.append((lath.energies, index, 1))
         self.load = np.zeros(3 * first + angles)
@@ -181,14 +185,15 @@ class LoadedTwin:
 
 
 class LathBends:
-    """Bending and twist of naturally straight anisotropic rods [HQK Eqs 1b, 1c; Bergou et al. 2008].
+    """Bending and twist of anisotropic rods [HQK Eqs 1b, 1c; Bergou et al. 2008], curved `at_rest` to the left [1/m].
 
     Each edge's material frame is a director of its own, carried from where the edge began by the smallest rotation and
     turned by its angle; the twist is the angle between neighbouring frames, one being carried to the other.
     """
 
-    def __init__(self, x, bends, pairs, voronoi, rod):
+    def __init__(self, x, bends, pairs, voronoi, rod, at_rest):
         self.voronoi, self.pairs = voronoi, pairs
+        self.natural = 2 * np.tan(0.5 * voronoi * np.array(at_rest))
         (self.one, self.two), self.twist = rod.bend_stiffnesses, rod.twist_stiffness
         count = pairs.max() + 1
         self.tangents, self.directors = np.zeros((count, 3)), np.zeros((count, 3))
@@ -212,7 +217,8 @@ class LathBends:
 
     def energies(self, values):
         """(b,) [J] of three nodes and two angles each (b, 11)."""
-        strains = self.strains(values)
+        first, second, twist = self.strains(values)  # a director upright, the other one on the right
+        strains = first, second + self.natural, twist
         return sum(k * s**2 for k, s in zip((self.one, self.two, self.twist), strains, strict=True)) / (
             2 * self.voronoi
         )

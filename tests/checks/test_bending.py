@@ -5,7 +5,8 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks.bending import bending, bending_of, fibre_distance, fibre_strain
-from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout import FlatGrid, GridMesh, mesh_grid
+from rodshell.layout.gridlayout import lattice_rod
 
 RADIUS = 0.2
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
@@ -13,7 +14,7 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
 
 def rods_of_length(*lengths: float, edge: float = 0.01) -> GridMesh:
     """Rods that never meet."""
-    rods = [FlatRod.u(f"U{k + 1:02}", float(k), 0.0, length) for k, length in enumerate(lengths)]
+    rods = [lattice_rod(0, f"U{k + 1:02}", float(k), 0.0, length) for k, length in enumerate(lengths)]
     return mesh_grid(FlatGrid.of(rods), edge)
 
 

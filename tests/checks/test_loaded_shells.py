@@ -8,6 +8,7 @@ import pytest
 import rodshell as rs
 from rodshell.checks.reactions import reactions
 from rodshell.checks.self_weight import self_weight
+from rodshell.loads.check import tributary_of
 from rodshell.solve.load_path import CLOSE
 from tests.checks.loaded_twin import LoadedTwin
 from tests.checks.shells import ROD, dome
@@ -70,7 +71,7 @@ def test_equilibrium_inertia_and_reactions_agree(name, ends):
 @pytest.mark.parametrize("name", SHELLS)
 def test_the_share_of_its_own_weight_that_a_shell_bears_agrees(name):
     popped = shell(name).popped["pinned"]
-    found = self_weight(popped.shell, popped.equilibrium, most=2e3)
+    found, _ = self_weight(popped.shell, popped.equilibrium, most=2e3)
     other = twin(name, "pinned")
     factor, at_one = other.load_factor(COARSE)
     assert (1 - COARSE) * factor < found.load_factor / (1 - CLOSE)  # never less than stable,
@@ -80,3 +81,30 @@ def test_the_share_of_its_own_weight_that_a_shell_bears_agrees(name):
     else:
         moved = (at_one - other.state)[: 3 * other.nodes].reshape(-1, 3)
         assert found.deflection == pytest.approx(np.linalg.norm(moved, axis=1).max(), rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "ends"), [("tubes", "pinned"), ("laths", "clamped")])
+def test_snow_on_top_of_the_weight_is_all_that_the_shell_carries(name, ends):
+    """By the twin, under weight and snow that grow together: it reaches the same loads on another way."""
+    form = shell(name)
+    plan = tributary_of(form.stages).plan
+    snow = rs.check({ends: form.popped[ends]}, form.rod, stages=0, plan=plan).snow[ends]
+    other = LoadedTwin(form.popped[ends], form.rod)
+    other.load = other.load.copy()
+    other.load[2 : 3 * other.nodes : 3] -= snow * plan
+    factor, _ = other.load_factor(COARSE)
+    assert (1 - COARSE) * factor < 1 / (1 - CLOSE)
+    assert (1 + 2 * COARSE) * factor > 1
+
+
+def test_a_shell_that_falls_under_its_weight_carries_no_snow_and_without_a_target_none_is_known():
+    form = shell("dome")
+    checks = rs.check(form.popped, form.rod, stages=0, plan=tributary_of(form.stages).plan)
+    assert checks.snow == {"pinned": 0.0, "clamped": 0.0}
+    assert all(weight.load_factor < 1 for weight in checks.self_weight.values())
+    assert rs.check(form.popped, form.rod, stages=0).snow == {}
+
+
+def test_more_snow_than_is_looked_for_is_none():
+    stiff = rs.find_form(rs.Hemisphere(0.2), grid(0.06, 0.02), STEEL, ends="clamped")
+    assert stiff.archive().results.plain()["snow"] == {"clamped": None}

@@ -17,6 +17,7 @@ from rodshell.checks.contact import (
     nearest_points,
 )
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.layout.mesh import side_by_side as side_by_side_meshes
 from tests.checks.shells import dome
 from tests.checks.stress_twin import distance
@@ -103,8 +104,8 @@ def test_two_rods_of_a_family_that_cross_are_found_where_they_do() -> None:
 
 def lattice(spacing: float = 0.1, edge: float = 0.02) -> GridMesh:
     offsets = spacing * np.arange(-2, 3)
-    rods = [FlatRod.u(f"U{k + 1}", y, -0.24, 0.24) for k, y in enumerate(offsets)]
-    rods += [FlatRod.v(f"V{k + 1}", x, -0.23, 0.25) for k, x in enumerate(offsets)]
+    rods = [lattice_rod(0, f"U{k + 1}", y, -0.24, 0.24) for k, y in enumerate(offsets)]
+    rods += [lattice_rod(1, f"V{k + 1}", x, -0.23, 0.25) for k, x in enumerate(offsets)]
     return mesh_grid(FlatGrid.of(rods), edge)
 
 
@@ -130,10 +131,10 @@ def test_a_sheared_lattice_touches_when_its_rods_are_wider_than_their_distance(
 def test_rods_that_end_at_others_or_just_short_of_them_are_no_contact(tilt: float) -> None:
     """Ends in T and L, and a crossing next to an end that is not made a joint; also when the grid is bent."""
     rods = [
-        FlatRod.u("U1", 0.0, -0.3, 0.3), FlatRod.u("U2", 0.1, -0.3, 0.3),
-        FlatRod.v("V1", -0.3, 0.0, 0.4),  # L at the end of U1
-        FlatRod.v("V2", 0.1, 0.103, 0.4),  # ends 3 mm short of U2
-        FlatRod.v("V3", -0.1, -0.002, 0.4),  # crosses U1 by 2 mm: no joint
+        lattice_rod(0, "U1", 0.0, -0.3, 0.3), lattice_rod(0, "U2", 0.1, -0.3, 0.3),
+        lattice_rod(1, "V1", -0.3, 0.0, 0.4),  # L at the end of U1
+        lattice_rod(1, "V2", 0.1, 0.103, 0.4),  # ends 3 mm short of U2
+        lattice_rod(1, "V3", -0.1, -0.002, 0.4),  # crosses U1 by 2 mm: no joint
     ]  # fmt: skip
     mesh = mesh_grid(FlatGrid.of(rods, margin=0.015), 0.02)
     flat = mesh.flat[mesh.rod_nodes]
@@ -143,7 +144,7 @@ def test_rods_that_end_at_others_or_just_short_of_them_are_no_contact(tilt: floa
 
 def test_crossing_rods_that_come_together_again_touch() -> None:
     """V crosses U, and bends round until it lies against it 0.2 m from their joint."""
-    rods = [FlatRod.u("U1", 0.0, -0.5, 0.5), FlatRod.v("V1", 0.0, -0.1, 0.4)]
+    rods = [lattice_rod(0, "U1", 0.0, -0.5, 0.5), lattice_rod(1, "V1", 0.0, -0.1, 0.4)]
     mesh = mesh_grid(FlatGrid.of(rods), 0.01)
     places = mesh.flat[mesh.rod_nodes].copy()
     s = mesh.stations[mesh.rod_slice(1)]
@@ -228,8 +229,8 @@ def test_the_work_grows_with_the_rods_not_with_their_square() -> None:
     counts = []
     for size in (10, 20, 40):
         offsets = 0.1 * np.arange(size)
-        rods = [FlatRod.u(f"U{k}", y, 0.0, 0.1 * size) for k, y in enumerate(offsets)]
-        rods += [FlatRod.v(f"V{k}", x, 0.0, 0.1 * size) for k, x in enumerate(offsets)]
+        rods = [lattice_rod(0, f"U{k}", y, 0.0, 0.1 * size) for k, y in enumerate(offsets)]
+        rods += [lattice_rod(1, f"V{k}", x, 0.0, 0.1 * size) for k, x in enumerate(offsets)]
         mesh = mesh_grid(FlatGrid.of(rods), 0.02)
         outline = _Outline(0.024, 0.024, False)
         edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], outline, None, mesh.grid.meetings(4 * outline.reach / FLATTEST))
@@ -270,7 +271,7 @@ def beside_each_other(first: list[FlatRod], second: list[FlatRod], *, gap: float
 
 def test_on_their_way_rods_of_two_patches_are_not_looked_at_and_those_of_each_are() -> None:
     """Two strips that lie in each other, as flat grids below their boundaries do; then two rods of B alone."""
-    rods = [FlatRod.v(f"V{k}", 0.1 * k, 0.0, 0.3) for k in range(4)]
+    rods = [lattice_rod(1, f"V{k}", 0.1 * k, 0.0, 0.3) for k in range(4)]
     shell = beside_each_other(rods, rods)
     state = np.vstack([grid.flat - [*grid.flat[0, :2], 0.0] for grid in shell.mesh.grids])
     assert contact_of(shell, state, round_rod(5e-3)).pairs == 4
@@ -293,7 +294,7 @@ def test_a_section_without_an_outline_is_not_judged() -> None:
 
 def test_rods_of_two_patches_that_meet_at_a_seam_are_no_contact_and_others_are() -> None:
     """Two strips side by side whose U rods end together on the seam at y = 0.3, at angles; then one moved over."""
-    rods = [FlatRod.v(f"V{k}", 0.1 * k, 0.0, 0.3) for k in range(4)]
+    rods = [lattice_rod(1, f"V{k}", 0.1 * k, 0.0, 0.3) for k in range(4)]
     shell, flat = beside_each_other(rods, rods), mesh_grid(FlatGrid.of(rods), 0.02).flat
     there = flat + [0.0, 0.3, 0.0]
     there[:, 2] = 0.4 * flat[:, 1]  # a ridge at the seam
@@ -312,7 +313,7 @@ def test_rods_of_two_patches_that_meet_at_a_seam_are_no_contact_and_others_are()
 
 def test_rods_that_meet_at_both_their_ends_are_no_contact() -> None:
     """Of two patches each has one arch; they stand on the same points and lean apart."""
-    rods = [FlatRod.u("U1", 0.0, 0.0, 0.5)]
+    rods = [lattice_rod(0, "U1", 0.0, 0.0, 0.5)]
     arch = mesh_grid(FlatGrid.of(rods), 0.02).flat.copy()
     height = 0.6 * arch[:, 0] * (0.5 - arch[:, 0]) / 0.5
     arch[:, 1:] = height[:, None] * [-1.0, 1.0]
@@ -322,7 +323,7 @@ def test_rods_that_meet_at_both_their_ends_are_no_contact() -> None:
 
 def test_rods_of_patches_that_cross_only_where_their_flat_grids_lie_are_a_contact() -> None:
     """Patches are laid out side by side for drawing: that their lines cross there means nothing."""
-    one, other = FlatRod.u("U1", 0.0, 0.0, 0.5), FlatRod.v("V1", 0.0, -0.25, 0.25)
+    one, other = lattice_rod(0, "U1", 0.0, 0.0, 0.5), lattice_rod(1, "V1", 0.0, -0.25, 0.25)
     shell = beside_each_other([one], [other], gap=0.01)
     flat = [mesh_grid(FlatGrid.of([rod]), 0.02).flat for rod in (one, other)]
     found = contact_of(shell, np.vstack([flat[0], flat[1] + [0.492, 0.0, 0.002]]), round_rod(5e-3))

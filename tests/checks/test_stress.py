@@ -93,11 +93,11 @@ def test_without_twist_nothing_is_added() -> None:
 def test_a_shear_strength_is_used_up_by_torsion_alone() -> None:
     rod = rs.Rod(rs.RectangularSection(1e-2, 3e-2), rs.Material(1.1e10, 450, shear=6.9e8))
     rate = 4e6 / torsion_stress(rod, np.ones(1))[0]  # a shear stress of 4 MPa
-    options = rs.OutputOptions(strength=24e6, shear_strength=4e6)
-    zero = np.zeros(1)
-    used = largest_stress(rod, zero, zero, zero, np.array([rate]), weight=options.shear_weight) / 24e6
+    zero, given = np.zeros(1), rs.OutputOptions(strength=24e6, shear_strength=4e6)
+    weight = given.limits(rod, rs.Strength()).shear_weight
+    used = largest_stress(rod, zero, zero, zero, np.array([rate]), weight=weight) / 24e6
     assert used[0] == pytest.approx(1.0)
-    assert rs.OutputOptions(strength=24e6).shear_weight == VON_MISES
+    assert rs.OutputOptions(strength=24e6).limits(rod, rs.Strength()).shear_weight == VON_MISES
 
 
 def helix(radius: float, rise: float, edge: float = 0.005) -> tuple[rs.GridMesh, np.ndarray, np.ndarray, np.ndarray]:
@@ -270,11 +270,12 @@ def test_a_reduced_strength_of_timber_has_a_shear_strength_in_the_preset_s_propo
     rod = rs.Rod(rs.RectangularSection(width=0.035, height=0.05), larch)
     assert larch.bending_strength is not None
     assert larch.shear_strength is not None
-    preset = rs.OutputOptions().judged_by(rod)
-    reduced = rs.OutputOptions(strength=18e6).judged_by(rod)
+    preset = rs.OutputOptions().limits(rod, rs.Strength())
+    reduced = rs.OutputOptions(strength=18e6).limits(rod, rs.Strength())
     assert reduced.shear_weight == pytest.approx(larch.bending_strength / larch.shear_strength)
     assert reduced.shear_weight == pytest.approx(preset.shear_weight)
-    assert rs.OutputOptions(strength=18e6, shear_strength=2e6).judged_by(rod).shear_weight == pytest.approx(9.0)
+    given = rs.OutputOptions(strength=18e6, shear_strength=2e6).limits(rod, rs.Strength())
+    assert given.shear_weight == pytest.approx(9.0)
 
 
 def test_the_stress_at_rigid_joints_does_not_depend_on_the_mesh() -> None:

@@ -7,7 +7,8 @@ from rodshell.checks.bending import bending
 from rodshell.checks.contact import contact
 from rodshell.fabrication.fabricate import fabricate
 from rodshell.fabrication.settings import Fabrication
-from rodshell.layout import FlatGrid, FlatRod, Profile, mesh_grid
+from rodshell.layout import FlatGrid, Profile, mesh_grid
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, RectangularSection, Rod
 
@@ -18,7 +19,7 @@ TAPER = Profile((0.0, 0.5, 1.0), (0.1, 1.0, 0.4))
 
 def arc(profile, length=0.6, edges=60):
     """One rod bent to a circle of the radius BEND [m], without strain of its axis."""
-    mesh = mesh_grid(FlatGrid.of([FlatRod.u("U", 0.0, 0.0, length)]), length / edges).with_profiles(profile)
+    mesh = mesh_grid(FlatGrid.of([lattice_rod(0, "U", 0.0, 0.0, length)]), length / edges).with_profiles(profile)
     half = 0.5 * length / edges / BEND  # half the angle of an edge; the chord is the edge's rest length
     angle = 2 * half * np.arange(edges + 1)
     radius = 0.5 * length / edges / np.sin(half)
@@ -54,7 +55,7 @@ def test_stress_of_a_lath_bent_out_of_the_grid_follows_its_thickness_only(varies
 
 def test_clearance_of_rods_side_by_side_is_that_of_their_local_radii():
     apart = 7e-3
-    rods = [FlatRod.u("A", 0.0, 0.0, 1.0), FlatRod.u("B", apart, 0.0, 1.0)]
+    rods = [lattice_rod(0, "A", 0.0, 0.0, 1.0), lattice_rod(0, "B", apart, 0.0, 1.0)]
     mesh = mesh_grid(FlatGrid.of(rods), 0.01).with_profiles(Profile((0.0, 1.0), (1.0, 16.0)))
     found = contact(mesh, mesh.flat[mesh.rod_nodes], ROUND)
     assert found.clearance == pytest.approx(apart - 4 * RADIUS, abs=1e-6)  # both are twice as thick at their ends
@@ -65,7 +66,7 @@ def test_clearance_of_rods_side_by_side_is_that_of_their_local_radii():
 
 def test_double_laths_are_twice_as_deep_for_what_lies_above_them():
     lath, above = Rod(RectangularSection(width=4e-3, height=20e-3), Material(10e9, 600.0)), 15e-3
-    rods = [FlatRod.u("A", 0.0, 0.0, 1.0), FlatRod.u("B", 0.0, 2.0, 3.0)]
+    rods = [lattice_rod(0, "A", 0.0, 0.0, 1.0), lattice_rod(0, "B", 0.0, 2.0, 3.0)]
     mesh = mesh_grid(FlatGrid.of(rods), 0.01).with_profiles(Profile.double(0.5))
     positions = mesh.flat[mesh.rod_nodes]
     positions[mesh.rod_slice(1)] += (-2.0, 0.0, above)

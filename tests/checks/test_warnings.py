@@ -13,6 +13,7 @@ from rodshell.checks.deployment import Deployment
 from rodshell.fabrication.fabricate import fabricate
 from rodshell.fabrication.settings import Fabrication
 from rodshell.figures.form import PopUp, Rod
+from rodshell.loads.strength import Limits
 from rodshell.results import Results
 from rodshell.results.from_checks import checked_results
 from rodshell.results.verdict import verdict
@@ -45,7 +46,7 @@ def reasons(found: Checks, strength: float | None = STRENGTH) -> list[str]:
     rods = tuple(Rod(id=rod.name, family=rod.family, start=rod.start, end=rod.end) for rod in MESH.grid.rods)
     shells = {ends: PopUp(status="converged", stable=True) for ends in found.bending}
     found_words = verdict(
-        checked_results(Results(rods=rods, pop_up=shells), MESH, found, MADE, strength=strength)
+        checked_results(Results(rods=rods, pop_up=shells), MESH, found, MADE, limits=Limits(counted=strength))
     ).reasons
     return [words for words in found_words if (" thick" if strength is None else "break") in words]
 

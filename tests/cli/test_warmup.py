@@ -14,6 +14,7 @@ FEW = """
 import sys
 from rodshell.kernels import ahead
 ahead.KERNELS = {"targets.quadric": {"_level": "f2 f1 f f"}, "solve.implicit_euler": {"_mass_norm": "f1 f1"}}
+ahead.modules = lambda: list(ahead.KERNELS)
 from rodshell.cli import main
 sys.exit(main(sys.argv[1:]))
 """

@@ -1,5 +1,6 @@
 """Layers, stock, splices and bracing, against what they must satisfy and against brute force."""
 
+from dataclasses import replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -15,6 +16,7 @@ from rodshell.figures.fabrication import Piece
 from rodshell.layout import FlatGrid, Profile, mesh_grid, straight_rods
 from rodshell.layout.flatgrid import layers
 from rodshell.layout.gridlayout import GridLayout
+from rodshell.layout.rest_curve import RestCurve
 
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
 
@@ -238,3 +240,72 @@ def test_one_rod_that_cannot_be_spliced_is_named_alone() -> None:
 def test_lengths_that_cannot_be_are_refused(options: dict[str, float], reason: str) -> None:
     with pytest.raises(rs.InputError, match=reason):
         Fabrication(**options)
+
+
+# Upright strips, and laths cut from boards
+
+HYPAR = rs.HeightField(formula="x*y/2", domain=rs.Disc(1.0))  # its rulings are its asymptotic lines
+STRIP = rs.Rod(rs.RectangularSection(width=0.03, height=0.002), rs.Material.preset("gfrp"))
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.0, 1.4, np.pi / 2])
+def test_a_slot_takes_a_strip_from_face_to_face(angle: float) -> None:
+    """The rhombus in which two strips of 2 mm overlap, along the one that is cut."""
+    along = np.array([[np.sin(angle), -np.cos(angle)], [0.0, 1.0]])
+    corners = [np.linalg.solve(along, [0.001 * a, 0.001 * b]) for a in (-1, 1) for b in (-1, 1)]
+    mesh = mesh_grid(
+        straight_rods([[(-1.0, 0.0), (1.0, 0.0)], [(-np.cos(angle), -np.sin(angle)), (np.cos(angle), np.sin(angle))]]),
+        0.1,
+    )
+    made = fabricate(mesh, STRIP, Fabrication(slot_clearance=0.0004), slotted=[mesh.flat])
+    assert made.slots[0] == pytest.approx(np.ptp(corners, axis=0)[0] + 0.0004, rel=1e-9)
+    assert made.slot_depth == pytest.approx(0.0154)
+
+
+def test_slots_on_a_saddle_of_rulings_are_as_wide_as_their_angle_asks() -> None:
+    """Rulings (1, 0, y/2) and (0, 1, x/2) meet at the angle whose cosine is their scalar product."""
+    draped = rs.drape(rs.Asymptotic(spacing=0.2), STRIP, HYPAR, anchor=(0.0, 0.0), joint=rs.Pin())
+    made = fabricate(draped.mesh, STRIP, Fabrication(), slotted=[draped.positions])
+    x, y, _ = draped.positions[draped.mesh.joint_nodes].T
+    cosine = 0.25 * np.abs(x * y) / np.sqrt((1 + 0.25 * x**2) * (1 + 0.25 * y**2))
+    np.testing.assert_allclose(made.slots, 0.002 * (1 + cosine) / np.sqrt(1 - cosine**2), rtol=1e-5)
+    flat = draped.mesh.flat
+    both = fabricate(draped.mesh, STRIP, Fabrication(), slotted=[draped.positions, flat])
+    np.testing.assert_array_equal(
+        both.slots, np.maximum(made.slots, fabricate(draped.mesh, STRIP, Fabrication(), slotted=[flat]).slots)
+    )
+    assert not len(fabricate(draped.mesh, STRIP, Fabrication()).slots)
+
+
+def test_a_finding_says_where_little_remains_next_to_a_slot() -> None:
+    """Slots of 2 t at 53 degrees, 30 mm apart: with t = 8 mm there remain 14 mm, less than their depth of 15."""
+    sine, cosine = 0.8, 0.6
+    lines = [[(-0.3, 0.0), (0.3, 0.0)]]
+    lines += [[(x - 0.2 * cosine, -0.2 * sine), (x + 0.2 * cosine, 0.2 * sine)] for x in (-0.015, 0.015)]
+    mesh = mesh_grid(straight_rods(lines), 0.05)
+
+    def said(thickness: float) -> list[str]:
+        rod = rs.Rod(rs.RectangularSection(width=0.03, height=thickness), rs.Material.preset("gfrp"))
+        return [str(word) for word in fabricate(mesh, rod, Fabrication(), slotted=[mesh.flat]).warnings]
+
+    (always,) = said(0.0074)
+    assert "keep half of their height" in always
+    word, again = said(0.008)
+    assert again == always
+    assert "meet at 53 degrees, slots are 16 mm wide, and on R01 only 14 mm remain next to one" in word
+    assert "its depth of 15 mm" in word
+    assert "only 0 mm remain" in said(0.02)[0]
+
+
+def test_curved_laths_are_spliced_so_that_no_board_is_longer_than_the_stock_and_are_not_nested() -> None:
+    lines = [[(0.0, y), (2.0, y)] for y in (0.0, 0.1)] + [[(x, -0.2), (x, 0.3)] for x in np.linspace(0.1, 1.9, 10)]
+    grid = straight_rods(lines)
+    bent = [rod._replace(curve=RestCurve((0.0, 2.0), (0.5, 0.5))) if rod.length > 1 else rod for rod in grid.rods]
+    mesh = mesh_grid(replace(grid, rods=tuple(bent)), 0.05)
+    rod = rs.Rod(rs.RectangularSection(width=0.002, height=0.06), rs.Material.preset("gfrp"))
+    made = fabricate(mesh, rod, Fabrication(stock_length=1.04))
+    assert made.stock is None
+    assert [word.finding.code for word in made.warnings] == ["not_nested"]
+    assert [len(splices) for splices in made.splices[:2]] == [2, 2]  # one would do of straight bars
+    assert max(piece.length for piece in made.pieces) <= 1.04 - 0.06
+    assert fabricate(mesh_grid(grid, 0.05), rod, Fabrication(stock_length=1.04)).stock is not None

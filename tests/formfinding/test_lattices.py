@@ -10,12 +10,19 @@ import pytest
 
 import rodshell as rs
 from rodshell.case import load_case
+from rodshell.case.rod_ends import read_result
 from rodshell.errors import InputError
+from rodshell.formfinding.pipeline import meshed_again
 from rodshell.nets.surface_lattice import surface_net
+from rodshell.output.blanks import blanks_of
+from rodshell.output.drawing import FAMILIES
 from rodshell.output.drawings import drawing_set
-from rodshell.output.grid import joints_of, rods_of, shape_names
+from rodshell.output.drawings.flat import flat_drawing, flat_plan
+from rodshell.output.grid import family_numbers, joints_of, rods_of, shape_names
 from rodshell.output.schedules import joints_table
+from rodshell.output.viewer import scene_of
 from rodshell.results.archive import Archive, read
+from rodshell.solve.equilibrium import Status
 
 LOW, HIGH = rs.Cap(radius=2.0, base=1.6), rs.Cap(radius=2.0, base=1.0)
 GFRP = rs.Material.preset("gfrp")
@@ -110,17 +117,29 @@ def test_schedules_have_the_places_of_joints_and_no_flat_ones_of_a_shell_that_is
     form: Callable[[], rs.Form],
 ) -> None:
     archive, mesh = kept(form()), form().footprint.mesh
-    names, rows = joints_table(archive)
+    table = joints_table(archive)
+    rows = {row[0]: dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)}
     places = form().popped["pinned"].positions[mesh.joint_nodes]
     for joint, place in zip(mesh.grid.joint_names, places, strict=True):
-        row = next(dict(zip(names, row, strict=True)) for row in rows if row[0] == joint)
+        row = rows[joint]
         found = [float(row[f"final_{axis}_mm"]) for axis in "xyz"]
         np.testing.assert_allclose(found, 1e3 * place, atol=0.1)  # twice the rounding
         assert bool(row["flat_x_mm"]) == bool(row["scissor_deg"]) == (form is low)
     if form is low:
         scissors = {"/".join(load.rods): load.scissor_deg for load in archive.results.joint_loads["pinned"]}
-        for row in rows:
-            assert float(row[names.index("scissor_deg")]) == pytest.approx(scissors[row[0]], abs=0.05)
+        for joint, row in rows.items():
+            assert float(row["scissor_deg"]) == pytest.approx(scissors[joint], abs=0.05)
+
+
+def test_families_of_a_lattice_are_named_in_the_result_and_coloured_in_drawings() -> None:
+    archive = kept(low())
+    families = [rod.family for rod in archive.results.rods]
+    assert {*families} == {"u", "v"}
+    assert [rod.id[0].lower() for rod in archive.results.rods] == families
+    assert {rod.offset for rod in archive.results.rods} == {None}  # on no line of the flat plan
+    crossed = {frozenset((rod.family, joint.other[0].lower())) for rod in archive.results.rods for joint in rod.joints}
+    assert all(len(pair) == 2 for pair in crossed)  # rods of a family do not cross
+    assert {*family_numbers(families)} == {0, 1}
 
 
 def test_a_result_is_kept_and_its_case_gives_it_again(tmp_path: Path) -> None:
@@ -343,3 +362,156 @@ def test_laths_that_would_cross_just_past_their_ends_do_not_touch() -> None:
     at = form.footprint.mesh.grid.meetings(0.1).at
     assert ((at < first) | (last < at)).any()
     assert form.checks.contact["pinned"].pairs == 0
+
+
+@cache
+def curved() -> rs.Form:
+    lines = [[(x + 0.1 * np.cos(y), y) for y in np.linspace(-1.6, 1.6, 9)] for x in (-0.6, -0.2, 0.2, 0.6)]
+    lines += [[point[::-1] for point in line] for line in lines]
+    return rs.find_form(LOW, rs.Curves(lines=lines, rest="curved"), lath(0.04), joint=rs.Pin(), ends="pinned")
+
+
+def test_a_result_keeps_how_its_rods_are_curved_at_rest(tmp_path: Path) -> None:
+    """As the mesh has it, over each rod from its start; kept, read, written again and run again it is the same."""
+    form = curved()
+    archive, mesh = kept(form), form.footprint.mesh
+    for k, rod in enumerate(archive.results.rods):
+        known = rod.rest_curvature
+        assert known is not None
+        assert (known.at[0], known.at[-1]) == pytest.approx((0.0, rod.length))
+        here = mesh.rod_slice(k)
+        found = np.interp(mesh.stations[here] - rod.start, known.at, known.curvatures)
+        np.testing.assert_allclose(found, mesh.rest_curvatures[here], atol=1e-6)
+    folder = form.save(tmp_path / "kept", kinds=[])
+    again = read(folder)
+    assert [rod.rest_curvature for rod in again.results.rods] == [rod.rest_curvature for rod in archive.results.rods]
+    assert rs.Job.load(folder / "case.toml").run(until="drape").draped.rods == form.draped.rods
+    with pytest.raises(InputError, match=r"do not lie straight in the plane \(the first: R0\d\).*run its case again"):
+        read_result(folder)
+
+
+@pytest.mark.slow
+def test_a_refinement_of_curved_laths_keeps_their_curves_and_the_blank_follows_the_breadth() -> None:
+    refined = rs.refine(curved(), ["taper"])
+    assert refined.refined is not None
+    assert refined.refined.changed
+    found, before = kept(refined), kept(curved())
+    rods = [archive.results.rods[0] for archive in (found, before)]
+    assert rods[0].rest_curvature == rods[1].rest_curvature
+    along = rods[0].stiffness
+    assert along is not None
+    assert along.varies == "size"
+    right, left = blanks_of(found)[rods[0].id].across(along.at[1])
+    assert np.hypot(*(left - right)) == pytest.approx(0.04 * along.factors[1] ** 0.25, rel=1e-3)
+
+
+def test_meshed_again_rods_lie_in_the_plane_as_before() -> None:
+    """Angles at rest of rigid joints are those of the flat state."""
+    old, again = low().footprint.mesh, meshed_again(low().stages, "pinned").footprint.mesh
+    np.testing.assert_allclose(again.flat[again.joint_nodes], old.flat[old.joint_nodes], atol=1e-9)
+
+
+def test_lengths_cannot_be_refined_along_curves() -> None:
+    with pytest.raises(InputError, match="tails and holes cannot vary where rods follow curves of the target"):
+        rs.refine(low(), ["tails", "holes"])
+
+
+def test_a_straight_rod_has_no_curvature_at_rest() -> None:
+    assert all(rod.rest_curvature is None for rod in kept(low()).results.rods)
+
+
+def test_each_family_has_its_name_and_its_colour() -> None:
+    """First, second and third; lines that are given are of none, and of one colour."""
+    three = rs.find_form(LOW, rs.Geodesic(spacing=0.4, families=3), lath(0.01), joint=rs.Pin(), ends="pinned")
+    rods = rods_of(kept(three))
+    assert {rod.id[0]: rod.family for rod in rods} == {"U": "u", "V": "v", "W": "w"}
+    scene = scene_of(kept(three))
+    assert scene is not None
+    assert {rod["id"][0]: rod["ink"] for rod in scene.header["rods"]} == dict(zip("UVW", FAMILIES, strict=True))
+    assert {rod.family for rod in rods_of(kept(curved()))} == {"free"}
+    plan = flat_drawing(flat_plan(kept(low())), 20.0)
+    pens = {path.name[0]: path.pen.colour for path in plan.paths if path.name and path.pen}
+    assert pens == {"U": FAMILIES[0], "V": FAMILIES[1]}
+
+
+def test_strips_of_a_saddle_cross_by_slots_unless_they_are_pinned() -> None:
+    """On Scherk's surface asymptotic lines cross at right angles; in the plane they are more acute."""
+    target = rs.HeightField(formula="0.8*(log(cos(y/0.8)) - log(cos(x/0.8)))", domain=rs.Disc(0.9))
+    strip = rs.Rod(rs.RectangularSection(width=0.020, height=0.002), GFRP)
+    layout, slots = rs.Asymptotic(spacing=0.3), rs.Spring(out_of_plane=np.inf, twist=np.inf)
+    forms = [
+        rs.find_form(target, layout, strip, joint=joint, ends="pinned", anchor=(0.0, 0.0))
+        for joint in (slots, rs.Pin())
+    ]
+    slotted, pinned = map(kept, forms)
+    assert not any(joint.slot for rod in pinned.results.rods for joint in rod.joints)
+    assert pinned.results.fabrication is not None
+    assert pinned.results.fabrication.slot_depth is None
+    assert slotted.results.fabrication is not None
+    assert slotted.results.fabrication.slot_depth == pytest.approx(0.010)
+    said = [{finding.code for finding in kept.verdict.findings} for kept in (slotted, pinned)]
+    assert ["slots_weaken" in codes for codes in said] == [True, False]
+    assert slotted.verdict.level != "good"
+    assert slotted.results.flat_state is not None
+    assert slotted.results.flat_state.lies_flat
+    table, widths = joints_table(slotted), dict[str, float]()
+    np.testing.assert_allclose(np.array(table["final_deg"], dtype=float), 90.0, atol=1.5)  # by polylines
+    for k, name in enumerate(table["id"]):
+        flat = np.radians(float(table["flat_deg"][k]))
+        widths[name] = 2e-3 / np.tan(0.5 * min(flat, np.pi - flat))
+        assert float(table["slot_mm"][k]) == pytest.approx(1e3 * widths[name], abs=0.06)  # rounding, polylines
+        assert table["over"][k].startswith("V")
+    for rod in slotted.results.rods:
+        for joint in rod.joints:
+            both = f"{rod.id}/{joint.other}" if rod.family == "u" else f"{joint.other}/{rod.id}"
+            assert joint.slot == pytest.approx(widths[both], rel=1e-2)
+
+
+def test_a_clearance_of_slots_needs_slots() -> None:
+    with pytest.raises(InputError, match=r"fabrication.slot_clearance = 0.001: only strips of an asymptotic lattice"):
+        load_case("cap", {"fabrication.slot_clearance": "1 mm"}).build()
+    saddle = {"target.kind": "heightfield", "target.formula": "x*y", "target.domain": "disc", "target.radius": 1.0}
+    strips = {"layout.kind": "asymptotic", "rod.section": {"kind": "rectangle", "width": 0.02, "height": 0.002}}
+    case = load_case({**saddle, **strips, "rod.material": {"preset": "gfrp"}, "fabrication.slot_clearance": "1 mm"})
+    assert case.build().layout.upright
+
+
+@pytest.mark.parametrize(
+    ("layout", "closer", "elsewhere"),
+    [
+        (rs.Geodesic(), "a smaller spacing", "another anchor or layout.rotate"),
+        (rs.Asymptotic(), "a smaller spacing", "another anchor or layout.rotate"),
+        (rs.Curves(), "lines that lie closer", "other lines"),
+        (rs.GridLayout.orthogonal(spacing=0.1), "a smaller spacing", "another offset, anchor or heading"),
+    ],
+)
+def test_advice_fits_the_lattice(layout: rs.GridLayout | rs.Curves, closer: str, elsewhere: str) -> None:
+    diverged, buckled = Status.DIVERGED.sentence_on(layout), Status.BUCKLED.sentence_on(layout)
+    assert diverged == f"the iteration diverged; choose {closer}, or {elsewhere}"
+    assert f"{closer}, a flatter target" in buckled
+
+
+def test_rods_along_lines_that_run_far_past_their_last_joint_are_told_of_other_lines() -> None:
+    lines = [[(x, -1.5), (x, 1.5)] for x in (-0.2, 0.0, 0.2)] + [[(-1.5, y), (1.5, y)] for y in (-0.2, 0.0, 0.2)]
+    form = rs.Job(LOW, rs.Curves(lines=lines, spacing=0.2), lath(0.01), joint=rs.Pin()).run(until="drape")
+    (said,) = [word for word in form.warnings if "past its last joint" in word]
+    assert said.endswith("; other lines may help, or leave such rods out (layout.left_out)")
+
+
+def test_curved_rods_are_laid_flat_at_the_angle_that_they_have_on_the_target() -> None:
+    """To scissor them hardly bends them: without their middle joint held they would end as a narrow bundle."""
+    lines = [[(x + 0.2 * (1 - y**2), y) for y in np.linspace(-1.3, 1.3, 9)] for x in np.arange(-0.9, 0.91, 0.3)]
+    lines += [[point[::-1] for point in line] for line in lines]
+    draped = rs.drape(rs.Curves(lines=lines, rest="curved"), lath(0.06), LOW, joint=rs.Pin())
+    found = draped.flat_state
+    assert found is not None
+    assert found.report.stable
+    grown = np.ptp(found.positions, axis=0) / np.ptp(draped.positions[:, :2], axis=0)
+    np.testing.assert_allclose(grown, np.sqrt(grown.prod()), rtol=0.02)  # both ways alike
+    assert 1.0 < grown.prod() < 1.2
+
+
+def test_joints_that_are_nearer_than_a_lath_is_broad_are_said() -> None:
+    (said,) = rs.drape(rs.Geodesic(spacing=0.3, families=3), lath(0.04), HIGH, joint=rs.Pin()).warnings
+    assert "pairs of neighbouring joints on a rod are nearer than its breadth of 40 mm" in said
+    assert not rs.drape(rs.Geodesic(spacing=0.3), lath(0.04), HIGH, joint=rs.Pin()).warnings

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.formfinding.supports import figures_of
 from rodshell.loads.locked_joints import locked
 from rodshell.loads.structure import Structure
 from rodshell.rods.supports import SUPPORTS, supports_of
@@ -25,6 +26,9 @@ class Posts(rs.Support):
 
     def energies(self, ends, points):
         return [rs.LocalEnergy(ends[:, None], lambda x: self.stiffness / 2 * (x[:, 0, 0] - points[:, 0]) ** 2)]
+
+    def figures(self, moved, forces):
+        return {**super().figures(moved, forces), "stroke of a damper": (float(np.ptp(moved[:, 0])), "m")}
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +76,34 @@ def test_checks_summary_and_result_know_the_support_by_its_name(form, tmp_path):
     assert archive.summary() == form.summary()
     assert (tmp_path / "dome" / "model" / "popped_posts.obj").exists()
     np.testing.assert_array_equal(archive.states["popped_posts"], form.popped["posts"].positions)
+
+
+def test_what_a_support_says_of_itself_stands_in_result_summary_and_report(form, tmp_path):
+    slid = ends_of(form, "posts") - form.boundary.points
+    largest, stroke = np.linalg.norm(slid, axis=1).max(), np.ptp(slid[:, 0])
+    form.save(tmp_path / "dome")
+    held = rs.read(tmp_path / "dome").results.reactions
+    assert held["pinned"].figures == {}
+    assert {*held["posts"].figures} == {"largest displacement of a rod end", "stroke of a damper"}
+    assert held["posts"].figures["largest displacement of a rod end"] == (pytest.approx(largest, rel=1e-6), "m")
+    assert held["posts"].figures["stroke of a damper"] == (pytest.approx(stroke, rel=1e-6), "m")
+    assert f"stroke of a damper {1e3 * stroke:.2f} mm" in form.summary()
+    report = (tmp_path / "dome" / "report.html").read_text()
+    row = report[report.index("Stroke of a damper") :].split("</tr>")[0]
+    assert f"{1e3 * stroke:.2f} mm" in row  # of the posts
+    assert "\N{EN DASH}" in row  # of the pinned ends
+
+
+@pytest.mark.parametrize("said", [["stroke"], {"stroke": 0.1}, {"stroke": ("long", "m")}, {1: (0.1, "m")}])
+def test_figures_that_are_no_values_with_units_are_refused(said):
+    @dataclass(frozen=True)
+    class Wrong(rs.Support):
+        def figures(self, moved, forces):
+            return said
+
+    moved = np.zeros((4, 3))
+    with pytest.raises(rs.InputError, match="figure"):
+        figures_of(Wrong("wrong"), moved, moved)
 
 
 def test_what_other_supports_find_does_not_change(form):

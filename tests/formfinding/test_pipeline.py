@@ -15,6 +15,7 @@ from rodshell.errors import InputError
 from rodshell.figures.records import json_text
 from rodshell.formfinding import bound_drape, form_warnings, pipeline
 from rodshell.formfinding.finite_sections import section_rotation
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.layout.lattices import EDGES_A_SPAN
 from rodshell.results import read
 from rodshell.results.verdict import verdict
@@ -173,8 +174,8 @@ def test_section_rotation_is_what_the_twist_angles_add(turn):
 @pytest.mark.parametrize(("ending", "tail", "left"), [(6, 0.5, 5), (4, 0.7, 7), (10, None, 0), (11, None, 0)])
 def test_a_rod_that_runs_far_past_its_last_joint_is_warned_of(ending, tail, left):
     """One rod of 1.1 m, met every 0.1 m; from `ending` on those that meet it end 10 mm past it."""
-    crossing = [rs.FlatRod.v(f"V{k:02d}", k / 10, -0.2, 0.01 if k >= ending else 0.2) for k in range(1, 11)]
-    grid = rs.FlatGrid.of([rs.FlatRod.u("U01", 0.0, 0.0, 1.1), *crossing], margin=0.015)
+    crossing = [lattice_rod(1, f"V{k:02d}", k / 10, -0.2, 0.01 if k >= ending else 0.2) for k in range(1, 11)]
+    grid = rs.FlatGrid.of([lattice_rod(0, "U01", 0.0, 0.0, 1.1), *crossing], margin=0.015)
     layout = rs.GridLayout.orthogonal(spacing=0.1)
     trimmed = SimpleNamespace(mesh=SimpleNamespace(grid=grid), draped=SimpleNamespace(layout=layout))
     found = form_warnings._long_tails(trimmed)

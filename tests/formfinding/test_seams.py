@@ -216,7 +216,7 @@ def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> 
     archive = form.archive()
     for ends, weighed in archive.results.plain()["self_weight"].items():
         popped = [patch.popped[ends] for patch in form.patches]
-        own = [self_weight(patch.shell, patch.equilibrium) for patch in popped]
+        own = [self_weight(patch.shell, patch.equilibrium)[0] for patch in popped]
         # followed as one shell: each path ends within CLOSE of its limit
         assert weighed["load_factor"] == pytest.approx(min(patch.load_factor for patch in own), rel=CLOSE)
     assert archive.summary().count("(weakest patch, its seam held)") == 2

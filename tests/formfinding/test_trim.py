@@ -19,6 +19,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Draped, DrapeFigures, Fall, Gravity, Trimmed, drape, map_back, trim
 from rodshell.formfinding.trim import end_tangents, untrimmed
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.rods.section import Circle, Material, Rod
 from rodshell.targets import Disc, Ellipsoid, HeightField, Hemisphere, Paraboloid, Target
 from tests.nets.sphere_net import sphere_net_end, sphere_net_rod
@@ -300,7 +301,7 @@ def test_a_drape_that_stopped_is_kept_whole():
 
 
 def lone_rod(stations: Floats) -> GridMesh:
-    rod = FlatRod.u("U01", 0.0, float(stations[0]), float(stations[-1]))
+    rod = lattice_rod(0, "U01", 0.0, float(stations[0]), float(stations[-1]))
     mesh = mesh_grid(FlatGrid.of([rod]), rod.length, marks=[tuple(stations[1:-1].tolist())])
     np.testing.assert_allclose(mesh.stations, stations, rtol=0, atol=1e-15)
     return mesh

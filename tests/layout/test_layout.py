@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from rodshell.errors import InputError
 from rodshell.geometry.curves import on_curve
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.layout.mesh import cut_mesh
 
 ROUND_OFF = 1e-12
@@ -207,6 +208,21 @@ def test_the_usual_span_is_that_of_rods_whose_crossings_nearly_coincide():
     assert grid.span == pytest.approx(1.0, abs=0.06)
 
 
+@pytest.mark.parametrize(
+    ("rod", "across"), [(lattice_rod(0, "U", 0.2, 0.0, 1.0), (0, 1)), (lattice_rod(1, "V", 0.2, 0.0, 1.0), (1, 0))]
+)
+def test_a_rod_is_moved_across_itself_and_its_offset_with_it(rod: FlatRod, across: tuple[float, float]):
+    moved = rod.cut(0.1, 0.9, 0.05)
+    assert rod.across == across
+    assert (moved.offset, moved.start, moved.end) == (0.25, 0.1, 0.9)
+    np.testing.assert_allclose(
+        moved.point([0.1, 0.9]) - rod.point([0.1, 0.9]), 2 * [0.05 * np.array(across)], atol=1e-16
+    )
+    back = rod._replace(direction=tuple(-x for x in rod.direction))
+    assert back.across == rod.across  # whichever way it runs
+    assert rod._replace(offset=None).cut(0.1, 0.9, 0.05).offset is None
+
+
 # Random rods
 
 
@@ -292,14 +308,12 @@ def test_edges_bends_and_lengths_are_those_of_each_rod_in_turn(seed, count, edge
     grid = random_rods(seed, count)
     mesh = mesh_grid(grid, edge)
     edges, bends, of_edge, of_bend, lengths, voronoi = [], [], [], [], [], []
-    share = np.zeros(mesh.node_count)
     for k in range(count):
         nodes, s = mesh.nodes_of(k).tolist(), mesh.stations[mesh.rod_slice(k)]
         for i in range(len(nodes) - 1):
             edges.append(nodes[i : i + 2])
             of_edge.append(k)
             lengths.append(s[i + 1] - s[i])
-            share[nodes[i : i + 2]] += (s[i + 1] - s[i]) / 2
         for i in range(1, len(nodes) - 1):
             bends.append(nodes[i - 1 : i + 2])
             of_bend.append(k)
@@ -310,10 +324,8 @@ def test_edges_bends_and_lengths_are_those_of_each_rod_in_turn(seed, count, edge
     np.testing.assert_array_equal(mesh.bend_rods, of_bend)
     np.testing.assert_allclose(mesh.edge_lengths, lengths, rtol=0, atol=ROUND_OFF)
     np.testing.assert_allclose(mesh.voronoi_lengths, voronoi, rtol=0, atol=ROUND_OFF)
-    np.testing.assert_allclose(mesh.tributary_lengths(), share, rtol=0, atol=ROUND_OFF)
     total = sum(rod.length for rod in grid.rods)
     assert mesh.edge_lengths.sum() == pytest.approx(total, rel=ROUND_OFF)
-    assert mesh.tributary_lengths().sum() == pytest.approx(total, rel=ROUND_OFF)
     # in the flat state an edge is as long as its rest length
     flat = np.linalg.norm(np.diff(mesh.flat[mesh.edges], axis=1)[:, 0], axis=1)
     np.testing.assert_allclose(flat, mesh.edge_lengths, rtol=0, atol=1e-9)
@@ -348,7 +360,7 @@ def test_crossings_are_found_along_their_rods(seed, count, edge):
 
 
 def test_marks_become_nodes_and_those_at_joints_or_ends_add_none():
-    rods = [FlatRod.u("U01", 0.0, -0.5, 0.7), FlatRod.v("V01", 0.2, -0.4, 0.4)]
+    rods = [lattice_rod(0, "U01", 0.0, -0.5, 0.7), lattice_rod(1, "V01", 0.2, -0.4, 0.4)]
     grid = FlatGrid.of(rods)
     plain = mesh_grid(grid, 1.0)
     assert plain.node_count == 5
@@ -361,7 +373,7 @@ def test_marks_become_nodes_and_those_at_joints_or_ends_add_none():
 def test_an_edge_a_hair_longer_than_the_span_still_counts_as_one():
     """0.3 / 0.1 is 2.9999999999999996 or 3.0000000000000004: no fourth edge, nor one edge for two."""
     for spans, edge in product(range(1, 40), (0.1, 0.005, 0.03, 1 / 3)):
-        rod = FlatRod.u("U01", 0.0, 0.0, spans * edge)
+        rod = lattice_rod(0, "U01", 0.0, 0.0, spans * edge)
         for length in (edge, np.nextafter(edge, 0), np.nextafter(edge, 1)):
             assert len(mesh_grid(FlatGrid.of([rod]), float(length)).edges) == spans
         assert len(mesh_grid(FlatGrid.of([rod]), edge * (1 - 1e-4 / spans)).edges) == spans + 1
@@ -401,9 +413,9 @@ def test_places_that_differ_by_round_off_are_one_node():
     a = 0.15
     b = np.nextafter(a, 1)
     c = np.nextafter(b, 1)
-    across = FlatRod.v("V", c, -1.0, 1.0)
-    begins = mesh_grid(FlatGrid.of([FlatRod.u("U", 0.0, a, 1.0), across]), 0.5, marks=[[b], []])
-    passes = mesh_grid(FlatGrid.of([FlatRod.u("U", 0.0, 0.0, 1.0), across]), 0.5, marks=[[b, a], []])
+    across = lattice_rod(1, "V", c, -1.0, 1.0)
+    begins = mesh_grid(FlatGrid.of([lattice_rod(0, "U", 0.0, a, 1.0), across]), 0.5, marks=[[b], []])
+    passes = mesh_grid(FlatGrid.of([lattice_rod(0, "U", 0.0, 0.0, 1.0), across]), 0.5, marks=[[b, a], []])
     assert min(begins.edge_lengths.min(), passes.edge_lengths.min()) > 0.1
 
 
@@ -411,7 +423,7 @@ def test_places_that_differ_by_round_off_are_one_node():
 
 
 def test_a_mesh_without_joints_may_be_cut():
-    grid = FlatGrid.of([FlatRod.u("U", 0.0, 0.0, 1.0), FlatRod.v("V", 0.1, -1.0, 1.0)], margin=0.2)
+    grid = FlatGrid.of([lattice_rod(0, "U", 0.0, 0.0, 1.0), lattice_rod(1, "V", 0.1, -1.0, 1.0)], margin=0.2)
     part, nodes = cut_mesh(mesh_grid(grid, 0.1), grid.rods)
     assert len(part.grid.crossings) == 0
     assert len(nodes) == 32
@@ -452,7 +464,7 @@ def test_a_cut_mesh_keeps_stations_nodes_and_the_joints_far_from_ends(seed, coun
     for (a, b), node in zip(part.grid.crossings.rods, part.joint_nodes, strict=True):
         assert node in part.nodes_of(a)
         assert node in part.nodes_of(b)
-    assert part.tributary_lengths().sum() == pytest.approx(sum(rod.length for rod in rods), rel=1e-9)
+    assert part.edge_lengths.sum() == pytest.approx(sum(rod.length for rod in rods), rel=1e-9)
 
 
 def test_of_three_rods_through_one_point_two_stay_joined_when_the_third_ends_near_it():
@@ -554,17 +566,17 @@ def test_the_whole_grid_of_a_layout_is_a_lattice(rods, offset):
 @pytest.mark.parametrize(
     ("rod", "said"),
     [
-        (FlatRod.u("A", 0.0, float("nan"), 1.0), "start and end of the rods must be finite"),
-        (FlatRod.u("A", 0.0, "x", 1.0), "must be numbers of the shape"),
+        (lattice_rod(0, "A", 0.0, float("nan"), 1.0), "start and end of the rods must be finite"),
+        (lattice_rod(0, "A", 0.0, "x", 1.0), "must be numbers of the shape"),
         (FlatRod("A", "free", 0.0, 0.0, 1.0, (0.0, 0.0, 0.0), (1.0, 0.0)), "must be numbers of the shape"),
         (FlatRod("A", "free", 0.0, 0.0, 1.0, (0.0, 0.0), (0.0, 0.0)), "rod A must have a direction"),
-        (FlatRod.u("A", 0.0, 1.0, -1.0), "rod A must .* start 1 m and end -1 m"),
-        (FlatRod.u("A", 0.0, 1.0, 1.0), "rod A must .* start 1 m and end 1 m"),
+        (lattice_rod(0, "A", 0.0, 1.0, -1.0), "rod A must .* start 1 m and end -1 m"),
+        (lattice_rod(0, "A", 0.0, 1.0, 1.0), "rod A must .* start 1 m and end 1 m"),
     ],
 )
 def test_a_rod_that_is_no_line_is_refused(rod, said):
     with pytest.raises(InputError, match=said):
-        FlatGrid.of([rod, FlatRod.v("B", 0.0, -1.0, 1.0)])
+        FlatGrid.of([rod, lattice_rod(1, "B", 0.0, -1.0, 1.0)])
 
 
 def test_no_rods_make_an_empty_grid():

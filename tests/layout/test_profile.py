@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rodshell.errors import InputError
-from rodshell.layout import FlatGrid, FlatRod, Profile, mesh_grid
+from rodshell.layout import FlatGrid, Profile, mesh_grid
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.layout.mesh import side_by_side
 
 EIGHTFOLD = Profile((0.0, 1.0), (1.0, 8.0))
@@ -40,7 +41,7 @@ def test_symmetric_profile_is_the_same_from_both_ends():
 
 
 def test_profiles_stay_with_their_rods_in_meshes_and_side_by_side():
-    rods = [FlatRod.u("U", 0.0, -1.0, 1.0), FlatRod.v("V", 0.0, -1.0, 1.0)]
+    rods = [lattice_rod(0, "U", 0.0, -1.0, 1.0), lattice_rod(1, "V", 0.0, -1.0, 1.0)]
     mesh = mesh_grid(FlatGrid.of(rods), 0.3).with_profiles((EIGHTFOLD, None))
     assert [rod.profile for rod in mesh.in_layers(0.1).grid.rods] == [EIGHTFOLD, None]
     assert mesh.grid.rods[0].cut(-0.5, 0.5).profile == EIGHTFOLD
@@ -73,6 +74,6 @@ def test_a_share_that_is_no_part_of_the_rod_is_refused(share):
 
 
 def test_as_many_profiles_as_rods():
-    grid = FlatGrid.of([FlatRod.u("U", 0.0, -1.0, 1.0)])
+    grid = FlatGrid.of([lattice_rod(0, "U", 0.0, -1.0, 1.0)])
     with pytest.raises(InputError, match="the grid has 1 rods"):
         grid.with_profiles((None, None))

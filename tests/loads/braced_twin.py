@@ -37,6 +37,17 @@ class BracedTwin(LoadedTwin):
         strain = np.sqrt(np.sum(apart * apart, axis=1)) / self.slack - 1
         return np.where(strain.real > 0, 0.5 * self.rope_stiffness * self.slack * strain**2, 0.0)
 
+    def negative_modes(self, factors):
+        """Of the stiffness at the last of these factors, each equilibrium being found from the last one's tangent."""
+        state, before = self.state, 0.0
+        for factor in factors:
+            solve, _ = self.factored(state)
+            guess = state.copy()
+            guess[self.free] += (factor - before) * solve(self.load[self.free])
+            state, negative = self.settled(guess, factor)
+            before = factor
+        return negative
+
     def linear_factor(self, state):
         """Lowest factor of linear buckling about a state: the stiffness of the change of axial forces and of laths'
         moments, the geometry being frozen. Rods that bend alike have no strains of their bending."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.checks.bending import Bending, bending, bending_of
 from rodshell.checks.reactions import cut_forces, reactions
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
@@ -142,6 +143,68 @@ def test_stress_over_strength_is_what_is_used_and_the_erected_shell_counts_with_
     assert 1 < more["bending"] / loaded.used.largest["bending"] <= net_section(TUBE.section, 0.01)
 
 
+def by_clauses(kappas: np.ndarray, axial: np.ndarray) -> np.ndarray:
+    """Stress over f_m,k of larch laths of 35 x 50 mm, C30, term by term [EN 1995-1-1, 3.2(3), 6.1.6, 6.2.3, 6.3.2]."""
+    used = np.empty(len(axial))
+    for k, ((out, within), strain) in enumerate(zip(kappas, axial, strict=True)):
+        flat, edge = 12e9 * 0.0175 * abs(out) / 1.3, 12e9 * 0.025 * abs(within) / (150 / 50) ** 0.2
+        along = 12e9 * strain
+        pull = along / (19 / 30 * (150 / 50) ** 0.2) if along > 0 else -along / (24 / 30)
+        used[k] = max(flat + 0.7 * edge, 0.7 * flat + edge) + pull
+    return used / 30e6
+
+
+@pytest.mark.parametrize("relaxed", [None, 0.2, 0.4])
+def test_erected_laths_are_judged_term_by_term_as_their_code_asks(relaxed: float | None) -> None:
+    """All of their stress for days, and what does not relax for ever; under snow nothing has relaxed yet."""
+    form = rs.find_form(rs.Cap(10.0, 4.0), grid(2.0, 0.5), TIMBER, ends="pinned", joint=rs.Pin())
+    asked = one(rs.Snow(10.0), strength=rs.Strength(service_class=1, relaxed=relaxed))
+    popped, loaded = form.popped["pinned"], rs.check_loads(form, asked).shells["all"]["pinned"]
+    assert loaded.at_factor == 1
+    alone = bending_of(popped.shell, popped.state, TIMBER)
+    assert alone.normal_curvature is not None
+    assert alone.geodesic_curvature is not None
+    erected = np.column_stack([alone.normal_curvature, alone.geodesic_curvature])
+    first, permanent, short = by_clauses(erected, alone.axial_strain), 0.6 / 1.3, 0.9 / 1.3
+    assert np.ptp(alone.axial_strain) > np.abs(alone.axial_strain).max()  # pulled and pressed
+    stays = np.maximum(first * (1 - (relaxed or 0.0)) / permanent, first / short)
+    assert loaded.used.uses["permanent"].max() == pytest.approx(stays.max(), rel=1e-4)
+    results = form.archive().results
+    assert results.bending is not None
+    assert results.bending.pinned is not None
+    assert results.bending.pinned.utilisation == pytest.approx(first.max() / permanent, rel=1e-3)  # none was given
+    bare = rs.check_loads(form, replace(asked, strength=rs.Strength(service_class=1))).shells["all"]["pinned"]
+    np.testing.assert_allclose(loaded.used.uses["bending"], bare.used.uses["bending"])
+
+
+def test_under_permanent_loads_what_has_relaxed_of_the_erected_shell_is_missing() -> None:
+    layout = rs.GridLayout.orthogonal(rods=(3, 3), spacing=0.5, edge=0.25, length=1.5)
+    mesh, chance = rs.mesh_grid(layout.flat_grid((3, 3), 1.5), 0.25), np.random.default_rng(1)
+    count, limits = len(mesh.rod_nodes), Limits.of(TIMBER, rs.Strength(relaxed=0.4))
+    shells, kappas, strains = list[Bending](), list[np.ndarray](), list[np.ndarray]()
+    for _ in range(2):
+        kappas.append(chance.normal(0.0, 0.1, (count, 2)))
+        edge_strains = np.full(len(mesh.edges), chance.normal(0.0, 1e-4))
+        shells.append(bending(mesh, mesh.flat, TIMBER, components=kappas[-1], edge_strains=edge_strains))
+        strains.append(shells[-1].axial_strain)
+    before, loaded = shells
+    stress = limits.compared(loaded, mesh)
+    assert stress is not None
+    np.testing.assert_allclose(stress / 30e6, by_clauses(kappas[1], strains[1]))
+    left = by_clauses(kappas[1] - 0.4 * kappas[0], strains[1] - 0.4 * strains[0])
+    expected = np.maximum(left / 0.6, by_clauses(kappas[1], strains[1]) / 0.9)
+    assert (left / 0.6 < expected).any()
+    assert (left / 0.6 == expected).any()
+    found = limits.relaxed_stress(stress, loaded, before, mesh)
+    np.testing.assert_allclose(found / 30e6 / 0.6, expected)
+
+
+def test_what_relaxes_is_judged_at_first_by_the_short_strength() -> None:
+    for share, strength in ((None, 0.6), (0.2, 0.6 / 0.8), (0.5, 0.9)):
+        limits = Limits.of(TIMBER, rs.Strength(relaxed=share))
+        assert limits.staying == pytest.approx(strength * 30e6 / 1.3)
+
+
 def test_slip_is_what_a_joint_adds_to_the_force_in_a_rod_at_any_mesh() -> None:
     """By the whole forces on both sides of each joint, along the rod there; the edges next to it are bent, by as much
     as they are long, to second order."""
@@ -236,6 +299,9 @@ def test_a_strength_of_rods_without_fibres_is_refused_in_one_sentence() -> None:
         (lambda: rs.Strength(short=-1.0), "must be"),
         (lambda: rs.Strength(service_class=4), "the service class must be a whole number, 1 to 3, not 4"),
         (lambda: Limits.of(TUBE, rs.Strength(service_class=2)), "only the strengths of timber presets depend on it"),
+        (lambda: Limits.of(TUBE, rs.Strength(relaxed=0.4)), "it is for timber presets that are judged by their code"),
+        (lambda: Limits.of(TIMBER, rs.Strength(relaxed=0.4, permanent=9e6)), "count it in strength.permanent"),
+        (lambda: rs.Strength(relaxed=1.0), "must be below 1, not 1: some stress stays"),
         (lambda: net_section(TIMBER.section, 0.05), "leaves nothing of the rod"),
         (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={"a": {"b": 1.0}}, durations={"c": "long"}), '"c"'),
         (

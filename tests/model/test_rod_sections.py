@@ -8,7 +8,8 @@ import pytest
 from scipy.sparse import csc_matrix
 
 from rodshell.joints import Ball, Linker, Pin, Rigid, Spring
-from rodshell.layout import FlatGrid, FlatRod, Profile, mesh_grid
+from rodshell.layout import FlatGrid, Profile, mesh_grid
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.model import Shell
 from rodshell.model.assembly import Assembly
 from rodshell.rods.materials import Material
@@ -21,7 +22,7 @@ LATH = Rod(RectangularSection(width=3e-3, height=12e-3), Material(10e9, 600.0, s
 
 def cantilever_tip(profile, edges):
     """Deflection of the end of a rod clamped at its start, per force at the end [m/N], for small displacements."""
-    mesh = mesh_grid(FlatGrid.of([FlatRod.u("U", 0.0, 0.0, LENGTH)]), LENGTH / edges).with_profiles(profile)
+    mesh = mesh_grid(FlatGrid.of([lattice_rod(0, "U", 0.0, 0.0, LENGTH)]), LENGTH / edges).with_profiles(profile)
     shell = Shell.of(mesh, ROD, clamped=True, twist=False)
     first, last = mesh.ends[0]
     free = shell.freedom().with_directions(np.array([first, shell.ghosts[0]]))
@@ -67,7 +68,7 @@ def test_double_laths_over_the_middle_bend_as_a_beam_of_three_segments():
 
 def test_mass_of_a_tapered_round_rod_is_that_of_its_solid():
     low, high = 0.3, 2.0
-    mesh = mesh_grid(FlatGrid.of([FlatRod.u("U", 0.0, 0.0, LENGTH)]), LENGTH / 40)
+    mesh = mesh_grid(FlatGrid.of([lattice_rod(0, "U", 0.0, 0.0, LENGTH)]), LENGTH / 40)
     shell = Shell.of(mesh.with_profiles(Profile((0.0, 1.0), (low, high))), ROD)
     # EI grows as f, the area as sqrt(f), whose mean over f linear from a to b is 2/3 (b^1.5 - a^1.5)/(b - a)
     mean = 2 / 3 * (high**1.5 - low**1.5) / (high - low)
@@ -76,8 +77,8 @@ def test_mass_of_a_tapered_round_rod_is_that_of_its_solid():
 
 def crossed(profile):
     """Three rods along x and two along y."""
-    rods = [FlatRod.u(f"U{k}", 0.1 * k, -0.3, 0.3) for k in (-1, 0, 1)]
-    rods += [FlatRod.v(f"V{k}", 0.1 * k, -0.3, 0.3) for k in (-1, 1)]
+    rods = [lattice_rod(0, f"U{k}", 0.1 * k, -0.3, 0.3) for k in (-1, 0, 1)]
+    rods += [lattice_rod(1, f"V{k}", 0.1 * k, -0.3, 0.3) for k in (-1, 1)]
     return mesh_grid(FlatGrid.of(rods), 0.05).with_profiles(profile)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.layout.flatgrid import whole_rods
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.nets.apron import RINGS, with_apron
 from rodshell.nets.compass import Net
 
@@ -24,10 +25,13 @@ def random_net(seed: int) -> tuple[np.random.Generator, Net, np.ndarray]:
 def random_rods(random: np.random.Generator) -> list[rs.FlatRod]:
     """Pieces of half of the lines, one or two on each."""
     rods = []
-    for make, letter in ((rs.FlatRod.u, "U"), (rs.FlatRod.v, "V")):
+    for family, letter in enumerate("UV"):
         for k in random.choice(9, 5, replace=False).tolist():
             cuts = np.sort(random.uniform(-3.5, 3.5, 4)).tolist()
-            rods += [make(f"{letter}{k}{n}", float(LINES[k]), *cuts[2 * n : 2 * n + 2]) for n in range(1 + k % 2)]
+            rods += [
+                lattice_rod(family, f"{letter}{k}{n}", float(LINES[k]), *cuts[2 * n : 2 * n + 2])
+                for n in range(1 + k % 2)
+            ]
     return rods
 
 

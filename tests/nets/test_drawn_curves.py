@@ -45,7 +45,22 @@ def test_straight_lines_in_plan_are_circles_of_a_sphere_up_to_its_base(base: flo
         radius = np.sqrt(R**2 - x**2)
         assert np.diff(net.curves.ends[k])[0] == pytest.approx(2 * radius * np.arccos(base / radius), rel=1e-9)
     offsets = [line[0][0] for line in ACROSS]
-    assert len(net.crossings) == sum(x**2 + y**2 < R**2 - base**2 for x in offsets for y in offsets)
+    low, high = net.curves.ends[net.crossings.rods].transpose(2, 0, 1)
+    on_both = ((low <= net.crossings.at) & (net.crossings.at <= high)).all(axis=1)  # some meet past an end
+    assert on_both.sum() == sum(x**2 + y**2 < R**2 - base**2 for x in offsets for y in offsets)
+
+
+def test_such_circles_bend_within_the_sphere_by_their_geodesic_curvature() -> None:
+    """By which laths are cut that are curved at rest: x/(R rho) on a circle of radius rho, x from the middle."""
+    net = net_of(BOTH, rs.Cap(radius=R, base=1.0))
+    curve, s = net.curves.knots
+    ends = net.curves.ends[curve]
+    inside = (ends[:, 0] < s) & (s < ends[:, 1])
+    normal, within = net.bends
+    offset = np.array([line[0][0] for line in ACROSS] * 2)[curve]
+    exact = np.abs(offset) / (R * np.sqrt(R**2 - offset**2))
+    assert np.abs(np.abs(normal) - 1.0 / R)[inside].max() < 1e-7
+    assert np.abs(np.abs(within) - exact)[inside].max() < 1e-5
 
 
 def test_points_in_space_give_the_curve_between_its_ends_and_are_moved_onto_the_target() -> None:

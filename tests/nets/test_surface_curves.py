@@ -147,3 +147,37 @@ def test_rods_are_set_out_at_equal_arcs_across_each_family() -> None:
         chosen = seeds[[name[0] == "UVW"[k] for name in net.names]]
         apart = 2.0 * np.arccos(np.clip(np.einsum("ij,ij->i", chosen[1:], chosen[:-1]) / 4.0, -1.0, 1.0))
         np.testing.assert_allclose(apart, 0.3, rtol=1e-6)
+
+
+def test_corners_that_the_curve_across_does_not_reach_are_filled() -> None:
+    """On a plane at 30 degrees: lines at all multiples of the spacing, up to those of three spacings in a corner."""
+    half, spacing, angle = np.array([3.0, 2.0]), 0.4, np.radians(30.0)
+    plane = rs.HeightField(function=lambda x, y: 1.0 + 0.0 * x, domain=rs.Rectangle((6.0, 4.0)))
+    net = surface_net(plane, Geodesic(spacing=spacing, rotate=angle), anchor=(0.0, 0.0))
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    offsets = []
+    for k in np.flatnonzero(np.array(net.families) == "u"):
+        _, points, _ = along(net.curves, int(k))
+        assert np.ptp(points[:, :2] @ across) < 1e-9
+        offsets.append(points[0, :2] @ across)
+    corner = np.abs(across) @ half
+    most = corner - 3.0 * spacing / (
+        np.tan(angle) + 1.0 / np.tan(angle)
+    )  # a line is as long, over its way to the corner
+    count = int(most / spacing)
+    assert count > 2.0 / np.cos(angle) // spacing  # further than the curve across through the anchor
+    np.testing.assert_allclose(np.sort(offsets), spacing * np.arange(-count, count + 1), atol=1e-9)
+
+
+def test_rods_of_one_family_that_cross_are_said_until_they_are_left_out() -> None:
+    hill = rs.HeightField(formula="2.5*exp(-(x^2 + y^2)/4)", domain=rs.Rectangle((6.0, 6.0)))
+    net = surface_net(hill, Geodesic(spacing=0.8), anchor=(0.0, 0.0))
+    (said,) = net.warnings
+    assert "rods of one family cross each other without a joint" in said
+    assert {*net.families} == {"u", "v"}
+    of = np.array(net.families)[net.crossings.rods]
+    assert (of[:, 0] != of[:, 1]).all()
+    kept = ("U01", "U08", "V01", "V08")  # at the rim, where the hill is flat
+    left_out = [name for name in net.names if name not in kept]
+    assert not surface_net(hill, Geodesic(spacing=0.8, left_out=left_out), anchor=(0.0, 0.0)).warnings
+    assert not surface_net(rs.Cap(radius=2.0, base=1.0), Geodesic(spacing=0.3)).warnings

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rodshell.errors import InputError, OutputError, OutputWarning
-from rodshell.output.files import KINDS, NAMES, Content, export, save
+from rodshell.output.files import KINDS, NAMES, export, save
 from rodshell.progress import TimeLimit, silent
 from rodshell.results import Archive, folder, read
 from rodshell.results.archive import ARCHIVE
@@ -164,11 +164,11 @@ def test_every_name_of_every_kind_is_known_before_the_work(monkeypatch: pytest.M
     )
     for what in (*costly, "dxf.drawing_dxf", "svg.drawing_svg"):
         monkeypatch.setattr(f"rodshell.output.{what}", lambda *_: (b"", b""))
-    content = Content(wished())
+    archive = wished()
     for kind, make in KINDS.items():
         if kind == "3dm":
             pytest.importorskip("rhino3dm")
-        for name, _ in make(content):
+        for name, _ in make(archive):
             assert any(Path(name).match(pattern) for pattern in NAMES[kind]), name
 
 

@@ -16,7 +16,8 @@ from rodshell.figures.form import Section, Stiffness
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.files import export
 from rodshell.output.grid import joints_of, rods_of
-from rodshell.output.models import section_outline, swept, widths_along
+from rodshell.output.models import swept
+from rodshell.output.sections import section_outline, widths_along
 from tests.output.forms import archive, wished
 
 RADIUS = 1e-3  # m, of the rods
@@ -202,9 +203,8 @@ def test_a_lath_lies_flat_on_the_shell() -> None:
 )
 def test_a_tapered_rod_is_drawn_as_stiff_as_it_is(section: Section, varies: Any) -> None:
     """The second moment of the drawn section, of its polygon, follows the stiffness, linear between stations."""
-    flat = np.column_stack([np.linspace(0, 2, 5), np.zeros(5), np.zeros(5)])
     along = Stiffness(at=[0.0, 1.0, 2.0], factors=[1.0, 8.0, 0.5], varies=varies, sizes=[])
-    widths = widths_along(along, flat)
+    widths = widths_along(along, np.linspace(0, 2, 5))
     outline = section_outline(section, 1.0)
     drawn = [second_moment(outline * pair) / second_moment(outline) for pair in widths]
     np.testing.assert_allclose(drawn, [1.0, 4.5, 8.0, 4.25, 0.5])
@@ -212,9 +212,8 @@ def test_a_tapered_rod_is_drawn_as_stiff_as_it_is(section: Section, varies: Any)
 
 def test_double_laths_are_drawn_twice_as_thick_along_the_normal() -> None:
     """Two laths that slide on each other are twice as stiff, and twice as thick."""
-    flat = np.column_stack([np.linspace(0, 3, 4), np.zeros(4), np.zeros(4)])
     along = Stiffness(at=[0.0, 0.5, 0.5, 3.0], factors=[1.0, 1.0, 2.0, 2.0], varies="laths", sizes=[])
-    np.testing.assert_allclose(widths_along(along, flat), [[1, 1], [1, 2], [1, 2], [1, 2]])
+    np.testing.assert_allclose(widths_along(along, np.linspace(0, 3, 4)), [[1, 1], [1, 2], [1, 2], [1, 2]])
 
 
 def second_moment(polygon: np.ndarray) -> float:

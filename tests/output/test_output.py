@@ -316,7 +316,7 @@ def test_report_needs_nothing_else(which: str, request: pytest.FixtureRequest) -
 
 def test_report_gives_the_verdict_first(out: Path) -> None:
     page = (out / "report.html").read_text()
-    assert page.index('aria-label="Verdict"') < page.index("<strong>Check: ") < page.index("<h2>")
+    assert page.index('aria-label="Verdict"') < page.index("<strong>Check, unloaded: ") < page.index("<h2>")
     assert "Supports that hold the rods&#39; directions (clamped) leave" in page
     assert "Design aid, not code compliance" in page
     assert page.count("<figure>") == 8

@@ -217,8 +217,7 @@ def test_utilisation_says_by_which_strength_it_is_counted() -> None:
             shape = shape_of(archive, name)
             scale = scale_of(archive, shape, "stress")
             assert scale is not None
-            assert shape.stress is not None
-            largest = 100 * shape.stress.max() / strength
+            largest = 100 * shape.known["stress"].max() / strength
             assert scale.caption == f"utilisation in %{which}, here up to {largest:.3g}"
             assert scale.values.max() == pytest.approx(largest)
 

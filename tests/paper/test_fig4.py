@@ -85,7 +85,7 @@ def test_figure_is_written_with_its_tables(tmp_path):
             root = ElementTree.parse(tmp_path / "fig4" / name).getroot()
             assert root.tag.endswith("svg")
     rows = list(csv.DictReader((tmp_path / "fig4" / "table.csv").open(encoding="utf-8")))
-    assert len(rows) == len(figure.runs) == 12
+    assert len(rows) == len(figure.parts) == 12
     follows = {(row["demonstration"], row["joint"]): row["rod 2 follows"] for row in rows}
     assert follows["(b) bending", "pin"] == "no"
     angles = list(csv.reader((tmp_path / "fig4" / "angles-a.csv").open(encoding="utf-8")))

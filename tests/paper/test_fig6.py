@@ -31,7 +31,7 @@ def figure() -> DrapeFigure:
 
 
 def by(method: str) -> DrapeRun:
-    return next(one for one in figure().drapes if one.method == method)
+    return next(one for one in figure().parts if one.method == method)
 
 
 @pytest.mark.slow

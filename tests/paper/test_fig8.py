@@ -24,7 +24,7 @@ def figure() -> fig8.Fig8:
 
 @pytest.mark.slow
 def test_every_scheme_is_timed_and_that_of_the_paper_is_counted_in_bare_solves() -> None:
-    timings = figure().timings
+    timings = figure().parts
     assert {one.method for one in timings} == {"explicit", "shared", "implicit", "ours"}
     for one in timings:
         assert one.seconds > 0
@@ -39,7 +39,7 @@ def test_every_scheme_is_timed_and_that_of_the_paper_is_counted_in_bare_solves()
 @pytest.mark.slow
 def test_six_sizes_span_the_papers_range_and_more_unknowns_take_longer() -> None:
     for method in ("explicit", "ours"):
-        sizes = sorted((one.dofs, one.seconds) for one in fig8.of_sizes(figure().timings, method))
+        sizes = sorted((one.dofs, one.seconds) for one in fig8.of_sizes(figure().parts, method))
         assert len(sizes) == len(fig8.SIZES) == 6
         assert sizes[-1][0] > 15 * sizes[0][0]
     assert figure().slopes()["explicit"]["hemisphere"] > 0.3

@@ -300,7 +300,7 @@ def test_the_table_the_picture_and_the_files_tell_the_search(tmp_path: Path) -> 
     made = genetic.make(silent, seed=SEED, generations=1, cases=[SMALL], folder=tmp_path / "kept")
     assert made.status == f"seed {SEED} on the hemisphere has not converged: 1 of at least 21 generations"
     made.save(tmp_path / "genetic")
-    found, by_direct = made.comparisons[0].searches[0], made.rows()[0]
+    found, by_direct = made.parts[0].searches[0], made.rows()[0]
     assert float(by_direct[5]) == pytest.approx(1e3 * direct(SMALL).agreement["pinned"].rms, abs=6e-4)
     assert by_direct[3] == "1"
     row = made.rows()[1]

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -147,6 +148,29 @@ def test_rods_moved_across_stay_straight_and_their_joints_stay_together() -> Non
         rods = [built.grid.rods[k] for k in built.grid.crossings.rods[:, side]]
         there = np.array([rod.point(s) for rod, s in zip(rods, built.grid.crossings.at[:, side], strict=True)])
         np.testing.assert_allclose(there, built.flat[built.joint_nodes, :2], atol=1e-14)
+
+
+def test_offsets_of_a_turned_table_of_rods_are_those_of_the_lattice_and_rods_that_cross_askew_are_refused() -> None:
+    shell = structure("pinned")
+    turn = np.array([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]])
+    change = 1e-3 * np.random.default_rng(4).uniform(-1.0, 1.0, len(shell.mesh.grid.rods))
+
+    def built(turns: list[np.ndarray]) -> np.ndarray:
+        """Flat nodes (n, 2) of a table of the same rods, the first and the second family turned."""
+        rods = [(rod, turns[rod.family == "v"]) for rod in shell.mesh.grid.rods]
+        lines = [(tuple((by @ rod.origin).tolist()), tuple((by @ rod.direction).tolist())) for rod, by in rods]
+        table = tuple(
+            rod._replace(family="free", offset=None, origin=origin, direction=direction)
+            for (rod, _), (origin, direction) in zip(rods, lines, strict=True)
+        )
+        mesh = replace(shell.mesh, grid=replace(shell.mesh.grid, rods=table))
+        variables = Offsets().on(SimpleNamespace(mesh=mesh))  # type: ignore[arg-type]  # all that it looks at
+        return variables.applied(Grid(mesh, shell.popped.boundary), change).mesh.flat[:, :2]
+
+    lattice = Offsets().on(shell).applied(Grid(shell.mesh, shell.popped.boundary), change).mesh.flat[:, :2]
+    np.testing.assert_allclose(built([turn, turn]), lattice @ turn.T, atol=1e-15)
+    with pytest.raises(rs.InputError, match="cross at right angles"):
+        built([np.eye(2), turn])
 
 
 def test_an_ellipsoid_has_its_three_symmetries_and_a_hemisphere_seven() -> None:

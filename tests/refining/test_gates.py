@@ -9,8 +9,9 @@ import pytest
 import rodshell as rs
 from rodshell.formfinding.pipeline import Stages, agreement, popped_again
 from rodshell.formfinding.trim import Footprint
-from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout import FlatGrid, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import Crossings
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.model.edge_properties import LENGTH
 from rodshell.progress import silent
 from rodshell.refining import acceptance, refine
@@ -58,8 +59,8 @@ def test_a_tapered_shell_passes_every_gate() -> None:
 def grid(shift: float = 0.0) -> GridMesh:
     """Four rods each way; a joint in the middle is drilled `shift` [m] off its place on one of its rods."""
     at = (-0.3, -0.1, 0.1, 0.3)
-    rods = [FlatRod.u(f"U{k}", y, -0.5, 0.5) for k, y in enumerate(at)]
-    rods += [FlatRod.v(f"V{k}", x, -0.5, 0.5) for k, x in enumerate(at)]
+    rods = [lattice_rod(0, f"U{k}", y, -0.5, 0.5) for k, y in enumerate(at)]
+    rods += [lattice_rod(1, f"V{k}", x, -0.5, 0.5) for k, x in enumerate(at)]
     crossed = FlatGrid.of(rods)
     places = crossed.crossings.at.copy()
     middle = int(np.flatnonzero((crossed.crossings.rods == (1, 5)).all(axis=1))[0])

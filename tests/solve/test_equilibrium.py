@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import rodshell as rs
-from rodshell.layout import FlatGrid, FlatRod
+from rodshell.layout import FlatGrid
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.model import Shell
 from rodshell.solve import equilibrium
 from rodshell.solve.equilibrium import Status, find_equilibrium, find_stable
@@ -29,7 +30,7 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def straight_rod(edges, **options):
-    mesh = rs.mesh_grid(FlatGrid.of([FlatRod.u("U01", 0.0, -0.5, 0.5)]), 1.0 / edges)
+    mesh = rs.mesh_grid(FlatGrid.of([lattice_rod(0, "U01", 0.0, -0.5, 0.5)]), 1.0 / edges)
     return Shell.of(mesh, ROD, **options)
 
 
@@ -156,11 +157,16 @@ def test_a_pulled_straight_rod_stretches_by_its_force_over_its_stiffness(force):
     np.testing.assert_allclose(found.gradient[start], [-force, 0, 0], rtol=1e-12)
 
 
+def lengths_at_nodes(mesh):
+    """Half of every edge at each node [m]."""
+    return np.bincount(mesh.edges.ravel(), np.repeat(0.5 * mesh.edge_lengths, 2))
+
+
 def test_a_rod_that_hangs_straight_down_stretches_by_half_its_weight():
     """Exact on any mesh: each edge carries what hangs below its middle."""
     shell, weight = straight_rod(9), 5.0
     load = np.zeros_like(shell.mesh.flat)
-    load[:, 0] = weight * shell.mesh.tributary_lengths()
+    load[:, 0] = weight * lengths_at_nodes(shell.mesh)
     free = in_plane(shell, X).with_directions(shell.ends[:1])
     problem = Problem(shell.elements, shell.stretch, Supports(free), 1.0, load=load)
     found = find_equilibrium(problem, shell.mesh.flat, np.zeros(9))
@@ -183,7 +189,7 @@ def hanging_chain(edges, bending):
     exact = np.column_stack([x, 0 * x, CATENARY * (np.cosh(x / CATENARY) - cosh(SPAN / (2 * CATENARY)))])
     sagging = np.column_stack([SPAN * s, 0 * s, s**2 - 0.25])
     load = np.zeros_like(sagging)
-    load[:, 2] = -shell.mesh.tributary_lengths()
+    load[:, 2] = -lengths_at_nodes(shell.mesh)
     supports = Supports(in_plane(shell).with_directions(shell.ends))
     penalty = replace(shell.stretch, stiffness=np.full(edges, 100.0))
     problem = Problem((soft,), penalty, supports, 1.0, inextensible=True, load=load)

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.layout import FlatGrid, FlatRod
+from rodshell.layout import FlatGrid
+from rodshell.layout.gridlayout import lattice_rod
 from rodshell.model import Shell
 from rodshell.solve import path as module
 from rodshell.solve.equilibrium import find_stable
@@ -46,7 +47,7 @@ def snapping():
 
 def turned_to(most, *, snap, shortest=SHORTEST):
     """The right clamp of the buckled strip turned from mu = 0 to `most`; the shell and the path."""
-    mesh = rs.mesh_grid(FlatGrid.of([FlatRod.u("U01", 0.0, -0.5, 0.5)]), 1.0 / EDGES)
+    mesh = rs.mesh_grid(FlatGrid.of([lattice_rod(0, "U01", 0.0, -0.5, 0.5)]), 1.0 / EDGES)
     shell = Shell.of(mesh, ROD, clamped=True)
     plane = shell.freedom().with_directions(np.arange(mesh.node_count), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     held = plane.with_directions(shell.ghosts).with_directions(shell.ends)

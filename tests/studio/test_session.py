@@ -308,7 +308,7 @@ def test_a_damaged_record_is_not_read_and_not_lost(how: str, tmp_path: Path, cap
         sessions, jobs = sessions_in(tmp_path), Jobs(tmp_path / "jobs", 120.0, Room(tmp_path))
         assert sessions.get(name) is None
         assert sessions.new()
-        jobs.resume()
+        jobs.run_next()
         found = jobs.get(name)
         assert found is not None
         assert found["status"] == "failed"

@@ -137,6 +137,7 @@ def test_the_example_is_valid():
         ({"objectives": {"minimise": "rms_pinned"}}, "give a list of columns"),
         ({"objectives": {"minimise": ["rms_pinned"], "maximise": ["rms_pinned"]}}, "occurs twice"),
         ({"constraints": {"min_angle_deg": 30}}, "{ min = 30 }"),
+        ({"constraints": {5: {"min": 30}}}, "keys are words"),
         ({"constraints": {"min_angle_deg": {"least": 30}}}, "unknown key"),
         ({"constraints": {"min_angle_deg": {"min": "30 deg"}}}, "number in SI"),
         ({"constraints": {"findings": ["strength"]}}, r"give { without = \["),

@@ -142,7 +142,7 @@ def test_the_designs_are_replaced_whole_or_not_at_all(tmp_path: Path):
         with pytest.raises(KeyboardInterrupt):
             store.plan(broken())  # type: ignore[arg-type]
         assert store.count() == 2
-        store.add([([3], "c")])
+        store.plan([([3], "c")], more=True)
         store.record("c", FOUND, ROW)
         assert [(design.position, design.keys) for design in store.finished()] == [(2, [3])]
 

@@ -20,7 +20,7 @@ from rodshell.case.stage_tables import (
 )
 from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
-from rodshell.fabrication.settings import Fabrication
+from rodshell.fabrication.settings import Fabrication, has_slots
 from rodshell.loads.combinations import Loads
 from rodshell.loads.settings import LockedJoints, Stability, Strength
 from rodshell.output.settings import CheckOptions, DrawingStyle
@@ -254,6 +254,7 @@ class Case:
             progress("preparing", "net for the size of the rods", 0.0)
         rod = self.rod_on(target, layout, anchor=anchor, progress=progress)
         self.require_strength(rod)
+        self.require_slots(rod, upright=layout.upright)
         return Built(target, layout, rod, method, anchor)
 
     def require_strength(self, rod: Rod) -> None:
@@ -266,6 +267,14 @@ class Case:
             options.limits(rod, self.strength)
             if self.strength.hole:
                 net_section(rod.section, self.strength.hole)
+
+    def require_slots(self, rod: Rod, *, upright: bool) -> None:
+        """InputError where slots have a clearance and there are none: of strips that do not stand `upright`."""
+        if self.fabrication.slot_clearance and not has_slots(upright, rod, self.joint):
+            raise InputError(
+                f"fabrication.slot_clearance = {shown(self.fabrication.slot_clearance)}: only strips of an asymptotic "
+                "lattice, higher than they are thick and without pins, cross by slots: leave it out"
+            )
 
     def _require_allowance(self, target: "Target") -> None:
         """InputError where rods are cut longer by more than the shell is wide: of no support."""

@@ -194,6 +194,11 @@ def read_result(folder: Path) -> ResultRods:
         raise InputError(f"the result in {folder} lacks its rods or its states: run it again") from None
     if not rods:
         raise InputError(f"the result in {folder} has no rods")
+    if bent := next((rod.id for rod in rods if len(rod.course) > 2 or rod.record.rest_curvature), ""):
+        raise InputError(
+            f"the rods in {folder} do not lie straight in the plane (the first: {bent}), as those that popup takes: "
+            f"run its case again (rodshell form {folder / 'case.toml'})"
+        )
     edge = results.layout.edge if results.layout else None
     grid = straight_rods(flat, names=[rod.id for rod in rods])
     profiles = [_profile(rod.record.stiffness, rod.length) for rod in rods]

@@ -74,9 +74,7 @@ class LayoutTable(Holding):
 class DrawnCurves(Curves):
     """Curves, of which a file may give the lines; a case that was read has them itself."""
 
-    file: Annotated[FileToRead | None, "CSV table (rod,x,y or rod,x,y,z), OBJ, DXF or 3dm file with a curve a rod"] = (
-        None
-    )
+    file: Annotated[FileToRead | None, "CSV table (rod,x,y[,z]), OBJ, DXF or 3dm file with a curve a rod"] = None
     unit: Annotated[Unit, "unit of that file, such as mm; a 3dm file states its own"] = 1.0
 
     def __post_init__(self) -> None:

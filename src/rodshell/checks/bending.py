@@ -31,7 +31,7 @@ from math import sqrt
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, State
+from rodshell.arrays import Floats, State
 from rodshell.checks.reactions import joint_loads
 from rodshell.errors import InputError
 from rodshell.figures.form import Bent
@@ -209,6 +209,8 @@ class Bending:
             no rods cross.
         twist_rate: twist per length [rad/m]; zero where nothing twists the rods.
         torsion_stress: largest shear stress of torsion over the section [Pa]; None as the stress.
+        fibre_strains: (k, 2) of the outermost fibres along m1 and m2, of bending alone [-]; None as the stress, and
+            where it is not known which way a section bends that is not round.
     """
 
     curvature: Floats
@@ -219,6 +221,7 @@ class Bending:
     geodesic_curvature: Floats | None
     twist_rate: Floats
     torsion_stress: Floats | None
+    fibre_strains: Floats | None = None
 
     __repr__ = brief
 
@@ -281,7 +284,8 @@ def _bent_by_joints(shell: Shell, state: Floats, rod: Rod) -> Floats | None:
     stiffness = np.full(len(moments), rod.bend_stiffnesses[1])
     if (local := varied_at_nodes(mesh, rod)) is not None:
         stiffness = stiffness * local.bend2
-    share = np.where(_inner(mesh), 0.5, 1.0)  # a rod that ends at a joint has all of its moment on one side
+    share = np.ones(len(moments))  # a rod that ends at a joint has all of its moment on one side
+    share[mesh.bend_entries] = 0.5
     return np.asarray(moments * (share / stiffness)[:, None])
 
 
@@ -316,7 +320,7 @@ def bending(
         edge_strains = lengths / mesh.edge_lengths - 1.0
     axial = _mean_of_edges(mesh, edge_strains)
     twist = np.zeros(len(curvature)) if twist_rate is None else twist_rate
-    stress = strain = sheared = normal = geodesic = None
+    stress = strain = sheared = normal = geodesic = fibres = None
     if components is not None:
         normal, geodesic = components.T
     elif normals is not None:
@@ -330,13 +334,17 @@ def bending(
     if fibre is not None:
         bent = fibre * sharp if bends is None else fibre_strain(rod, bends[:, 0], bends[:, 1])
         strain = bent + np.abs(axial)
+        if bends is not None and rod.section.half_widths is not None:
+            fibres = bends * np.array(rod.section.half_widths)
+        elif rod.section.round:
+            fibres = np.column_stack([bent, np.zeros(len(bent))])
     if known and strain is not None:
         sheared = torsion_stress(rod, sheared_by) if twist.any() else np.zeros(len(twist))
         if bends is None:
             stress = np.hypot(fibre_modulus(rod) * strain, shear_weight * sheared)
         else:
             stress = largest_stress(rod, bends[:, 0], bends[:, 1], axial, sheared_by, weight=shear_weight)
-    return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared)
+    return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared, fibres)
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: State) -> Floats:
@@ -358,10 +366,8 @@ def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
 
 def _mean_of_edges(mesh: GridMesh, values: Floats) -> Floats:
     """(k, ...) of each entry of `rod_nodes`: the mean of the `values` (e, ...) of its edges, which at an end is one."""
-    begins = np.ones(len(mesh.rod_nodes), dtype=bool)
-    begins[mesh.rod_stop - 1] = False  # entries that an edge begins at
-    total, count = np.zeros((len(begins), *values.shape[1:])), np.zeros(len(begins))
-    for entries in (np.flatnonzero(begins), np.flatnonzero(begins) + 1):
+    total, count = np.zeros((len(mesh.rod_nodes), *values.shape[1:])), np.zeros(len(mesh.rod_nodes))
+    for entries in (mesh.edge_entries, mesh.edge_entries + 1):
         total[entries] += values
         count[entries] += 1
     return np.asarray(total / count.reshape(-1, *[1] * (values.ndim - 1)))
@@ -371,18 +377,10 @@ def _on_entries(shell: Shell, strains: Floats) -> Floats:
     """(k, 3) strains of the bends, and of clamps if among them, over their length at each entry of `rod_nodes`."""
     mesh = shell.mesh
     result = np.zeros((len(mesh.rod_nodes), 3))
-    result[_inner(mesh)] = strains[: len(mesh.bends)] / mesh.voronoi_lengths[:, None]
+    result[mesh.bend_entries] = strains[: len(mesh.bends)] / mesh.voronoi_lengths[:, None]
     if len(strains) > len(mesh.bends):
-        ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
-        result[ends] = strains[len(mesh.bends) :] / (0.5 * last_edges(mesh)[:, None])
+        result[mesh.end_entries] = strains[len(mesh.bends) :] / (0.5 * last_edges(mesh)[:, None])
     return result
-
-
-def _inner(mesh: GridMesh) -> Bools:
-    """(k,) which entries of `rod_nodes` are not ends."""
-    inner = np.ones(len(mesh.rod_nodes), dtype=bool)
-    inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False
-    return inner
 
 
 def _turns(mesh: GridMesh, positions: Floats, clamps: Floats | None) -> tuple[Floats, Floats]:
@@ -391,7 +389,7 @@ def _turns(mesh: GridMesh, positions: Floats, clamps: Floats | None) -> tuple[Fl
     edges = unit(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]])
     tangents[:] = _mean_of_edges(mesh, edges)
     before, here, after = (positions[mesh.bends[:, k]] for k in range(3))
-    turns[_inner(mesh)] = _turn(unit(here - before), unit(after - here)) / mesh.voronoi_lengths[:, None]
+    turns[mesh.bend_entries] = _turn(unit(here - before), unit(after - here)) / mesh.voronoi_lengths[:, None]
     if clamps is not None:
         half = 0.5 * last_edges(mesh)[:, None]
         first, last = mesh.rod_start, mesh.rod_stop - 1

@@ -8,17 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from rodshell.arrays import Floats
 from rodshell.checks.bending import VON_MISES, Bending, bending, bending_of, shell_normals, worst
 from rodshell.checks.contact import contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy_grids, reached_by_turning
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
-from rodshell.checks.self_weight import self_weight
+from rodshell.checks.self_weight import self_weight, snow_carried
 from rodshell.errors import OutOfTimeError
 from rodshell.figures.checks import ClampedDeployment, Clearance, SelfWeight, Stage
 from rodshell.figures.findings import Said, said
 from rodshell.figures.records import Ends
 from rodshell.formfinding import PopUp
+from rodshell.formfinding.supports import figures_of
 from rodshell.joints.crossings import UP
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.quantities import MOST_STAGES
@@ -27,7 +29,7 @@ from rodshell.rods.supports import PINNED, SUPPORTS, finals_first
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.load_path import MOST_FACTORIZATIONS
 from rodshell.units import length_text, shown, stress_text
-from rodshell.validation import brief, choice, instance, mapping, positive, whole
+from rodshell.validation import array, brief, choice, instance, mapping, positive, whole
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
 
@@ -38,6 +40,7 @@ class ShellChecks:
 
     Args:
         self_weight, other_shapes: None where a time limit came before them, or the shell is not stable.
+        snow: [Pa]; None where it is more than is looked for, or not known.
     """
 
     bending: Bending
@@ -45,6 +48,7 @@ class ShellChecks:
     joints: JointLoads
     contact: Clearance
     self_weight: SelfWeight | None
+    snow: float | None
     other_shapes: OtherShapes | None
 
     __repr__ = brief
@@ -58,6 +62,8 @@ class Checks:
         deployment: from flat, with pinned ends, or None; `deployment_bending` the bending of its stages, the flat grid
             first.
         self_weight: by end condition, what share of its own weight the shell carries.
+        snow: by end condition, uniform snow on the plan that it carries on top of its weight [Pa]; None: more than
+            10 kPa; missing where it is not known.
         contact: by end condition; `deployment_contact` of the deployment's stages.
         other_shapes: by end condition, of shells that are stable; empty where they were not looked for.
         stopped, missing: when the time limit came, or "", and which checks were not reached.
@@ -69,6 +75,7 @@ class Checks:
     deployment: Deployment | None = None
     deployment_bending: tuple[Bending, ...] = ()
     self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
+    snow: dict[Ends, float | None] = field(default_factory=dict)
     contact: dict[Ends, Clearance] = field(default_factory=dict)
     deployment_contact: tuple[Clearance, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
@@ -162,7 +169,7 @@ class Checks:
 
 def check(
     popped: Mapping[Ends, PopUp], rod: Rod, *, stages: int = 8, shear_weight: float = VON_MISES,
-    progress: Progress = silent,
+    plan: Floats | None = None, progress: Progress = silent,
 ) -> Checks:  # fmt: skip
     """Check every shell that converged.
 
@@ -170,6 +177,7 @@ def check(
         popped: the shells of one footprint by their end condition.
         stages: of the deployment from flat of the pinned shell; 0: none.
         shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
+        plan: (n,) of the target's plan that each node takes snow from [m2]; None: it is not known how much is carried.
         progress: called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and
             what was found until then is returned.
 
@@ -185,14 +193,16 @@ def check(
     shear_weight = positive("shear_weight", shear_weight)
     require_progress(progress)
     done = {ends: _settled(shape) for ends, shape in popped.items() if shape.report.converged}
+    for shape in done.values():
+        plan = None if plan is None else array("plan", plan, np.float64, shape.shell.node_count)
     checks = Checks(
         bending={
             ends: bending_of(shape.shell, shape.state, rod, shear_weight=shear_weight) for ends, shape in done.items()
         },
-        reactions={ends: reactions(shape.shell, shape.equilibrium) for ends, shape in done.items()},
+        reactions={ends: _held(shape) for ends, shape in done.items()},
         joints={ends: joint_loads(shape.shell, shape.state) for ends, shape in done.items()},
         contact={ends: contact_of(shape.shell, shape.state, rod) for ends, shape in done.items()},
-        **_long_checks(popped, done, stages, progress),
+        **_long_checks(popped, done, stages, plan, progress),
     )
     if checks.deployment is None:
         return checks
@@ -229,19 +239,35 @@ def _settled(shape: PopUp) -> PopUp:
     return replace(shape, shell=shape.shell.with_elements(found.elements), equilibrium=found)
 
 
+def _held(shape: PopUp) -> Reactions:
+    """What the supports exert, and what they say of themselves."""
+    found = reactions(shape.shell, shape.equilibrium)
+    said_by = figures_of(shape.support, found.points - shape.boundary.points, found.forces)
+    return found.changed(figures=said_by) if said_by else found
+
+
 def _long_checks(
-    popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], stages: int, progress: Progress
+    popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], stages: int, plan: Floats | None, progress: Progress
 ) -> dict[str, Any]:
     """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
     upright = _deployable(done) if stages > 0 else None
     clamped = next((ends for ends, shape in done.items() if shape.support.holds_directions), None)
     deployment, turned, stopped = None, None, ""
-    weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
-    missing = [f"self-weight with {ends} ends" for ends in done]
+    weights, snow, others = dict[Ends, SelfWeight](), dict[Ends, float | None](), dict[Ends, OtherShapes]()
+    weighings = ["self-weight", *(["snow"] if plan is not None else [])]
+    missing = [f"{what} with {ends} ends" for ends in done for what in weighings]
     missing += [*(["the deployment from flat"] if upright else []), "other stable shapes"]
     try:
         for ends, shape in done.items():
-            weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=partial(_weighing, ends, progress))
+            following = partial(_loading, progress, "self-weight", ends, 100.0, "% of the weight")
+            weights[ends], whole = self_weight(shape.shell, shape.equilibrium, progress=following)
+            missing.pop(0)
+            if plan is None:
+                continue
+            if whole is not None:
+                snow[ends] = snow_carried(whole, plan, partial(_loading, progress, "snow", ends, 1.0, "kPa"))
+            elif weights[ends].limit not in ("not followed", "no mass"):
+                snow[ends] = 0.0
             missing.pop(0)
         if upright is not None:
             deployment = deploy_grids(
@@ -254,14 +280,15 @@ def _long_checks(
                 progress("deployment", "turning the ends into their clamps", 0.0)
                 turned = reached_by_turning(popped[upright], popped[clamped])
             missing.pop(0)
-        weighing = sum(weight.factorizations or 0 for weight in weighed.values())
+        weighing = sum(weight.factorizations or 0 for weight in weights.values())
         for ends, search in _other_shapes(popped, done, deployment, weighing, progress):
             others[ends] = search
         missing.pop(0)
     except OutOfTimeError as error:
         stopped = str(error)
     return {
-        "self_weight": weighed,
+        "self_weight": weights,
+        "snow": snow,
         "deployment": deployment and deployment.changed(clamped=ClampedDeployment(reached_from_flat=turned)),
         "other_shapes": others,
         "stopped": stopped,
@@ -301,6 +328,8 @@ def _starting(ends: Ends, progress: Progress, start: int) -> None:
     progress("other shapes", f"{ends} ends, start {start}", 0.0)
 
 
-def _weighing(ends: Ends, progress: Progress, count: int, factor: float) -> None:
+def _loading(
+    progress: Progress, stage: str, ends: Ends, times: float, unit: str, count: int, factor: float
+) -> None:  # fmt: skip
     done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
-    progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
+    progress(stage, f"{ends} ends, {times * factor:.3g} {unit}, {done}", 0.0)

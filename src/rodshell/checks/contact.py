@@ -127,7 +127,7 @@ def _by_design(mesh: GridMesh, positions: Floats, outline: _Outline) -> Crossing
     if len(grids) == 1:
         return grids[0]
     firsts = np.cumsum([0, *(len(grid.grid.rods) for grid in mesh.grids)])
-    ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
+    ends = positions[mesh.end_entries]
     together = cKDTree(ends).query_pairs(outline.near, output_type="ndarray")
     of_ends = np.repeat(mesh.grid_of_rods, 2)
     together = together[of_ends[together[:, 0]] != of_ends[together[:, 1]]]

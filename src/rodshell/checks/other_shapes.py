@@ -9,6 +9,8 @@ is a shape of the shell; that nothing is found proves nothing, so the search say
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import spsolve
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors
@@ -18,12 +20,11 @@ from rodshell.figures.records import Rows, rows
 from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.geometry.frames import parallel_transport, signed_angle, unit
 from rodshell.layout import GridMesh
-from rodshell.model import Assembly, Freedom, Shell
+from rodshell.model import Shell
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.path import SAME
 from rodshell.solve.problem import half_width
-from rodshell.solve.sparse_ldl import Multifrontal
 
 MODES = 4
 MODE_SWEEPS = 4  # enough for directions to search in: the last eigenvalue may be a quarter too high
@@ -201,20 +202,12 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     """
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]
-    springs, count = joined[mesh.edges], np.zeros(mesh.node_count, dtype=np.intp)
-    count[joined] = 1  # x, y and z alike: one unknown a node
-    count[joined[mesh.ends]] = 0
-    inner = np.flatnonzero(count)
-    free = Freedom(Freedom.free(mesh.node_count).directions, count)
-    stiffness = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3)) / mesh.edge_lengths[:, None, None]
-    assembly = Assembly.of([springs], free)
-    values = assembly.assemble([stiffness], [springs], free)
-    factors = Multifrontal(assembly.indptr, assembly.indices, mesh.flat[inner, :2]).factor(values)
-    pulls = np.diff(positions[springs], axis=1)[:, 0] / mesh.edge_lengths[:, None]
-    forces = np.zeros_like(positions)
-    np.add.at(forces, springs, np.stack([pulls, -pulls], axis=1))
+    ends, signs = joined[mesh.edges].ravel(), np.tile([-1.0, 1.0], len(mesh.edges))
+    pulled = csr_array((signs, ends, 2 * np.arange(len(mesh.edges) + 1)), shape=(len(mesh.edges), mesh.node_count))
+    inner = np.setdiff1d(joined, joined[mesh.ends])
+    stiffness = csr_array(pulled.T @ diags_array(1.0 / mesh.edge_lengths) @ pulled)[inner]
     result = positions.copy()
-    result[inner] += np.array([factors.solve(column) for column in forces[inner].T]).T
+    result[inner] -= spsolve(stiffness[:, inner].tocsc(), stiffness @ positions)
     return np.asarray(result[joined])
 
 

@@ -205,9 +205,7 @@ def cut_forces(shell: Shell, state: Floats) -> Floats:
         gradient[start] += of_rods[shell.ghosts[::2]]
     before = np.cumsum(gradient, axis=0)
     before -= np.repeat(before[start] - gradient[start], mesh.rod_stop - start, axis=0)
-    inner = np.ones(len(gradient), dtype=bool)
-    inner[mesh.rod_stop - 1] = False
-    return np.asarray(-before[inner])
+    return np.asarray(-before[mesh.edge_entries])
 
 
 def _between(shell: Shell, state: Floats, met: Ints) -> tuple[Floats, Floats]:

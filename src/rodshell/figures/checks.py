@@ -99,6 +99,9 @@ class Reactions(Record):
     largest_moment: Number = key("largest support moment", "N m")
     forces: Points = points("force at each rod end", "N")
     moments: Points = points("moment at each rod end, about its own point; 0 where it is pinned", "N m")
+    figures: dict[Text, tuple[Number, Text]] = key(
+        "value and SI unit of each figure that the support says of itself, by what it is", default_factory=dict
+    )
 
 
 class JointLoad(Record):

@@ -8,7 +8,10 @@ from rodshell.figures.records import Ends, Number, Record, Rows, Text, key, rows
 from rodshell.figures.sentences import SENTENCES
 
 CODES = {
+    "assumed_class": "strengths are those of a service class that was taken, as none was given",
+    "cables_short": "cables are shortened by so little that they have to be stressed to their forces",
     "contact": "rods touch or cross",
+    "creep_unknown": "creep is not known of these rods",
     "ends_in_the_air": "rod ends lie above the lowest: what holds them has to be designed",
     "erection_contact": "rods touch or cross on the way that was computed",
     "erection_strength": "rods use more than their strength on the way that was computed",
@@ -22,9 +25,10 @@ CODES = {
     "lies_flat": "the rods can be laid out flat, although they follow curves of the target",
     "linear_buckling": "linear buckling is below the loads, which the shell carries in another shape",
     "lost": "the deployment could not be followed all the way",
+    "low_stiffness": "with the modulus that a code asks for, the shell falls under a combination of loads",
     "needs_bracing": "without its bracing the shell does not carry its own weight",
     "no_imperfections": "imperfections were not looked at",
-    "no_loads": "loads other than the own weight were not checked",
+    "no_loads": "loads other than the own weight and even snow were not checked",
     "no_mass": "no mass was given",
     "no_room": "rods pass each other so near that there is hardly any room for joints",
     "no_shear_strength": "torsion counts, and the shear strength of timber or a fibre composite was not given",
@@ -33,14 +37,18 @@ CODES = {
     "not_checked": "something was not checked",
     "not_computed": "a computation did not converge or is not complete",
     "not_followed": "the shell could be followed only up to a part of the loads",
+    "not_nested": "rods are cut from boards, curved at rest, and are in no plan of cutting bars",
     "not_refined": "the form was not refined, or not to the end",
     "not_sold": "the chosen section is thinner than any that is sold",
     "not_spliced": "rods cannot be spliced from the stock",
     "off_target": "the shell deviates from the target",
     "other_shape": "another stable shape is near",
+    "relaxed": "strengths count on stress that relaxes",
     "reserve": "the shell carries its own weight, but not with the reserve that is asked for",
     "sinks": "under its own weight the shell takes another shape",
     "slip": "a joint transfers more than the force at which it slips",
+    "slots": "little of a strip remains next to one of its slots",
+    "slots_weaken": "strips are weaker at their slots than they were judged",
     "snaps": "the shell snaps forward by itself during the deployment",
     "stands": "the shell carries its own weight with the reserve that is asked for",
     "stands_under_loads": "the shell carries a combination of loads",
@@ -58,7 +66,10 @@ CODES = {
 
 Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
-GOOD = frozenset({"in_place", "lies_flat", "stands", "stands_under_loads", "no_loads", "no_imperfections"})
+GOOD = frozenset({
+    "assumed_class", "cables_short", "creep_unknown", "in_place", "lies_flat", "no_imperfections", "no_loads",
+    "not_nested", "relaxed", "stands", "stands_under_loads",
+})  # fmt: skip
 FAULTS = frozenset({
     "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",
     "too_thick", "unstable",

@@ -1,5 +1,6 @@
 """What was asked for, and the form that was found."""
 
+from itertools import pairwise
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -243,6 +244,7 @@ class RodJoint(Record):
 
     other: Text = required("id of the rod that is met", alias="with")
     at: Real = Field(description="distance from the rod's start, its end allowance not counted [m]")
+    slot: Number = key("width of the rod's slot there; from above where the other rod's layer is the higher one", "m")
 
 
 class Bent(Record):
@@ -280,12 +282,33 @@ class Stiffness(Record):
         return self
 
 
+class RestCurvature(Record):
+    """How a rod is curved where it is free of stress and lies flat; linear between stations."""
+
+    at: Rows[Real] = rows("stations, ascending from the start to the end", "m")
+    curvatures: Rows[Real] = rows("curvature at each station, positive to the left seen from above", "1/m")
+
+    @model_validator(mode="after")
+    def _as_many(self) -> Self:
+        if not len(self.at) == len(self.curvatures) >= _FEWEST_STATIONS:
+            raise ValueError(
+                f"{len(self.at)} stations and {len(self.curvatures)} curvatures: there must be as many of each, two or "
+                "more"
+            )
+        if any(after <= before for before, after in pairwise(self.at)):
+            raise ValueError("the stations must ascend from the start of the rod to its end")
+        return self
+
+
 class RodLine(Record):
     """A rod's flat geometry, its joints, and how it is cut."""
 
     id: Text = Field(description="name of the rod")
-    family: Text = Field(description='"u" runs along x at y = offset, "v" along y at x = offset, "free": from a table')
-    offset: Number = key("place of the rod's line across its family", "m")
+    family: Text = Field(
+        description='rods that do not cross each other: "u" along x at y = offset, "v" along y at x = offset; without '
+        'an offset "u", "v", "w" along curves of the target; "free": of a table or along lines that are given'
+    )
+    offset: Number = key("place of the rod's line across its family; null: it is on no line of a straight lattice", "m")
     start: Real = Field(description="material coordinate of the start, from the layout's middle [m]")
     end: Real = Field(description="material coordinate of the end [m]")
     length: Number = key("length between the supports", "m")
@@ -295,6 +318,7 @@ class RodLine(Record):
     layer: Whole | None = key("layer in which it is laid, 1 the lowest")
     splices: Rows[Real] = rows("splices, from the start", "m")
     stiffness: Stiffness | None = key("where its section changes along it: its bending stiffness")
+    rest_curvature: RestCurvature | None = key("of a rod that is curved at rest: the curvature that it is cut with")
 
 
 class Rod(Bent, RodLine):

@@ -47,11 +47,28 @@ class DesignStrength(Record):
     short: Number = key("under loads of days", "Pa")
     instantaneous: Number = key("under gusts", "Pa")
     erection: Number = key("during the deployment", "Pa")
-    axial: Number = key("axial strength over bending strength")
+    code: Text | None = key("building code by which all is judged; null: by none")
+    service_class: Whole | None = key("that was asked for; null: none was, or nothing depends on it")
+    relaxed: Number = key("share of the unloaded shell's stress that is gone after months; null: not given, none is")
+    axial: Number = key("strength along the rod over bending strength, in tension by a code")
+    compression: Number = key("the same in compression, by a code")
+    depth: Numbers = numbers("k_h by the depth along both axes of the section; empty: not a rectangle by a code")
+    biaxial: Number = key("k_m, share of the smaller of two bends that counts")
+    stiffness: Number = key("Young's modulus for stability over its mean; null: the mean itself is taken")
     shear: Number = key("shear strength over bending strength")
+    hole: Number = key("diameter of the holes at joints, by which the net section is judged; absent: none", "m")
     creep: Number = key("by how much deflections under permanent loads grow, over what they are at first")
     erection_utilisation: Number = key("largest stress of the deployment over that strength")
     source: Text | None = key("where they are from")
+
+    @property
+    def staying(self) -> float | None:
+        """By which rods are judged that stay bent [Pa]: all of their stress for a short time, and what does not relax
+        permanently; None: not known."""
+        if not self.relaxed or self.permanent is None:
+            return self.permanent
+        left = self.permanent / max(1.0 - self.relaxed, 1e-9)
+        return left if self.short is None else min(left, self.short)
 
 
 class LoadedShell(Record):
@@ -80,6 +97,7 @@ class LoadedShell(Record):
     bracing: Rows[Number] = rows(
         "axial force of each brace in the order of fabrication.bracing, tension positive, 0: slack; null: left out", "N"
     )
+    bracing_unloaded: Rows[Number] = rows("the same before these loads: what a cable is to be stressed to", "N")
     bracing_utilisation: Number = key("utilisation of laths of a third layer or of cables; null: none, or not known")
     joint_moments: Numbers = numbers(
         "moment of each locked joint about its normal, in the order of joint_loads; empty: none is locked", "N m"

@@ -7,7 +7,16 @@ LOADS = "with {ends} ends {what} under {place}{at}{where}"
 UNLOADED = "with {ends} ends {what}{where}"
 
 SENTENCES = {
-    "contact": "{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section) or a larger spacing",
+    "assumed_class": (
+        "strengths and creep are those of service class 2 (covered), which was taken as none was given: give "
+        "strength.service_class (1 inside, 3 in the weather)"
+    ),
+    "cables_short": (
+        "cables are shortened by only {short}: one that is {scatter} too long {slack}, one {scatter} too short has up "
+        "to {times} times its force; stress them to their forces (bracing.csv), not to their lengths"
+    ),
+    "contact": "{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section), or set them further apart",
+    "creep_unknown": "creep of these rods is not known, and the factors on permanent loads are those at first",
     "ends_in_the_air": (
         "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
         "beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has to be designed"
@@ -29,11 +38,11 @@ SENTENCES = {
     "imperfect: unloaded": "with {ends} ends and imperfections the shell is unstable before the loads of {place} act",
     "in_place": (
         "the rods cannot be laid out flat: there they would bend within the plane by up to {bent}, and withstand "
-        "{withstood} during erection; bring rod by rod to its place over a scaffold, by the holes of its strip"
+        "{withstood} during erection; bring rod by rod to its place over a scaffold, by the joints on its strip"
     ),
     "in_place: unstable": (
-        "the rods cannot be laid out flat, since no stable state in the plane was found; bring rod by rod to its place "
-        "over a scaffold, by the holes of its strip"
+        "no stable state of the rods in the plane was found, in which they could be laid out flat; bring rod by rod to "
+        "its place over a scaffold, by the joints on its strip"
     ),
     "lies_flat": (
         "the rods can be laid out flat: there they bend within the plane by up to {bent}, and withstand {withstood} "
@@ -43,6 +52,7 @@ SENTENCES = {
         "under {place} with {ends} ends linear buckling is at {factor} times these loads: the shell carries them only "
         "in another shape, its nodes having moved by {moved}"
     ),
+    "low_stiffness": ("under {place} with {ends} ends the shell falls at {factor} times these loads with {share}"),
     "lost": (
         "the deployment could not be followed all the way: {how}; stages are missing, and whether the shell reaches "
         "its final shape from flat is not known"
@@ -53,8 +63,8 @@ SENTENCES = {
         "looked at ({offer})"
     ),
     "no_loads": (
-        "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
-        "people) and imperfections were not checked{creep}"
+        "stresses and support forces are those of the unloaded shell{snow}; other loads (wind, drifts, people) and "
+        "imperfections were not checked{creep}"
     ),
     "no_mass": (
         "no mass was given, so that it is not known what share of its own weight the shell carries: give "
@@ -62,7 +72,7 @@ SENTENCES = {
     ),
     "no_room": (
         "{who} pass each other with {room} between them {where}: that leaves hardly any room for joints; use thinner "
-        "rods (rod.section) or a larger spacing"
+        "rods (rod.section), or set them further apart"
     ),
     "no_shear_strength": (
         "torsion shears the rods by up to {stress}, counted by von Mises as in isotropic materials; timber and fibre "
@@ -116,6 +126,10 @@ SENTENCES = {
         "with {ends} ends the shell{bracing} carries {times} its own weight; above, it could not be followed, and "
         "nothing is known"
     ),
+    "not_nested": (
+        "rods that are curved at rest are cut from boards, whose sizes are in the schedule of rods: no plan of cutting "
+        "them from bars was made"
+    ),
     "not_refined": "the form is not refined: {why}",
     "not_refined: late": "{when}: the refinement was stopped at what it had found",
     "not_sold": "the chosen section is {thin}: have it made, or choose another material or a larger target",
@@ -128,6 +142,10 @@ SENTENCES = {
         "with {ends} ends the shell has another stable shape, {distance} of its size away at {energy} times the "
         "energy: check on site that it takes the intended one"
     ),
+    "relaxed": (
+        "permanent strength counts on {share} of the unloaded shell's stress to be gone after months, as given "
+        "(strength.relaxed), which wood and moisture decide"
+    ),
     "reserve": "the shell{bracing} carries only {weights}, and {asked}{others}{advice}",
     "sinks": (
         "with {ends} ends the shell moves by {depth} ({share} of its size) under its own weight{further}, so that it "
@@ -135,12 +153,21 @@ SENTENCES = {
     ),
     "slip": LOADS,
     "slip: unloaded": UNLOADED,
+    "slots": (
+        "where strips meet at {angle}, slots are {width} wide, and on {place} only {left} remain next to one, less "
+        "than its depth of {depth}: use thinner or lower strips (rod.section), or set them further apart"
+    ),
+    "slots_weaken": (
+        "at their slots strips keep half of their height: stresses there are twice as large as shown, and four times "
+        "those of bends within the surface, which was not judged; compare them with the strength, or bolt the strips "
+        'side by side (joint.kind "pin")'
+    ),
     "snaps": "{where} of the deployment from flat the shell snaps forward by itself, by up to {by}{continues}{other}",
     "stands": (
         "with {all} ends the shell{bracing} is stable and carries {weight} times its own weight, {asked} being asked "
         "for{near}"
     ),
-    "stands_under_loads": "under {place} it is stable up to {factor} times these loads",
+    "stands_under_loads": "under {place} it is stable up to {factor} times these loads{stiffness}",
     "strength": "{shape} the rods use {share} of {whose}{where}",
     "strength: given": "{shape} the rods would break: {share} of their strength{where}",
     "strength: unloaded": UNLOADED,

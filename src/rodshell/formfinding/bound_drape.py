@@ -22,6 +22,7 @@ from rodshell.geometry.frames import dot, unit
 from rodshell.joints import Joint
 from rodshell.kernels import njit
 from rodshell.layout import GridLayout, GridMesh, mesh_grid
+from rodshell.layout.flatgrid import sides
 from rodshell.layout.mesh import spans_along
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.apron import with_apron
@@ -193,7 +194,7 @@ def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentric
 
     The difference in length between the layers' chords depends on the target's curvature along them.
     """
-    above = 0.5 * eccentricity * np.array([1.0 if rod.family == "v" else -1.0 for rod in mesh.grid.rods])
+    above = 0.5 * eccentricity * sides(mesh.grid)
     normal, (a, b) = target.on_surface(positions).normal, mesh.edges.T
     chord = positions[b] - positions[a]
     in_layer = chord + above[mesh.edge_rods, None] * (normal[b] - normal[a])

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.layout import FlatRod, GridLayout
-from rodshell.layout.flatgrid import Family
+from rodshell.layout.gridlayout import FAMILIES
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.net_ends import inside_nodes
 from rodshell.nets.net_refinement import interpolated
@@ -24,7 +24,6 @@ from rodshell.targets import Target
 Point = tuple[float, float]
 OnSeam = Callable[[Floats], Bools]  # whether points (k, 3) of the end lie on a seam whose rods are given
 
-FAMILIES: tuple[Family, Family] = ("u", "v")
 ROUNDS = 4  # of corrections; three are enough
 SETTLED = 1e-7  # of the size: largest move of a rod in the last round
 SAME = 0.03  # spacings between the offsets of two points: a single rod may join them, and misses both by half
@@ -231,8 +230,11 @@ def _corrected(net: ChebyshevNet, lines: list[_Line], points: Floats) -> tuple[l
     """Move the lines such that they end at the points; return the rod ends before that, and the largest move [m]."""
     matched, most = list[MatchedEnd](), 0.0
     for line in lines:
-        family = FAMILIES[line.family]
-        rods = [rod for rod in net.rods if rod.family == family and abs(rod.offset - line.offset) < 1e-12]
+        rods = [
+            rod
+            for rod in net.rods
+            if rod.family == FAMILIES[line.family] and rod.offset is not None and abs(rod.offset - line.offset) < 1e-12
+        ]
         ends, stations = rod_ends(net, rods), [s for rod in rods for s in (rod.start, rod.end)]
         steps = list[float]()
         for k in line.points if rods else ():

@@ -16,7 +16,6 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.kernels import njit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.section import GivenSection, Rod
@@ -38,6 +37,16 @@ def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     """
     before, after = np.moveaxis(positions[mesh.rod_nodes[mesh.beside_crossings]], 2, 0)
     return np.asarray(after - before)
+
+
+def joint_angles(mesh: GridMesh, positions: Floats) -> Floats:
+    """(c,) angles between both rods at each joint, 0 to pi/2 [rad].
+
+    Args:
+        positions: (n, 3) of the mesh's nodes [m].
+    """
+    first, second = joint_tangents(mesh, positions).transpose(1, 0, 2)
+    return np.asarray(np.arctan2(np.linalg.norm(cross(first, second), axis=1), np.abs(dot(first, second))))
 
 
 def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
@@ -116,8 +125,9 @@ def thickness_warnings(
         touching: (n,) which of them lie on the target itself, not on its continuation.
         spacing: of the rods [m].
     """
-    thick = rod_thickness(rod)
-    bent = thick * _curvatures(normal, positions, mesh.edges, touching)
+    thick, (a, b) = rod_thickness(rod), mesh.edges.T
+    turn, chord = normal[b] - normal[a], positions[b] - positions[a]
+    bent = thick * (touching[a] & touching[b]) * dot(turn, chord) / dot(chord, chord)
     if not (np.abs(bent).max(initial=0.0) > THICK or thick > CLOSE * spacing):
         return ()
     change = 0.5 * np.bincount(mesh.edge_rods, weights=bent * mesh.edge_lengths)
@@ -128,20 +138,6 @@ def thickness_warnings(
         f"and longer in the other, and joint distances up to {share:.2g} %; give the distance of their centre lines "
         "(joint.eccentricity), unless they are notched at the joints",
     )
-
-
-@njit("f2 f2 i2 b1")
-def _curvatures(normal, positions, edges, touching):  # type: ignore[no-untyped-def]
-    """(e,) the surface's curvature along each edge, by the normals at its ends [1/m]; 0 if one does not touch it."""
-    result = np.zeros(len(edges))
-    for e in range(len(edges)):
-        a, b, turn, square = edges[e, 0], edges[e, 1], 0.0, 0.0
-        if touching[a] and touching[b]:
-            for k in range(3):
-                chord = positions[b, k] - positions[a, k]
-                turn, square = turn + (normal[b, k] - normal[a, k]) * chord, square + chord * chord
-            result[e] = turn / square
-    return result
 
 
 def rise(points: Floats) -> float:

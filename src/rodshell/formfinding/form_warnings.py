@@ -4,6 +4,7 @@ from math import degrees, pi, sqrt
 
 import numpy as np
 
+from rodshell.arrays import largest_at
 from rodshell.formfinding.finite_sections import flat_warnings, section_rotation
 from rodshell.formfinding.methods import Bound, Draped
 from rodshell.formfinding.popup import PopUp
@@ -43,7 +44,7 @@ def _off_the_end(trimmed: Trimmed) -> tuple[str, ...]:
     if draped.eccentricity or not isinstance(draped.method, Bound):
         return ()
     off = np.abs(draped.target.margin(points))
-    allowed, worst = min(ON_THE_END * draped.target.size, MOST_OFF), int(np.argmax(off > (1 - 1e-6) * off.max()))
+    allowed, worst = min(ON_THE_END * draped.target.size, MOST_OFF), largest_at(off)
     if off[worst] <= allowed:
         return ()
     edge = length_text(0.9 * draped.layout.longest_edge * sqrt(allowed / off[worst]))  # the error is of second order
@@ -63,8 +64,9 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     np.minimum.at(first, grid.crossings.rods, grid.crossings.at)
     np.maximum.at(last, grid.crossings.rods, grid.crossings.at)
     tails = np.maximum(first - ends[:, 0], ends[:, 1] - last)
-    spacing = trimmed.draped.layout.most_spacing
-    long, worst = int(np.count_nonzero(tails > LONG_TAIL * spacing)), int(np.argmax(tails))
+    layout = trimmed.draped.layout
+    spacing = layout.most_spacing
+    long, worst = int(np.count_nonzero(tails > LONG_TAIL * spacing)), largest_at(tails)
     if not long:
         return ()
     left = len(grid.meetings()) - len(grid.crossings)
@@ -72,8 +74,8 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     near = f"no joint is made within {NEAREST_JOINT:g} spacings of a rod's end, here at {left} crossings"
     why = f": {near}" if left else ""
     return (
-        f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; another offset or "
-        "anchor of the layout may help, or leave such rods out",
+        f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; "
+        f"{layout.elsewhere} may help, or leave such rods out (layout.left_out)",
     )
 
 

@@ -234,7 +234,7 @@ def initial_grid(target: Target, layout: GridLayout, anchor: tuple[float, float]
     rods = [rod for rod in net.rods if not rod.virtual]
     if layout.length != "auto":
         half = layout.length / 2
-        return FlatGrid.of([rod.cut(*(layout.middle(rod.family) + end for end in (-half, half))) for rod in rods])
+        return FlatGrid.of([rod.cut(*(layout.middle(rod) + end for end in (-half, half))) for rod in rods])
     overhang = OVERHANG * max(layout.spacing)
     return FlatGrid.of([rod.cut(rod.start - overhang, rod.end + overhang) for rod in rods])
 
@@ -255,16 +255,16 @@ def placed_over(mesh: GridMesh, layout: GridLayout, top: Floats) -> Floats:
 
 
 def lost_contact(mesh: GridMesh, state: Floats, layout: GridLayout, top: Floats, target: Target) -> bool:
-    """Whether the grid slid from its place on the target: the rod nearest the heading's axis left its vertical plane.
+    """Whether the grid slid from its place on the target: the rod nearest the middle left its vertical plane.
 
     Args:
         state: (n, 3) of the mesh's nodes [m].
         top: (3,) the point under the layout's middle [m].
     """
-    rods = [k for k, rod in enumerate(mesh.grid.rods) if rod.family == "u"]
-    axis = min(rods, key=lambda k: abs(mesh.grid.rods[k].offset))
-    across = np.array([-np.sin(layout.rotate), np.cos(layout.rotate), 0.0])
-    x = state[mesh.nodes_of(axis)]
+    offsets = [float(np.dot(rod.across, rod.origin)) for rod in mesh.grid.rods]
+    axis = int(np.argmin(np.abs(offsets)))
+    c, s = np.cos(layout.rotate), np.sin(layout.rotate)
+    (dx, dy), x = mesh.grid.rods[axis].across, state[mesh.nodes_of(axis)]
     inside = target.margin(x) > 0
-    sideways = (x - top) @ across - mesh.grid.rods[axis].offset
+    sideways = (x - top) @ np.array([c * dx - s * dy, s * dx + c * dy, 0.0]) - offsets[axis]
     return bool(np.abs(sideways[inside]).max(initial=0.0) > SLIPPED * target.size)

@@ -30,7 +30,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import SolveReport, Status, find_stable
 from rodshell.solve.problem import Problem, Supports
 from rodshell.targets import Target
-from rodshell.units import shown
+from rodshell.units import length_text, shown
 
 MOST_ITERATIONS = 24  # of the flat state: a grid that lies flat takes less than ten, another may take hundreds
 PENALTY = 8e4  # stiffness of the edges against that of bending over the size, as of a bound drape
@@ -81,8 +81,37 @@ def lay(
     return Draped(
         method=Bound(), target=target, layout=lattice, rod=rod, anchor=anchor, eccentricity=0.0, mesh=mesh,
         positions=positions, rods=_built(mesh.grid.rods, lattice), levels=(report,), figures=figures, flat_state=flat,
-        warnings=(*target.warnings, *net.warnings),
+        warnings=(*target.warnings, *net.warnings, *_near_joints(mesh.grid, rod)),
     )  # fmt: skip
+
+
+def _middle_joint(mesh: GridMesh, positions: Floats) -> tuple[int, ...]:
+    """The joint nearest to the middle, and the node next to it on either rod."""
+    joint = int(np.argmin(np.linalg.norm(positions[mesh.joint_nodes] - positions.mean(axis=0), axis=1)))
+    rows = [mesh.nodes_of(rod) for rod in mesh.grid.crossings.rods[joint]]
+    at = [row.tolist().index(mesh.joint_nodes[joint]) for row in rows]
+    return mesh.joint_nodes[joint], *(
+        int(row[k + 1 if k + 1 < len(row) else k - 1]) for row, k in zip(rows, at, strict=True)
+    )
+
+
+def _near_joints(grid: FlatGrid, rod: Rod) -> tuple[str, ...]:
+    """A warning where joints of a rod are so near to each other that its laths lie on one another and holes meet."""
+    rods, at = grid.crossings.rods.ravel(), grid.crossings.at.ravel()
+    order = np.lexsort((at, rods))
+    rods, at = rods[order], at[order]
+    apart = np.where(rods[1:] == rods[:-1], np.diff(at), np.inf)
+    breadth = rod_breadth(rod)
+    near = int(np.count_nonzero(apart < breadth))
+    if not near:
+        return ()
+    k = int(np.argmin(apart))
+    line, place = grid.rods[rods[k]], length_text(at[k] - grid.rods[rods[k]].start)
+    return (
+        f"{near} pairs of neighbouring joints on a rod are nearer than its breadth of {length_text(breadth)}, down to "
+        f"{length_text(apart[k])} on {line.name}, {place} from its start, where their holes have no room: use another "
+        "spacing, anchor or heading, leave a rod out (layout.left_out), or use narrower laths",
+    )
 
 
 def _built(rods: tuple[FlatRod, ...], lattice: SurfaceLattice) -> tuple[FlatRod, ...]:
@@ -104,7 +133,7 @@ def _meshed(net: SurfaceNet) -> tuple[GridMesh, Floats]:
     of, ends = curves.pieces
     lines, rods = list[FlatRod](), list[FlatRod]()
     for k, (name, (start, stop)) in enumerate(zip(net.names, reach.tolist(), strict=True)):
-        line = FlatRod(name, "free", 0.0, start, stop, (0.0, lattice.least_spacing * k), (1.0, 0.0))
+        line = FlatRod(name, net.families[k], None, start, stop, (0.0, lattice.least_spacing * k), (1.0, 0.0))
         lines.append(line._replace(curve=_at_rest(net, k)))
         pieces = ends[of == k].tolist()
         named = zip(piece_names(name, len(pieces)), pieces, strict=True)
@@ -146,12 +175,15 @@ def flat_state(mesh: GridMesh, positions: Floats, rod: Rod, *, progress: Progres
     chords = np.linalg.norm(np.diff(start[mesh.edges], axis=1)[:, 0], axis=1)
     start *= mesh.edge_lengths.sum() / chords.sum()
     size, plane = float(np.abs(start - start.mean(axis=0)).max()), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    first, second = mesh.edges[np.argmin(np.linalg.norm(start[mesh.edges].mean(axis=1) - start.mean(axis=0), axis=1))]
-    along = unit(start[second] - start[first])
+    middle, *next_to = _middle_joint(mesh, start)
+    if all(line.curve is None for line in mesh.grid.rods):
+        del next_to[1]  # straight rods decide the angle
     shell = Shell.of(replace(mesh, flat=start), rod, isotropic=False, twist=True)
     free = Freedom.free(len(shell.like)).with_directions(np.arange(len(shell.like)))  # frames stay upright
     free = free.with_directions(np.arange(mesh.node_count), *plane)
-    free = free.with_directions(np.array([first])).with_directions(np.array([second]), tuple(along.tolist()))
+    free = free.with_directions(np.array([middle]))
+    for node in next_to:
+        free = free.with_directions(np.array([node]), tuple(unit(start[node] - start[middle]).tolist()))
     weight = PENALTY * (size / float(mesh.edge_lengths.mean())) ** 2 / size**2
     frames = shell.frames
     assert frames is not None

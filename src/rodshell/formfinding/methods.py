@@ -14,8 +14,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats
 from rodshell.contact.modified_mass import Stopped
 from rodshell.errors import InputError
-from rodshell.formfinding.finite_sections import StrongBending, joint_tangents
-from rodshell.geometry.frames import cross, dot
+from rodshell.formfinding.finite_sections import StrongBending, joint_angles
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import FlatRod, GridMesh, Layout
 from rodshell.layout.lattices import EDGES_A_SPAN
@@ -236,11 +235,7 @@ def smallest_joint_angle(mesh: GridMesh, positions: Floats, inside: Bools) -> tu
         positions: (n, 3) of the mesh's nodes [m].
         inside: (n,) nodes whose joints are considered.
     """
-    tangents = joint_tangents(mesh, positions)
-    angle = np.arctan2(
-        np.linalg.norm(cross(tangents[:, 0], tangents[:, 1]), axis=1), np.abs(dot(tangents[:, 0], tangents[:, 1]))
-    )
-    angle = np.where(inside[mesh.joint_nodes], angle, np.inf)
+    angle = np.where(inside[mesh.joint_nodes], joint_angles(mesh, positions), np.inf)
     k = int(np.argmin(angle))
     x, y, z = positions[mesh.joint_nodes[k]].tolist()
     return float(angle[k]), (x, y, z)

@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, largest_at
 from rodshell.errors import InputError
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.finite_sections import flat_warnings
@@ -27,8 +27,8 @@ from rodshell.formfinding.trim import (
     trim,
     untrimmed,
 )
+from rodshell.geometry.curves import on_curve
 from rodshell.joints import Ball, Joint, require_joint
-from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, GridMesh, Layout, mesh_grid
 from rodshell.layout.flatgrid import TOGETHER
 from rodshell.layout.lattices import EDGES_A_SPAN
@@ -93,35 +93,18 @@ def agreement(popped: PopUp, target: Target) -> Agreement:
     nodes, mesh = popped.positions, popped.footprint.mesh
     points = np.concatenate([nodes, edge_middles(mesh, nodes)])
     gaps = target.distance(points) - np.concatenate([mesh.heights, mesh.heights[mesh.edges[:, 0]]])
-    k = int(np.abs(gaps).argmax())
+    k = largest_at(np.abs(gaps))
     x, y, z = points[k].tolist()
     return Agreement(gaps[: len(nodes)], abs(float(gaps[k])), sqrt((gaps * gaps).mean()), (x, y, z), target.size)
 
 
 def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     """(e, 3) points of the rods halfway along each edge, on the cubic through the nearest nodes of the rod."""
-    return np.asarray(_edge_middles(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
-
-
-@njit("f2 i1 i1 i1 f1")
-def _edge_middles(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
-    result, edge = np.zeros((len(rod_nodes) - len(rod_start), 3)), 0
-    for rod in range(len(rod_start)):
-        start, stop = rod_start[rod], rod_stop[rod]
-        count = min(stop - start, 4)
-        for entry in range(start, stop - 1):
-            middle = 0.5 * (stations[entry] + stations[entry + 1])
-            first = min(max(entry + 1 - count // 2, start), stop - count)
-            for j in range(first, first + count):
-                above, below = 1.0, 1.0
-                for k in range(first, first + count):
-                    if j != k:
-                        above, below = above * (middle - stations[k]), below * (stations[j] - stations[k])
-                weight = above / below
-                for axis in range(3):
-                    result[edge, axis] += weight * positions[rod_nodes[j], axis]
-            edge += 1
-    return result
+    middles = list[Floats]()
+    for k in range(len(mesh.rod_start)):
+        s = mesh.stations[mesh.rod_slice(k)]
+        middles.append(on_curve(s, positions[mesh.nodes_of(k)], 0.5 * (s[:-1] + s[1:])))
+    return np.concatenate(middles)
 
 
 @dataclass(frozen=True)
@@ -231,7 +214,7 @@ class Stages:
         if self.lying is not None and self.draped.report.reason:
             return self.draped.report.reason
         if self.lying is not None and not self.draped.converged:
-            sentence = self.draped.report.status.sentence
+            sentence = self.draped.report.status.sentence_on(self.layout)
             weighed = not isinstance(self.draped.method, Bound) and "bound" not in sentence
             other = ', or use method = "bound", which needs no weight' if weighed else ""
             return f"drape {sentence}{other}"
@@ -243,7 +226,7 @@ class Stages:
     def _lost(self, shell: PopUp) -> str:
         """How a pop-up ended that did not converge, and what to do. A table of rods has neither spacing nor target."""
         if not self.from_table:
-            return shell.report.status.sentence
+            return shell.report.status.sentence_on(self.layout)
         return (
             f"could be followed from flat only up to {percent_text(shell.followed)} of the way of the rods' ends; rods "
             "of another section may be followed further (rod.section), and rodshell form starts from a target instead"
@@ -386,11 +369,12 @@ def meshed_again(form: Stages, ends: Ends) -> Stages:
         form: of a target, with a pop-up.
     """
     old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
-    mesh, normals = mesh_grid(old.grid, form.layout.longest_edge), None
+    mesh = mesh_grid(old.grid, form.layout.longest_edge)
     if old.layered:
         mesh = mesh.in_layers(2 * float(np.abs(old.heights).max()))
-        assert boundary.normals is not None
-        normals = old.prolong(boundary.normals, mesh)
+    elif form.flat_state is not None:  # not straight in the plane
+        mesh = replace(mesh, flat=old.prolong(old.flat, mesh))
+    normals = None if boundary.normals is None else old.prolong(boundary.normals, mesh)
     draped = None if boundary.draped is None else old.prolong(boundary.draped, mesh)
     start = replace(boundary, draped=old.prolong(positions, mesh), normals=normals)
     again = popped_again(form, Footprint(mesh), start, ends)

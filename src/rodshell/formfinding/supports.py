@@ -14,7 +14,8 @@ from rodshell.rods.elements import Elements
 from rodshell.rods.supports import Support
 from rodshell.solve.equilibrium import MOST_ITERATIONS, Equilibrium, find_stable
 from rodshell.solve.problem import Supports
-from rodshell.validation import described, direction, listed, mapping, some, whole
+from rodshell.units import shown
+from rodshell.validation import described, direction, listed, mapping, number, some, whole
 
 _ENERGY = "an energy, such as rodshell.LocalEnergy, or a list of them"
 _Counting = Callable[[str, int], Callable[[int, float], None]]
@@ -66,6 +67,21 @@ def energies_of(given: object, nodes: int) -> tuple[Elements, ...]:
 
 def _is_energy(given: object) -> TypeGuard[Elements]:
     return all(hasattr(given, name) for name in ("blocks", "evaluate", "refreshed"))
+
+
+def figures_of(support: Support, moved: Floats, forces: Floats) -> dict[str, tuple[float, str]]:
+    """What a support says of itself, see `Support.figures`.
+
+    Raises:
+        InputError: it is not value and unit by text.
+    """
+    wanted = f"the figures of {support} must be a mapping such as {{'largest moment of a post': (2.5, 'N m')}}"
+    found = dict[str, tuple[float, str]]()
+    for name, each in mapping(f"figures of {support}", support.figures(moved, forces), wanted).items():
+        if not (isinstance(name, str) and isinstance(each, tuple) and len(each) == 2 and isinstance(each[1], str)):
+            raise InputError(f"{wanted}, not {{{described(name)}: {described(each)}}}")
+        found[name] = (number(f"the figure {shown(name)} of {support}", each[0]), each[1])
+    return found
 
 
 def slides_of(support: Support, free: object, ends: int) -> dict[int, tuple[Direction, ...]]:

@@ -10,7 +10,6 @@ from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped
 from rodshell.geometry.frames import unit
-from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
 from rodshell.nets import chebyshev_net
@@ -135,7 +134,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     dropped += [(name, f"it has fewer than {fewest} joints and would swing") for name in swinging]
     if not kept.rods:
         raise InputError(
-            f"no rod of the grid has {fewest} joints on the target: use a smaller spacing or a larger target"
+            f"no rod of the grid has {fewest} joints on the target: use {draped.layout.closer} or a larger target"
         )
     mesh, nodes = cut_mesh(source, kept.rods, margin=margin)
     positions = positions.take(nodes, axis=0)
@@ -203,32 +202,15 @@ def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     Args:
         positions: (n, 3) of the mesh's nodes [m].
     """
-    return unit(_end_tangents(positions, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations))
-
-
-@njit("f2 i1 i1 i1 f1")
-def _end_tangents(positions, rod_nodes, rod_start, rod_stop, stations):  # type: ignore[no-untyped-def]
-    """As `end_tangents`, of about length 1."""
-    result = np.empty((2 * len(rod_start), 3))
-    for end in range(len(result)):
-        first, last = rod_start[end // 2], rod_stop[end // 2] - 1
-        a, inwards = (first, 1) if end % 2 == 0 else (last, -1)
-        b, c, turn = a + inwards, a + 2 * inwards, 0.0
-        edge = before = _direction(positions, rod_nodes[b], rod_nodes[a])
-        if first <= c <= last:  # turned further as from the edge before to the last
-            before = _direction(positions, rod_nodes[c], rod_nodes[b])
-            turn = (stations[a] - stations[b]) / (stations[a] - stations[c])
-        for k in range(3):
-            result[end, k] = edge[k] + turn * (edge[k] - before[k])
-    return result
-
-
-@njit()
-def _direction(positions, a, b):  # type: ignore[no-untyped-def]
-    """Unit vector from node a to node b."""
-    x, y, z = positions[b, 0] - positions[a, 0], positions[b, 1] - positions[a, 1], positions[b, 2] - positions[a, 2]
-    length = np.sqrt(x * x + y * y + z * z)
-    return x / length, y / length, z / length
+    first, last = mesh.rod_start, mesh.rod_stop - 1
+    end, inwards = np.column_stack([first, last]).ravel(), np.tile([1, -1], len(first))
+    next_to, long = end + inwards, np.repeat(last - first > 1, 2)
+    third = np.where(long, next_to + inwards, end)  # of a rod with two nodes there is no edge before its last
+    a, b, c = (positions[mesh.rod_nodes[entries]] for entries in (end, next_to, third))
+    s, edge = mesh.stations, unit(a - b)
+    turn = np.divide(s[end] - s[next_to], s[end] - s[third], out=np.zeros(len(end)), where=long)
+    before = np.where(long[:, None], unit(b - c), edge)
+    return unit(edge + turn[:, None] * (edge - before))  # turned further as from the edge before to the last
 
 
 def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]]]:

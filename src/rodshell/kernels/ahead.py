@@ -9,7 +9,7 @@ from rodshell.kernels.jit import arguments_of, is_kept
 
 # Kernels of joints, meshes, twist, warm starts and dynamics, which most forms do not call: modules, or single kernels
 OF_SOME_JOBS = {
-    "contact.modified_mass", "geometry.curves._on_curve", "joints.relative_rotation", "joints.ties", "rods.bend_twist",
+    "contact.modified_mass", "joints.relative_rotation", "joints.ties", "rods.bend_twist",
     "rods.isotropic._isotropic_bend_twist", "solve.implicit_euler", "solve.newton_matrix", "targets.field_fitting",
     "targets.rim", "targets.smooth_field",
 }  # fmt: skip

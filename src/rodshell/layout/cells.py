@@ -183,12 +183,13 @@ def _lattice(grid: FlatGrid) -> Ints:
     """(c, 2) which line of either family each crossing is on, counted from the axis next to the anchor.
 
     Raises:
-        InputError: rods of a table are on no lattice.
+        InputError: the rods are on no lattice of two families of straight lines, such as those of a table.
     """
-    if any(rod.family == "free" for rod in grid.rods):
-        raise InputError("rods of a table are on no lattice that lines of bracing could be counted on: brace all cells")
+    families = dict.fromkeys(rod.family for rod in grid.rods)
+    if len(families) != 2 or any(rod.offset is None for rod in grid.rods):
+        raise InputError("these rods are on no lattice that lines of bracing could be counted on: brace all cells")
     result = np.zeros((len(grid.crossings), 2), dtype=np.intp)
-    for column, family in enumerate("uv"):
+    for column, family in enumerate(families):
         offsets = np.array([rod.offset if rod.family == family else np.nan for rod in grid.rods])
         known = np.unique(offsets[np.isfinite(offsets)].round(9))
         rank = np.searchsorted(known, np.nan_to_num(offsets).round(9)) - int(np.argmin(np.abs(known)))

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from math import copysign
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +19,6 @@ from rodshell.layout.rest_curve import RestCurve
 from rodshell.untrusted import limit, raised
 from rodshell.validation import LARGEST, finite, instance, listed, number, short, texts
 
-Family = Literal["u", "v", "free"]
-
 MOST_RODS = 5000  # of a grid, of which all pairs are looked at; they take 0.4 GB
 _PARALLEL = 1e-9  # sine of the angle between lines that do not cross
 TOGETHER = 0.01  # of the usual span: crossings of three rods or more that are nearer to each other are one joint
@@ -28,14 +27,11 @@ TOGETHER = 0.01  # of the usual span: crossings of three rods or more that are n
 class FlatRod(NamedTuple):
     """A straight rod in the flat state: the points `origin + s * direction` for `start <= s <= end`.
 
-    Rods of family "u" run along the layout's x axis at y = `offset`, rods of family "v" along y at x = `offset`, and s
-    is measured from the middle of the layout. A rod of family "free" is given by its two ends, and s is measured from
-    its first end.
-
     Args:
         name: label such as "U09".
-        family: "u", "v" or "free".
-        offset: of the rod's line; 0 for a free one [m].
+        family: name of the rods that it is one of and that do not cross each other, such as "u"; "free": of none.
+        offset: of the rod's line in a lattice of straight lines, along `across` from the lattice's middle, from which s
+            is measured too; None: it is on no such line [m].
         start, end: material coordinates of the ends [m].
         origin: point of the rod's line at which s is 0 [m].
         direction: unit vector along the rod.
@@ -45,8 +41,8 @@ class FlatRod(NamedTuple):
     """
 
     name: str
-    family: Family
-    offset: float
+    family: str
+    offset: float | None
     start: float
     end: float
     origin: tuple[float, float]
@@ -54,30 +50,6 @@ class FlatRod(NamedTuple):
     virtual: bool = False
     profile: Profile | None = None
     curve: RestCurve | None = None
-
-    @staticmethod
-    def u(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
-        """A rod of family "u", along x.
-
-        Args:
-            name: label such as "U09".
-            offset: y of the rod's line [m].
-            start, end: x of the ends [m].
-            virtual: whether the line only shapes the net and is not built.
-        """
-        return FlatRod(name, "u", offset, start, end, (0.0, offset), (1.0, 0.0), virtual)
-
-    @staticmethod
-    def v(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
-        """A rod of family "v", along y.
-
-        Args:
-            name: label such as "V09".
-            offset: x of the rod's line [m].
-            start, end: y of the ends [m].
-            virtual: whether the line only shapes the net and is not built.
-        """
-        return FlatRod(name, "v", offset, start, end, (offset, 0.0), (0.0, 1.0), virtual)
 
     @property
     def length(self) -> float:
@@ -88,13 +60,25 @@ class FlatRod(NamedTuple):
         """Flat positions (..., 2) [m] at the material coordinates `s` (...) [m]."""
         return np.asarray(np.asarray(self.origin) + np.asarray(s, dtype=float)[..., None] * np.asarray(self.direction))
 
-    def cut(self, start: float, end: float) -> "FlatRod":
+    @property
+    def across(self) -> tuple[float, float]:
+        """Unit vector at right angles to the rod, towards y; of a rod along y, towards x."""
+        dx, dy = self.direction
+        side = copysign(1.0, dx or -dy)
+        return -side * dy, side * dx
+
+    def cut(self, start: float, end: float, across: float = 0.0) -> "FlatRod":
         """The same rod with other ends.
 
         Args:
             start, end: material coordinates of the new ends [m].
+            across: by which its line is moved along `across` [m].
         """
-        line = self.name, self.family, self.offset, start, end, self.origin, self.direction
+        offset, origin = self.offset, self.origin
+        if across:
+            (x, y), (nx, ny) = origin, self.across
+            offset, origin = None if offset is None else offset + across, (x + across * nx, y + across * ny)
+        line = self.name, self.family, offset, start, end, origin, self.direction
         return FlatRod(*line, self.virtual, self.profile, self.curve)
 
 
@@ -376,7 +360,7 @@ def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> Fla
     if not (length > 0).all():
         raise InputError(f"rod {labels[int(np.argmin(length))]} has no length: its two ends coincide")
     rods = [
-        FlatRod(label, "free", 0.0, 0.0, float(size), (float(p[0]), float(p[1])), (float(d[0]), float(d[1])))
+        FlatRod(label, "free", None, 0.0, float(size), (float(p[0]), float(p[1])), (float(d[0]), float(d[1])))
         for label, p, d, size in zip(labels, points[:, 0], apart / length[:, None], length, strict=True)
     ]
     _refuse_overlaps(rods)

@@ -10,13 +10,14 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod, refuse_too_many
+from rodshell.layout.flatgrid import FlatGrid, FlatRod, refuse_too_many
 from rodshell.layout.lattices import EDGES_A_SPAN, Asymptotic, Curves, Geodesic
 from rodshell.units import NUMBER
 from rodshell.validation import flag, instance, is_auto, number, numbers, positive, short, texts, whole
 
 Auto = Literal["auto"]
 
+FAMILIES = ("u", "v")  # along x and along y, in the order of all pairs
 FLATTEST = pi / 6 - 1e-9  # smallest crossing angle; and its supplement is the largest
 
 
@@ -55,6 +56,9 @@ class GridLayout:
     auto_edge: bool = False
 
     kind: ClassVar[str] = "chebyshev"
+    upright: ClassVar[bool] = False
+    closer: ClassVar[str] = "a smaller spacing"
+    elsewhere: ClassVar[str] = "another offset, anchor or heading"
 
     def __post_init__(self) -> None:
         for name in ("spacing", "offset"):
@@ -155,20 +159,19 @@ class GridLayout:
         edge = min(self.spacing) / whole("edges a span", a_span, 1)
         return replace(self, edge=edge) if self.auto_edge else self
 
-    def phase(self, family: Family) -> float:
+    def phase(self, family: int) -> float:
         """Offset of one line of the lattice of a family [m]; the others are whole spacings away."""
-        side = 0 if family == "u" else 1
-        half = 0.0 if self.rods == "auto" else (self.rods[side] - 1) / 2 % 1
-        return self.offset[1 - side] + half * self.spacing[side]
+        half = 0.0 if self.rods == "auto" else (self.rods[family] - 1) / 2 % 1
+        return self.offset[1 - family] + half * self.spacing[family]
 
-    def lattice(self, family: Family, low: float, high: float) -> Floats:
+    def lattice(self, family: int, low: float, high: float) -> Floats:
         """Offsets of the lines of a family [m], from at most a spacing below `low` to at most one above `high` [m].
 
         Args:
-            family: "u" or "v".
+            family: 0 or 1, of `FAMILIES`.
             low, high: ends of the range of offsets that the lines have to cover [m].
         """
-        spacing, given = self.spacing[0 if family == "u" else 1], self.lines[0 if family == "u" else 1]
+        spacing, given = self.spacing[family], self.lines[family]
         if given:
             before = given[0] + spacing * np.arange(min(np.floor((low - given[0]) / spacing), 0), 0)
             after = given[-1] + spacing * np.arange(1, max(np.ceil((high - given[-1]) / spacing), 0) + 1)
@@ -177,17 +180,16 @@ class GridLayout:
         first, last = np.floor((low - phase) / spacing), np.ceil((high - phase) / spacing)
         return np.asarray(phase + spacing * np.arange(first, last + 1))
 
-    def offsets(self, family: Family) -> Floats | None:
+    def offsets(self, family: int) -> Floats | None:
         """Ascending offsets of the rods of a family [m], or None where the count is "auto"."""
         if self.rods == "auto":
             return None
-        side = 0 if family == "u" else 1
-        count = self.rods[side]
-        return np.asarray(self.offset[1 - side] + (np.arange(count) - (count - 1) / 2) * self.spacing[side])
+        count = self.rods[family]
+        return np.asarray(self.offset[1 - family] + (np.arange(count) - (count - 1) / 2) * self.spacing[family])
 
-    def middle(self, family: Family) -> float:
-        """Material coordinate of the middle of the rods of a family [m]: the layout moves with its offset."""
-        return self.offset[0 if family == "u" else 1]
+    def middle(self, rod: FlatRod) -> float:
+        """Material coordinate of the middle of one of the rods [m]: the layout moves with its offset."""
+        return self.offset[FAMILIES.index(rod.family)]
 
     def parameters(self) -> dict[str, object]:
         """The layout in SI, as it is written in a case file."""
@@ -203,17 +205,27 @@ class GridLayout:
         """
         whole = GridLayout(counts, self.spacing, length, self.edge, self.rotate, self.offset)
         rods = list[FlatRod]()
-        families: tuple[Family, ...] = ("u", "v")
-        for family in families:
-            make = FlatRod.u if family == "u" else FlatRod.v
-            middle = whole.middle(family)
+        for family, middle in enumerate(whole.offset):
             offsets = whole.offsets(family)
             assert offsets is not None
             rods += [
-                make(name, c, middle - length / 2, middle + length / 2)
+                lattice_rod(family, name, c, middle - length / 2, middle + length / 2)
                 for name, c in zip(rod_names(family, len(offsets)), offsets.tolist(), strict=True)
             ]
         return FlatGrid.of(rods)
+
+
+def lattice_rod(family: int, name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> FlatRod:
+    """A rod of the lattice: of the first family along x at y = `offset`, of the second along y at x = `offset`.
+
+    Args:
+        family: 0 or 1, of `FAMILIES`.
+        name: label such as "U09".
+        start, end: material coordinates of the ends, x or y [m].
+        virtual: whether the line only shapes the net and is not built.
+    """
+    line = ((0.0, offset), (1.0, 0.0)) if family == 0 else ((offset, 0.0), (0.0, 1.0))
+    return FlatRod(name, FAMILIES[family], offset, start, end, *line, virtual)
 
 
 def auto_edge(spacing: tuple[float, float]) -> float:
@@ -246,13 +258,13 @@ def _counts(rods: object) -> tuple[int, int]:
     return int(first), int(second)
 
 
-def rod_names(family: Family, count: int) -> list[str]:
+def rod_names(family: int, count: int) -> list[str]:
     """Names of the rods of a family: U01, U02, ... in ascending offset.
 
     Args:
         count: number of rods of the family, which determines the number of digits.
     """
-    letter, digits = family.upper(), max(2, len(str(count)))
+    letter, digits = FAMILIES[family].upper(), max(2, len(str(count)))
     return [letter + str(k + 1).zfill(digits) for k in range(count)]
 
 

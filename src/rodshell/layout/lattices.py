@@ -47,6 +47,10 @@ class SurfaceLattice(ABC):
     left_out: Annotated[Names, "names of rods that are not built, such as U01, V03"] = ()
 
     kind: ClassVar[str]
+    upright: ClassVar[bool] = False  # whether its rods are strips that stand on edge
+    closer: ClassVar[str] = "a smaller spacing"
+    elsewhere: ClassVar[str] = "another anchor or layout.rotate"
+    """What sets its rods closer, or elsewhere on the target, in words."""
 
     @property
     @abstractmethod
@@ -138,6 +142,7 @@ class Asymptotic(SurfaceLattice):
     through the anchor the one nearer to `rotate` is of the first family."""
 
     kind = "asymptotic"
+    upright = True
 
     @property
     def family_count(self) -> int:
@@ -165,9 +170,10 @@ class Curves(SurfaceLattice):
 
     lines: Annotated[Strokes, 'points of each rod, "x,y,z; x,y,z" or in plan; "|" between two rods'] = ()
     names: Annotated[Names, "names of the rods; default: R01, R02, ..."] = ()
-    rest: Annotated[Rest, "rods are straight at rest, or cut so that none bends within the surface"] = "straight"
+    rest: Annotated[Rest, "straight rods, or rods cut so that none bends within the surface"] = "straight"
 
     kind = "curves"
+    closer, elsewhere = "lines that lie closer", "other lines"
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -6,14 +6,14 @@ Several meshed grids can be merged into one, side by side.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.curves import on_curve
-from rodshell.kernels import njit
 from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, sides, whole_rods
 from rodshell.layout.profile import Profile
 from rodshell.units import length_text
@@ -87,8 +87,7 @@ class GridMesh:
 
     def rod_slice(self, rod: int) -> slice:
         """The entries of `rod_nodes` and `stations` that belong to a rod."""
-        stop = self.rod_start[rod + 1] if rod + 1 < len(self.rod_start) else len(self.rod_nodes)
-        return slice(int(self.rod_start[rod]), int(stop))
+        return slice(int(self.rod_start[rod]), int(self.rod_stop[rod]))
 
     def nodes_of(self, rod: int) -> Ints:
         """Nodes along one rod, from its start to its end."""
@@ -99,44 +98,55 @@ class GridMesh:
         """(k,) rod of each entry of `rod_nodes`."""
         return np.repeat(np.arange(len(self.rod_start)), self.rod_stop - self.rod_start)
 
-    @property
-    def edges(self) -> Ints:
-        """(e, 2) nodes of each edge, rod by rod."""
-        return self._stencils.edges
-
-    @property
-    def edge_rods(self) -> Ints:
-        """(e,) rod of each edge."""
-        return self._stencils.edge_rods
-
-    @property
-    def edge_lengths(self) -> Floats:
-        """(e,) rest lengths [m]."""
-        return self._stencils.edge_lengths
-
-    @property
-    def bends(self) -> Ints:
-        """(b, 3) nodes of each pair of consecutive edges of a rod."""
-        return self._stencils.bends
-
-    @property
-    def bend_rods(self) -> Ints:
-        """(b,) rod of each bend."""
-        return self._stencils.bend_rods
-
-    @property
-    def voronoi_lengths(self) -> Floats:
-        """(b,) half the rest length of the two edges of each bend [m] [HQK Eq 1b, of the rest state: see ERRATA]."""
-        return self._stencils.voronoi_lengths
+    @cached_property
+    def edge_entries(self) -> Ints:
+        """(e,) entry of `rod_nodes` at which each edge begins; it ends at the next."""
+        return np.delete(np.arange(len(self.rod_nodes)), self.rod_stop - 1)
 
     @cached_property
-    def _stencils(self) -> "_Stencils":
-        return _Stencils(*_edges_and_bends(self.rod_nodes, self.rod_start, self.stations))
+    def edges(self) -> Ints:
+        """(e, 2) nodes of each edge, rod by rod."""
+        return np.asarray(self.rod_nodes[self.edge_entries[:, None] + [0, 1]])
+
+    @cached_property
+    def edge_rods(self) -> Ints:
+        """(e,) rod of each edge."""
+        return self.rod_of[self.edge_entries]
+
+    @cached_property
+    def edge_lengths(self) -> Floats:
+        """(e,) rest lengths [m]."""
+        return np.asarray(self.stations[self.edge_entries + 1] - self.stations[self.edge_entries])
+
+    @cached_property
+    def bend_entries(self) -> Ints:
+        """(b,) entry of `rod_nodes` in the middle of each bend."""
+        return np.delete(np.arange(len(self.rod_nodes)), self.end_entries)
+
+    @cached_property
+    def bends(self) -> Ints:
+        """(b, 3) nodes of each pair of consecutive edges of a rod."""
+        return np.asarray(self.rod_nodes[self.bend_entries[:, None] + [-1, 0, 1]])
+
+    @cached_property
+    def bend_rods(self) -> Ints:
+        """(b,) rod of each bend."""
+        return self.rod_of[self.bend_entries]
+
+    @cached_property
+    def voronoi_lengths(self) -> Floats:
+        """(b,) half the rest length of the two edges of each bend [m] [HQK Eq 1b, of the rest state: see ERRATA]."""
+        return np.asarray(0.5 * (self.stations[self.bend_entries + 1] - self.stations[self.bend_entries - 1]))
+
+    @cached_property
+    def end_entries(self) -> Ints:
+        """(2m,) entries of `rod_nodes` at the start and the end of each rod in turn."""
+        return np.column_stack([self.rod_start, self.rod_stop - 1]).ravel()
 
     @cached_property
     def ends(self) -> Ints:
         """(m, 2) first and last node of each rod."""
-        return np.column_stack([self.rod_nodes[self.rod_start], self.rod_nodes[self.rod_stop - 1]])
+        return np.asarray(self.rod_nodes[self.end_entries].reshape(-1, 2))
 
     @property
     def joint_pairs(self) -> Ints:
@@ -223,12 +233,6 @@ class GridMesh:
                 result[self.rod_slice(k)] = rod.curve.at(self.stations[self.rod_slice(k)])
         return result
 
-    def tributary_lengths(self) -> Floats:
-        """Rod length (n,) that each node represents: half of every edge at the node [m]."""
-        total = np.zeros(self.node_count)
-        np.add.at(total, self.edges, 0.5 * self.edge_lengths[:, None])
-        return total
-
     def prolong(self, positions: Floats, fine: "GridMesh", *, rods: Sequence[int] | None = None) -> Floats:
         """Interpolate positions on another mesh of the same rods, by local cubics along each rod.
 
@@ -245,40 +249,6 @@ class GridMesh:
             curve = on_curve(self.stations[here], positions[self.rod_nodes[here]], fine.stations[there])
             result[fine.rod_nodes[there]] = curve
         return result
-
-
-class _Stencils(NamedTuple):
-    """Edges and bends; see the properties of `GridMesh` of the same names."""
-
-    edges: Ints
-    edge_rods: Ints
-    edge_lengths: Floats
-    bends: Ints
-    bend_rods: Ints
-    voronoi_lengths: Floats
-
-
-@njit("i1 i1 f1")
-def _edges_and_bends(rod_nodes, rod_start, stations):  # type: ignore[no-untyped-def]
-    edge_count, bend_count, stop = 0, 0, len(rod_nodes)
-    for rod in range(len(rod_start) - 1, -1, -1):
-        edge_count += stop - rod_start[rod] - 1
-        bend_count += max(stop - rod_start[rod] - 2, 0)
-        stop = rod_start[rod]
-    edges, edge_rods = np.empty((edge_count, 2), dtype=np.int64), np.empty(edge_count, dtype=np.int64)
-    bends, bend_rods = np.empty((bend_count, 3), dtype=np.int64), np.empty(bend_count, dtype=np.int64)
-    lengths, voronoi, e, b = np.empty(edge_count), np.empty(bend_count), 0, 0
-    for rod in range(len(rod_start)):
-        stop = rod_start[rod + 1] if rod + 1 < len(rod_start) else len(rod_nodes)
-        for k in range(rod_start[rod], stop - 1):
-            edges[e, 0], edges[e, 1] = rod_nodes[k], rod_nodes[k + 1]
-            edge_rods[e], lengths[e] = rod, stations[k + 1] - stations[k]
-            e += 1
-            if k + 2 < stop:
-                bends[b, 0], bends[b, 1], bends[b, 2] = rod_nodes[k], rod_nodes[k + 1], rod_nodes[k + 2]
-                bend_rods[b], voronoi[b] = rod, 0.5 * (stations[k + 2] - stations[k])
-                b += 1
-    return edges, edge_rods, lengths, bends, bend_rods, voronoi
 
 
 def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
@@ -315,132 +285,63 @@ def _fixed_points(grid: FlatGrid, marks: Sequence[Sequence[float]]) -> tuple[Int
 
     The start, the marks and the end of each rod get a new node each, unless there is a joint or an earlier one of them.
     """
-    given, begin = list[float](), [0]
-    for rod, more in zip(grid.rods, marks, strict=True):
-        given += (rod.start, *more, rod.end)
-        begin.append(len(given))
-    found: tuple[Ints, Floats, Ints, int, Ints] = _fixed(
-        grid.crossings.rods, grid.crossings.at, finite("marks", given, len(given)), np.array(begin)
-    )
-    return found
+    rows = [(rod.start, *more, rod.end) for rod, more in zip(grid.rods, marks, strict=True)]
+    counts, crossings = [len(row) for row in rows], grid.crossings.rods
+    given = finite("marks", [s for row in rows for s in row], sum(counts))
+    lengths, sides = np.diff(grid.ends).ravel(), crossings.size  # both sides of each crossing, then the given points
+    rod = np.append(crossings.ravel(), np.repeat(np.arange(len(rows)), counts))
+    s = np.append(grid.crossings.at.ravel(), given)
+    order = np.lexsort((s, rod))
+    joints, joint_nodes = _merged_joints(order[order < sides], rod, s, len(crossings), 1e-7 * lengths.max(initial=0.0))
+    new = np.append(True, (np.diff(rod[order]) > 0) | (np.diff(s[order]) > 1e-9 * lengths[rod[order[1:]]]))
+    first = np.repeat(np.minimum.reduceat(order, np.flatnonzero(new)), np.diff(np.append(np.flatnonzero(new), len(s))))
+    joint = np.append(np.repeat(joint_nodes, 2), np.full(len(given), -1))[order]
+    _, once = np.unique(rod[order] * (joints + 1) + joint, return_index=True)  # three rods make three crossings
+    # of points at one place the first is kept, and every joint once
+    kept = np.where(order < sides, np.isin(np.arange(len(order)), once), order == first)
+    placed = np.sort(order[kept & (order >= sides)])
+    node = np.append(np.repeat(joint_nodes, 2), joints + np.searchsorted(placed, np.arange(sides, len(s))))
+    order = order[kept]
+    begin = np.searchsorted(rod[order], np.arange(len(rows) + 1))
+    return begin, s[order], node[order], joints + len(placed), joint_nodes
 
 
-@njit("i2 f2 f1 i1")
-def _fixed(crossings, at, given, begin):  # type: ignore[no-untyped-def]
-    """See `_fixed_points`: `crossings` (c, 2) and where they are (c, 2); the `given` points, rod by rod, of which those
-    of each rod `begin` (m + 1,) there."""
-    rods, sides, longest = len(begin) - 1, 2 * len(crossings), 0.0
-    size = sides + len(given)  # both sides of each crossing, then the given points
-    rod, s, first = np.empty(size, dtype=np.int64), np.empty(size), np.zeros(rods + 1, dtype=np.int64)
-    for k in range(sides):
-        rod[k], s[k] = crossings[k // 2, k % 2], at[k // 2, k % 2]
-    for r in range(rods):
-        longest = max(longest, given[begin[r + 1] - 1] - given[begin[r]])
-        for k in range(begin[r], begin[r + 1]):
-            rod[sides + k], s[sides + k] = r, given[k]
-    for k in range(size):
-        first[rod[k] + 1] += 1
-    for r in range(rods):
-        first[r + 1] += first[r]
-    order, stop = np.empty(size, dtype=np.int64), first[:rods].copy()
-    for k in range(size):  # sorted along each rod by insertion: crossings mostly come in order
-        n = stop[rod[k]]
-        stop[rod[k]] += 1
-        while n > first[rod[k]] and s[order[n - 1]] > s[k]:
-            order[n] = order[n - 1]
-            n -= 1
-        order[n] = k
-    joint_nodes, joints = _merge_joints(order, rod, s, sides, 1e-7 * longest)
-    node, kept = np.empty(size, dtype=np.int64), np.zeros(size, dtype=np.bool_)
-    for r in range(rods):
-        tiny, last, before, best = 1e-9 * (given[begin[r + 1] - 1] - given[begin[r]]), -np.inf, -1, -1
-        for n in range(first[r], first[r + 1]):
-            k = order[n]
-            if k < sides:
-                node[k] = joint_nodes[k // 2]
-                again, before = node[k] == before, node[k]
-                if again:  # each joint once on each of its rods: three rods make three crossings
-                    continue
-            if s[k] - last > tiny:
-                best = size
-            # of points at one place the first is kept, and every joint
-            if k < sides or k < best:
-                if sides <= best < size:
-                    kept[best] = False
-                kept[k], best = True, min(best, k)
-            last = s[k]
-    count = joints
-    for k in range(sides, size):
-        if kept[k]:
-            node[k] = count
-            count += 1
-    stations, nodes, used = np.empty(size), np.empty(size, dtype=np.int64), 0
-    for r in range(rods):
-        start, first[r] = first[r], used
-        for n in range(start, first[r + 1]):
-            if kept[order[n]]:
-                stations[used], nodes[used] = s[order[n]], node[order[n]]
-                used += 1
-    first[rods] = used
-    return first, stations[:used], nodes[:used], count, joint_nodes
-
-
-@njit()
-def _merge_joints(order, rod, s, sides, tiny):  # type: ignore[no-untyped-def]
-    """The node of each crossing, and their number: crossings at one point (of three rods or more) share their node.
+def _merged_joints(order: Ints, rod: Ints, s: Floats, count: int, tiny: float) -> tuple[int, Ints]:
+    """The number of joints, and the node of each of so many crossings: crossings at one point (of three rods or more)
+    share their node.
 
     They are neighbours along each of their rods, with no more than round-off between them: less than `tiny` [m].
-    `order` has the points along one rod after the other, see `_fixed`.
+    `order` has the sides of the crossings along one rod after the other, see `_fixed_points`.
     """
-    node, before = np.arange(sides // 2), -1
-    used = np.zeros(len(node), dtype=np.int64)
-    for k in order:
-        if k < sides:
-            if before >= 0 and rod[k] == rod[before] and s[k] - s[before] < tiny:
-                old, new = node[k // 2], node[before // 2]
-                for c in range(len(node)):
-                    if node[c] == old:
-                        node[c] = new
-            before = k
-    for c in range(len(node)):
-        used[node[c]] = 1
-    joints = 0
-    for c in range(len(node)):
-        if used[c]:
-            used[c] = joints
-            joints += 1
-    for c in range(len(node)):
-        node[c] = used[node[c]]
-    return node, joints
+    near = np.flatnonzero((np.diff(rod[order]) == 0) & (np.diff(s[order]) < tiny))
+    if not len(near):
+        return count, np.arange(count)
+    pairs = order[near] // 2, order[near + 1] // 2
+    joints, labels = connected_components(coo_array((np.ones(len(near)), pairs), shape=(count, count)), directed=False)
+    return int(joints), labels.astype(np.intp)
 
 
-@njit("f2 i1 f1 i1 i1 i")
-def _divided(lines, begin, s, nodes, edges, count):  # type: ignore[no-untyped-def]
+def _divided(
+    lines: Floats, begin: Ints, s: Floats, nodes: Ints, edges: Ints, count: int
+) -> tuple[Floats, Ints, Ints, Floats]:
     """Node positions, `rod_nodes`, `rod_start` and stations of rods with origin and direction `lines` (m, 4).
 
     The `count` nodes of their fixed points come first, see `_fixed_points`; `edges` of each is the number of edges up
     to the next of its rod.
     """
-    size, rods = len(s), len(lines)
-    for rod in range(rods):
-        for k in range(begin[rod], begin[rod + 1] - 1):
-            size += edges[k] - 1
-    flat, stations = np.zeros((count + size - len(s), 3)), np.empty(size)
-    rod_nodes, rod_start, entry = np.empty(size, dtype=np.int64), np.empty(rods, dtype=np.int64), 0
-    for rod in range(rods):
-        rod_start[rod] = entry
-        for k in range(begin[rod], begin[rod + 1]):
-            last = k + 1 == begin[rod + 1]
-            for step in range(1 if last else edges[k]):
-                node, at = nodes[k], s[k]
-                if step > 0:
-                    node, at = count, s[k] + (s[k + 1] - s[k]) * step / edges[k]
-                    count += 1
-                rod_nodes[entry], stations[entry] = node, at
-                for axis in range(2):
-                    flat[node, axis] = lines[rod, axis] + at * lines[rod, 2 + axis]
-                entry += 1
-    return flat, rod_nodes, rod_start, stations
+    parts = np.append(edges, 1)
+    parts[begin[1:] - 1] = 1
+    starts = np.cumsum(parts) - parts
+    point, rod = (
+        np.repeat(np.arange(len(s)), parts),
+        np.repeat(np.arange(len(lines)), np.diff(np.append(starts, parts.sum())[begin])),
+    )
+    step = np.arange(len(point)) - starts[point]
+    stations = s[point] + (np.append(s[1:], s[-1:])[point] - s[point]) * step / parts[point]
+    rod_nodes = np.where(step == 0, nodes[point], count - 1 + np.cumsum(step > 0))
+    flat = np.zeros((count + int(np.count_nonzero(step)), 3))
+    flat[rod_nodes, :2] = lines[rod, :2] + stations[:, None] * lines[rod, 2:]
+    return flat, rod_nodes, starts[begin[:-1]], stations
 
 
 def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float = 0.0) -> tuple[GridMesh, Ints]:
@@ -459,52 +360,39 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float = 0.0) ->
     grid, joints = mesh.grid.cut(rods, margin=margin)
     index = whole_rods(mesh.grid.rods, rods)
     spans, limits = spans_along(mesh, grid.ends, index), np.full(len(rods), CROWDED * mesh.edge_lengths.max())
-    source = spans, mesh.rod_nodes, mesh.stations, grid.crossings.rods, mesh.joint_nodes[joints], mesh.node_count
-    nodes, *part, left_out = _cut(*source, limits)
+    crossing_nodes = mesh.joint_nodes[joints]
+    part, nodes, left_out = _cut(mesh, grid, spans, crossing_nodes, limits)
     if left_out:
-        nodes, *part, _ = _cut(*source, CROWDED * _usual_edges(mesh)[index])
-    return GridMesh(grid, mesh.flat.take(nodes, axis=0), *part), nodes
+        part, nodes, _ = _cut(mesh, grid, spans, crossing_nodes, CROWDED * _usual_edges(mesh)[index])
+    return part, nodes
 
 
-@njit("i2 i1 f1 i2 i1 i f1")
-def _cut(spans, rod_nodes, stations, crossings, crossing_nodes, node_count, limits):  # type: ignore[no-untyped-def]
-    """Nodes of the part in the mesh; its `rod_nodes`, `rod_start`, stations and joint nodes; the number of nodes that
-    are left out, because they are closer than `limits` (m,) [m] to an end and not at a joint.
-
-    The pieces have the entries `spans` (m, 2), and cross in pairs `crossings` (c, 2) at the nodes `crossing_nodes`.
+def _cut(
+    mesh: GridMesh, grid: FlatGrid, spans: Ints, crossing_nodes: Ints, limits: Floats
+) -> tuple[GridMesh, Ints, int]:
+    """The part of a mesh with the rods of `grid`, which have the entries `spans` (m, 2), and its nodes in the mesh, at
+    which their crossings are (c,); and the number of nodes that are left out, because they are closer than `limits`
+    (m,) [m] to an end and not at a joint.
     """
-    number, joined = np.full(node_count, -1), np.full(node_count, -1)
-    last, before = np.full(len(spans), -1), np.empty(2 * len(crossings), dtype=np.int64)  # crossings of each piece
-    size = 0
-    for piece in range(len(spans)):
-        size += spans[piece, 1] + 1 - spans[piece, 0]
-    nodes, joints, count = np.empty(size, dtype=np.int64), np.empty(len(crossings), dtype=np.int64), 0
-    for k in range(2 * len(crossings)):
-        node, piece = crossing_nodes[k // 2], crossings[k // 2, k % 2]
-        if number[node] < 0:
-            number[node], nodes[count] = count, node
-            count += 1
-        joints[k // 2] = number[node]
-        before[k], last[piece] = last[piece], k
-    part, starts, s, used = np.empty(size, dtype=np.int64), np.empty(len(spans), dtype=np.int64), np.empty(size), 0
-    for piece in range(len(spans)):
-        low, high, k = spans[piece, 0], spans[piece, 1], last[piece]
-        starts[piece] = used
-        while k >= 0:
-            joined[crossing_nodes[k // 2]] = piece
-            k = before[k]
-        for entry in range(low, high + 1):
-            node, at = rod_nodes[entry], stations[entry]
-            if joined[node] == piece:
-                part[used] = number[node]
-            elif 0.0 < min(at - stations[low], stations[high] - at) < limits[piece]:
-                continue
-            else:
-                part[used], nodes[count] = count, node
-                count += 1
-            s[used] = at
-            used += 1
-    return nodes[:count], part[:used], starts, s[:used], joints, size - used
+    rod_nodes, stations = mesh.rod_nodes, mesh.stations
+    counts = 1 + spans[:, 1] - spans[:, 0]
+    piece, stops = np.repeat(np.arange(len(spans)), counts), np.cumsum(counts)
+    entry = np.arange(len(piece)) + (spans[:, 0] - stops + counts)[piece]
+    low, high = stations[spans].T
+    from_end = np.minimum(stations[entry] - low[piece], high[piece] - stations[entry])
+    at_joints = grid.crossings.rods * mesh.node_count + crossing_nodes[:, None]
+    joined = np.isin(piece * mesh.node_count + rod_nodes[entry], at_joints)
+    kept = joined | (from_end <= 0.0) | (from_end >= limits[piece])
+    left_out, piece, entry, joined = len(kept) - int(kept.sum()), piece[kept], entry[kept], joined[kept]
+    known, first = np.unique(crossing_nodes, return_index=True)
+    known = known[np.argsort(first)]
+    number = np.full(mesh.node_count, -1)
+    number[known] = np.arange(len(known))
+    part = np.where(joined, number[rod_nodes[entry]], len(known) - 1 + np.cumsum(~joined))
+    nodes = np.append(known, rod_nodes[entry[~joined]])
+    begin = np.searchsorted(piece, np.arange(len(spans)))
+    flat = mesh.flat.take(nodes, axis=0)
+    return GridMesh(grid, flat, part, begin, stations[entry], number[crossing_nodes]), nodes, left_out
 
 
 def spans_along(mesh: GridMesh, ends: Floats, whole: Ints) -> Ints:
@@ -514,19 +402,13 @@ def spans_along(mesh: GridMesh, ends: Floats, whole: Ints) -> Ints:
         ends: (m, 2) material coordinates of start and end of each piece [m].
         whole: (m,) the rod of the mesh that it belongs to.
     """
-    return np.asarray(_spans(mesh.rod_start[whole], mesh.rod_stop[whole] - 1, mesh.stations, ends))
-
-
-@njit("i1 i1 f1 f2")
-def _spans(first, last, stations, ends):  # type: ignore[no-untyped-def]
-    spans = np.empty((len(ends), 2), dtype=np.int64)
-    for k in range(len(ends)):
-        low, high, tiny = first[k], last[k], 1e-9 * (ends[k, 1] - ends[k, 0])
-        while low < high and stations[low] < ends[k, 0] - tiny:
-            low += 1
-        while low < high and stations[high] > ends[k, 1] + tiny:
-            high -= 1
-        spans[k, 0], spans[k, 1] = low, high
+    spans = np.empty((len(ends), 2), dtype=np.intp)
+    for k, (rod, (start, end)) in enumerate(zip(whole.tolist(), ends.tolist(), strict=True)):
+        here, tiny = mesh.rod_slice(rod), 1e-9 * (end - start)
+        s = mesh.stations[here]
+        low = min(int(np.searchsorted(s, start - tiny)), len(s) - 1)
+        high = max(int(np.searchsorted(s, end + tiny, side="right")) - 1, low)
+        spans[k] = here.start + low, here.start + high
     return spans
 
 
@@ -581,18 +463,18 @@ def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
 
 
 def _along(rod: FlatRod, shift: Floats) -> float:
-    """Change of a rod's material coordinates: those of families u and v are measured from the middle of the layout."""
-    return 0.0 if rod.family == "free" else float(shift @ np.array(rod.direction))
+    """Change of a rod's material coordinates: those on the lines of a lattice are measured from its middle."""
+    return 0.0 if rod.offset is None else float(shift @ np.array(rod.direction))
 
 
 def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
-    label, by = f"{name}-{rod.name}", _along(rod, shift)
-    if rod.family == "free":
+    if rod.offset is None:
         x, y = np.array(rod.origin) + shift
-        return rod._replace(name=label, origin=(float(x), float(y)))
-    make, across = (FlatRod.u, shift[1]) if rod.family == "u" else (FlatRod.v, shift[0])
-    moved = make(label, rod.offset + float(across), rod.start + by, rod.end + by)
-    return moved._replace(profile=rod.profile, curve=rod.curve)
+        moved = rod._replace(origin=(float(x), float(y)))
+    else:
+        by = _along(rod, shift)
+        moved = rod.cut(rod.start + by, rod.end + by, float(shift @ np.array(rod.across)))
+    return moved._replace(name=f"{name}-{rod.name}")
 
 
 def _merged(meshes: list[GridMesh]) -> GridMesh:

@@ -22,6 +22,12 @@ class RestCurve(NamedTuple):
         """Curvatures (...) at material coordinates `s` (...) [m]."""
         return np.asarray(np.interp(s, self.stations, self.curvatures))
 
+    def between(self, start: float, end: float) -> "RestCurve":
+        """The part from `start` to `end` [m], its stations measured from its start."""
+        apart = 1e-6 * (end - start)
+        s = np.array([start, *(s for s in self.stations if start + apart < s < end - apart), end])
+        return RestCurve(tuple((s - start).tolist()), tuple(self.at(s).tolist()))
+
     def line(self, s: Floats) -> Floats:
         """(k, 2) points of the rod at rest, from the origin along x, at ascending material coordinates `s` (k,) [m]."""
         fine = np.union1d(s, np.linspace(s[0], s[-1], 20 * len(self.stations)))

@@ -64,17 +64,18 @@ def corresponding_rods(mesh: GridMesh, to: GridMesh) -> list[tuple[int, int]]:
     for k, rod in enumerate(to.grid.rods):
         apart = np.abs(before - now[k])
         same = [j for j, old in enumerate(mesh.grid.rods) if old.family == rod.family and apart[j, 0] < SAME_LINE]
-        if same and rod.family != "free":
+        if same:
             pairs.append((k, min(same, key=lambda j: apart[j, 1])))
     return pairs
 
 
 def _lattice_coordinates(mesh: GridMesh) -> Floats:
-    """(m, 2) of each rod its line's offset from the anchor, in spacings, and its middle along the line [m]."""
+    """(m, 2) of each rod its line's offset from the anchor, in spacings, and its middle along the line [m]; NaN where
+    it is on no line of a lattice."""
     rods = mesh.grid.rods
-    offset = np.array([rod.offset for rod in rods])
-    for family in ("u", "v"):
-        in_family = np.array([rod.family == family for rod in rods])
+    offset, of = np.array([rod.offset for rod in rods], dtype=float), np.array([rod.family for rod in rods])
+    for family in np.unique(of):
+        in_family = of == family
         steps = np.diff(np.unique(offset[in_family]))
         if len(steps):
             offset[in_family] /= np.median(steps)

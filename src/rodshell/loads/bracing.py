@@ -62,7 +62,7 @@ def braced_diagonals(bracing: Bracing, structure: Structure, target: Target) -> 
     mesh, positions, pattern = structure.mesh, structure.positions(structure.equilibrium), Pattern.of(bracing.pattern)
     pairs = diagonals(mesh.grid, pattern)
     if not len(pairs):
-        raise InputError("the grid has no cell of four joints that could be braced: use a smaller spacing")
+        raise InputError("the grid has no cell of four joints that could be braced: set its rods closer")
     if isinstance(bracing, Cables) and bracing.ends_at == "supports":
         rim = rim_diagonals(mesh.grid, pattern)
         pairs = np.vstack([pairs, rim + [0, len(mesh.joint_pairs)]])

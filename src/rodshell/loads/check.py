@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 from pydantic import Field
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.checks.bending import require_known_stress
 from rodshell.checks.self_weight import self_weight, shown_limit
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
@@ -31,10 +31,10 @@ from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, Settlement, Temperature
 from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
+from rodshell.loads.nodes import LoadedNodes
 from rodshell.loads.settings import Cables, Laths
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
 from rodshell.loads.structure import NO_PAIRS, Structure
-from rodshell.loads.tributary import LoadedNodes, Tributary, tributary_areas
 from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import Duration
 from rodshell.solve.equilibrium import Equilibrium
@@ -42,6 +42,7 @@ from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.modes import LinearBuckling, linear_buckling, softest_motion
+from rodshell.targets.tributary import Tributary, tributary_areas
 from rodshell.units import shown
 
 BRACED: dict[type, Callable[..., Structure]] = {Cables: stressed, Laths: laid}
@@ -66,6 +67,7 @@ class LoadedShell(figures.LoadedShell):
     bracing_forces: Found[Floats] = Field(
         description="(d,) axial force of each brace, tension positive, of slack cables exactly 0 [N]"
     )
+    bracing_before: Found[Floats] = Field(description="(d,) the same before the loads [N]")
     modes: Found[Floats] = Field(description="(j, n, 3) lowest linear buckling modes, the largest component being 1")
     mode: Found[Floats | None] = Field(description="(n, 3) how the shell gives way at the limit, or None")
 
@@ -161,7 +163,7 @@ def check_shells(
                 missing.pop(0)
             if len(braced):
                 following = partial(_following, partial(_said, progress, f"own weight, {ends} ends"), "")
-                weighed[ends] = self_weight(
+                weighed[ends], _ = self_weight(
                     structure.shell, structure.equilibrium, mass=structure.mass, progress=following
                 )
     except OutOfTimeError as late:
@@ -291,10 +293,13 @@ def loaded_shell(
     judged = partial(utilisation, rod=structure.rod, limits=limits, asked=loads.strength)
     moments = structure.locked_moments(found)
     slip = None if loads.locked_joints is None else loads.locked_joints.slip
-    alone = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration=PERMANENT)
+    erected = (structure.shell, unloaded.state)
+    standing = bending_under(*erected, structure.rod, unloaded.forces[:edges], limits)
+    alone = judged(*erected, forces=unloaded.forces[:edges], duration=None, bent=standing)
     used = judged(
-        shell, found.state, forces=forces, duration=duration, bent=bent, moments=moments, slip_moment=slip
-    ).with_permanent(alone)
+        shell, found.state, forces=forces, duration=duration, bent=bent, before=standing, moments=moments,
+        slip_moment=slip,
+    ).with_permanent(alone)  # fmt: skip
     total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
     shapes, factors = np.zeros((0, n, 3)), np.zeros(0)
     if buckling is not None:
@@ -324,12 +329,13 @@ def loaded_shell(
         utilisation=None if used.governs is None else used.largest[used.governs[0]],
         utilisations=Utilisations(**used.largest),
         euler=float(used.euler.max()),
-        euler_at=_place(mesh, int(np.argmax(used.euler))),
+        euler_at=_place(mesh, largest_at(used.euler)),
         governs=None if used.governs is None else _place(mesh, used.governs[1], used.governs[0]),
         bracing_forces=structure.bracing_forces(found),
+        bracing_before=structure.bracing_forces(unloaded),
         bracing_utilisation=_of_bracing(structure, found, loads, limits, duration),
         joint_moments=moments,
-        joint_moment_at=names[int(np.argmax(np.abs(moments)))] if len(moments) else None,
+        joint_moment_at=names[largest_at(np.abs(moments))] if len(moments) else None,
         slipping=tuple(names[k] for k in _slipping(mesh, used)),
         modes=shapes,
         mode_factors=factors,
@@ -356,9 +362,9 @@ def _of_bracing(
     """Largest utilisation of the bracing; None: there is none, or its strength is not known."""
     bracing, asked, edges = loads.bracing, loads.strength, len(structure.mesh.edges)
     shares = list[float]()
-    for state, lasting in ((found, duration), (structure.equilibrium, PERMANENT)):  # prestress and bends of laths stay
+    for state, lasting in ((found, duration), (structure.equilibrium, None)):  # prestress and bends of laths stay
         if isinstance(bracing, Cables):
-            strength = preset_limits(bracing.rod, asked.service_class).bending.get(lasting)
+            strength = preset_limits(bracing.rod, asked.service_class).bending.get(lasting or PERMANENT)
             pull = float(structure.bracing_forces(state).max(initial=0.0))
             shares += [] if strength is None else [pull / (strength * area_of(bracing.rod))]
         elif (layer := structure.laths) is not None:

@@ -9,7 +9,7 @@ from rodshell.formfinding.pipeline import Stages
 from rodshell.loads.check import tributary_of
 from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, SelfWeight
-from rodshell.loads.tributary import LoadedNodes
+from rodshell.loads.nodes import LoadedNodes
 from rodshell.units import shown
 
 

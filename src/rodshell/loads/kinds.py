@@ -35,7 +35,7 @@ from rodshell.units import read_quantity, shown
 from rodshell.validation import listed, number, point, texts
 
 if TYPE_CHECKING:
-    from rodshell.loads.tributary import LoadedNodes
+    from rodshell.loads.nodes import LoadedNodes
     from rodshell.targets.heightfield import Formula
 
 GRAVITY = 9.81  # [m/s2]

@@ -78,7 +78,7 @@ def _laid_over(
         fine = np.interp(np.arange(SAMPLES * (len(row) - 1) + 1) / SAMPLES, np.arange(len(row)), chord)
         along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(curve(fine), axis=0), axis=1)))
         at = np.interp(chord, fine, along)
-        rods.append(FlatRod.u(f"B{k + 1:0{digits}d}", float(k), 0.0, float(at[-1])))
+        rods.append(FlatRod(f"B{k + 1:0{digits}d}", "free", None, 0.0, float(at[-1]), (0.0, float(k)), (1.0, 0.0)))
         marks.append(at)
         curves.append((curve, fine, along, chord, normals[row]))
     spans = np.concatenate([np.diff(at) for at in marks])

@@ -174,14 +174,19 @@ class Strength:
         Value(_service_class, lambda name, value: whole(name, value, 1, 3)),
         "of timber: 1 inside, 2 covered (default), 3 in the weather",
     ] = None
+    relaxed: Annotated[
+        Share | None, "share of timber's unloaded stress that is gone after months"
+    ] = None  # fmt: skip
     hole: Annotated[Distance, "diameter of the bolts' holes through the rods at joints"] = 0.0
     slip: Annotated[Force | None, "axial force that a joint transfers before it slips"] = None
     effective_length: Annotated[Factor, "effective length of a span between joints, over its length"] = 1.0
 
     def __post_init__(self) -> None:
         others = {"hole": "the diameter of holes", "effective_length": "the effective length",
-                  "service_class": "the service class"}  # fmt: skip
+                  "relaxed": "the {} share of stress", "service_class": "the service class"}  # fmt: skip
         checked(self, dict.fromkeys((*DURATIONS, "erection", "slip"), "the strength ({})") | others)
+        if self.relaxed is not None and self.relaxed >= 1:
+            raise InputError(f"the relaxed share of stress must be below 1, not {self.relaxed:g}: some stress stays")
 
     @property
     def given(self) -> dict[Duration, float]:

@@ -6,7 +6,8 @@ At every node of a rod, with f the design strength for the duration of the loads
     shear      (tau_T + tau_V) / f_v
 
 sigma is the normal stress of both bending moments and the axial force together, sigma_N that of the axial force alone,
-whose strength f_a is below that of bending in timber [EN 1995-1-1, 6.2.3; with k_m = 1]. tau_T is the stress of
+whose strength is f_a. Of timber by a building code bending is that of the code's own rule,
+in which torsion has no part, and shear counts the same (`rods.design_strength`). tau_T is the stress of
 torsion, tau_V of the shear force: 3/2 of its mean in a rectangle, 4/3 in a circle or an ellipse, 2 in a tube. At a
 joint with a hole, stresses are those of the net section. A joint slips where the axial forces of a rod on both of its
 sides differ by more than it can transfer. A locked joint also transfers a moment about its normal (which bends rods
@@ -20,15 +21,15 @@ of the loaded shell has the buckling of spans in it.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from rodshell.arrays import Bools, Floats, Ints, State
-from rodshell.checks.bending import VON_MISES, Bending, bending_of
+from rodshell.arrays import Bools, Floats, Ints, State, largest_at
+from rodshell.checks.bending import VON_MISES, Bending, bending_of, fibre_modulus
 from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
 from rodshell.figures.loads import DesignStrength
@@ -38,7 +39,7 @@ from rodshell.layout import GridMesh
 from rodshell.loads.settings import Strength
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
-from rodshell.rods.design_strength import DESIGN, DURATIONS, DesignFactors, Duration
+from rodshell.rods.design_strength import COVERED, DESIGN, DURATIONS, DesignFactors, Duration
 from rodshell.rods.section import GivenSection, Rod, Section
 from rodshell.validation import brief
 
@@ -51,6 +52,12 @@ class Limits(DesignStrength):
     shear_weight: Found[float] = Field(default=VON_MISES, description="bending over shear strength: checks.bending")
     cracked: Found[float] = Field(default=1.0, description="share of the section that carries shear forces")
     given: Found[bool] = Field(default=False, description="whether strengths were given in place of a preset's")
+    rod: Found[Rod | None] = Field(default=None, description="that is judged")
+    counted: Found[float | None] = Field(
+        default=None, description="bending strength as given, or a preset's characteristic one [Pa]"
+    )
+    strength_of: Found[str | None] = Field(default=None, description="the preset whose strengths these are")
+    shear_strength: Found[float | None] = Field(default=None, description="that goes with it [Pa]; None: von Mises")
 
     @property
     def bending(self) -> dict[Duration, float]:
@@ -58,18 +65,58 @@ class Limits(DesignStrength):
         known = {name: getattr(self, name) for name in DURATIONS}
         return {name: strength for name, strength in known.items() if strength is not None}
 
+    def compared(self, bent: Bending, mesh: GridMesh) -> Floats | None:
+        """(k,) the stress of bending and axial force that stands against the bending strength [Pa]; None: not known."""
+        rod, rules = self.rod, _factors(self.rod) if self.code else None
+        if bent.stress is None or rod is None:
+            return bent.stress
+        axial = bent.axial_strain * rod.stretch_stiffness / area_of(rod)
+        if rules is None:
+            return np.asarray(bent.stress + np.abs(axial) * (1.0 / (self.axial or 1.0) - 1.0))
+        half, widths = rod.section.half_widths, None
+        if rod.section.boxed:
+            widths = 2.0 * np.array(half)
+            if (local := varied_at_nodes(mesh, rod)) is not None:
+                widths = widths * np.column_stack([local.fibre1, local.fibre2])
+        bends = bent.fibre_strains
+        if bends is None:  # towards the farthest point, as if that were the deeper side
+            assert bent.bending_strain is not None
+            bends = np.column_stack([bent.bending_strain, np.zeros(len(axial))])
+            widths = None if widths is None else np.max(widths, axis=-1, keepdims=True) * np.ones(2)
+        return rules.compared(fibre_modulus(rod) * bends, axial, widths)
+
+    def relaxed_stress(self, stress: Floats, bent: Bending, before: Bending, mesh: GridMesh) -> Floats:
+        """(k,) `stress` under permanent loads as it stands against the permanent strength [Pa]: at first by the short
+        one, and after months without what has relaxed of that `before` the loads."""
+        if not self.relaxed or bent.fibre_strains is None or before.fibre_strains is None:
+            return stress
+        gone = {
+            name: getattr(bent, name) - self.relaxed * getattr(before, name)
+            for name in ("fibre_strains", "axial_strain")
+        }
+        left, short, permanent = self.compared(replace(bent, **gone), mesh), self.short, self.permanent
+        assert left is not None
+        return np.maximum(left, stress * (permanent or 0.0) / (short or np.inf))
+
+    def standing(self, bent: Bending, mesh: GridMesh) -> Floats | None:
+        """(k,) as `compared`, of a shell without loads: torsion counts too, against the shear strength."""
+        stress = self.compared(bent, mesh)
+        if stress is None or bent.torsion_stress is None:
+            return stress
+        return np.maximum(stress, self.shear_weight * bent.torsion_stress)
+
     @staticmethod
-    def of(rod: Rod, asked: Strength, *, given: float | None = None, shear_weight: float | None = None) -> "Limits":
+    def of(rod: Rod, asked: Strength, *, given: float | None = None, shear_given: float | None = None) -> "Limits":
         """The limits of a rod: what is `asked`, or else one strength for every duration of load, or else the preset's.
 
         Args:
             given: bending strength [Pa] in place of that of the rod's preset.
-            shear_weight: bending strength over shear strength; default: the preset's.
+            shear_given: shear strength that goes with it [Pa]; default: in the preset's proportion, or by von Mises.
 
         Raises:
             InputError: a service class is given, and nothing depends on it.
         """
-        factors, service = _factors(rod), asked.service_class or 2
+        factors, service = _factors(rod), asked.service_class or COVERED
         moist = factors is not None and len(factors.factors) > 1
         if asked.service_class is not None and (asked.given or not moist):
             raise InputError(
@@ -79,9 +126,12 @@ class Limits(DesignStrength):
         characteristic, shear = None, None
         if (material := rod.material) is not None:
             characteristic, shear = material.bending_strength, material.shear_strength
-        if shear_weight is None:
-            shear_weight = characteristic / shear if characteristic and shear else VON_MISES
+        counted = given or characteristic
+        if given is not None:
+            shear = shear_given or (given * shear / characteristic if characteristic and shear else None)
+        shear_weight = counted / shear if counted and shear else VON_MISES
         bending: dict[Duration, float] = {}
+        rules: DesignFactors | None = None
         source = "no design strength is known"
         if asked.given:
             known: float | None = None
@@ -97,19 +147,38 @@ class Limits(DesignStrength):
             bending = {key: share * characteristic for key, share in factors.by_duration(service).items()}
             source = f"{material.name}, characteristic {1e-6 * characteristic:.4g} MPa; {factors.source}"
             source += f"; service class {service}" if moist else ""
+            rules = factors if factors.code else None
         creep = None
         if factors is not None and factors.creep:
             creep = factors.creep[service - 1 if moist else 0]
+        by_code: dict[str, Any] = dict(bending.items())
+        if asked.hole:
+            by_code["hole"] = asked.hole
+        if rules is not None:
+            by_code |= {"code": rules.code, "service_class": asked.service_class, "relaxed": asked.relaxed}
+            by_code |= {"compression": rules.compression, "stiffness": rules.stiffness}
+            if rod.section.boxed:
+                depths = rules.depth_factor(2.0 * np.array(rod.section.half_widths))
+                by_code |= {"depth": depths, "biaxial": rules.biaxial}
+        elif asked.relaxed is not None:
+            raise InputError(
+                f"strength.relaxed = {asked.relaxed:g}: it is for timber presets that are judged by their code: leave "
+                "it out, or count it in strength.permanent"
+            )
         return Limits(
-            **bending,
+            **by_code,
             erection=asked.erection or bending.get("short"),
-            axial=factors.axial if factors is not None else 1.0,
+            axial=factors.tension if factors is not None else 1.0,
             shear=1.0 / shear_weight,
             shear_weight=shear_weight,
             cracked=factors.cracked if factors is not None else 1.0,
             creep=creep,
             source=source,
             given=bool(asked.given) or given is not None,
+            rod=rod,
+            counted=counted,
+            strength_of=material.name if material and characteristic and not (asked.given or given) else None,
+            shear_strength=shear,
         )
 
 
@@ -120,9 +189,9 @@ def preset_limits(rod: Rod, service_class: int | None) -> Limits:
     return Limits.of(rod, Strength(service_class=service_class if moist else None))
 
 
-def _factors(rod: Rod) -> DesignFactors | None:
+def _factors(rod: Rod | None) -> DesignFactors | None:
     """What building codes make of the strengths of the rod's preset, if it has one that they know."""
-    return None if rod.material is None or rod.material.name is None else DESIGN.get(rod.material.name)
+    return None if rod is None or rod.material is None or rod.material.name is None else DESIGN.get(rod.material.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +217,7 @@ class Utilisation:
     def governs(self) -> tuple[By, int] | None:
         """What is used most, and where; None: nothing is known."""
         by = max(self.uses, key=lambda by: float(self.uses[by].max()), default=None)
-        return None if by is None else (by, int(np.argmax(self.uses[by])))
+        return None if by is None else (by, largest_at(self.uses[by]))
 
     def with_permanent(self, permanent: "Utilisation") -> "Utilisation":
         """The same, where the erected shell's own utilisation counts too, by the permanent strength, and the slip of
@@ -164,15 +233,16 @@ class Utilisation:
 
 def utilisation(
     shell: Shell, state: State, rod: Rod, *,
-    forces: Floats, limits: Limits, asked: Strength, duration: Duration, bent: Bending | None = None,
-    moments: Floats | None = None, slip_moment: float | None = None,
+    forces: Floats, limits: Limits, asked: Strength, duration: Duration | None, bent: Bending | None = None,
+    before: Bending | None = None, moments: Floats | None = None, slip_moment: float | None = None,
 ) -> Utilisation:  # fmt: skip
     """Utilisation of a shell in equilibrium, its source frames being at the state.
 
     Args:
         forces: (e,) axial force of each edge, tension positive [N].
         asked: holes, slip and effective lengths.
-        bent: the shell's bending, where it is known.
+        duration: of the loads; None: there are none, and the rods stay bent.
+        bent, before: the shell's bending, where it is known, and that without loads, of which a part may relax.
         moments: (c,) of locked joints about their normals [N m]; None or empty: none is locked.
         slip_moment: at which locked joints slip [N m]; None: not known.
 
@@ -197,11 +267,11 @@ def utilisation(
         joints = mesh.at_crossings
         np.maximum.at(turned, joints, np.abs(moments)[:, None])
     uses: dict[By, Floats] = {}
-    strength = limits.bending.get(duration)
-    if strength is not None and bent.stress is not None:
+    strength = limits.staying if duration is None else limits.bending.get(duration)
+    if strength is not None and (stress := limits.compared(bent, mesh)) is not None:
+        if duration == "permanent" and before is not None:
+            stress = limits.relaxed_stress(stress, bent, before, mesh)
         net = net_factors(mesh, section, asked.hole)
-        drawn = np.abs(bent.axial_strain) * rod.stretch_stiffness / area_of(rod)
-        stress = bent.stress + drawn * (1.0 / (limits.axial or 1.0) - 1.0)
         uses["bending"] = net * stress / strength
         if bent.torsion_stress is not None and (peak := section.shear_peak) is not None:
             sheared = spans.on_entries(across) * peak / (limits.cracked * area_of(rod) * areas)
@@ -288,7 +358,7 @@ class Spans:
     def of(mesh: GridMesh) -> "Spans":
         """The spans of a mesh."""
         stops = _at_joints(mesh)
-        stops[mesh.rod_start] = stops[mesh.rod_stop - 1] = True
+        stops[mesh.end_entries] = True
         entries = np.flatnonzero(stops)
         rods = mesh.rod_of[entries]
         same = rods[1:] == rods[:-1]

@@ -358,14 +358,11 @@ class _Builder:
     def _bends(self) -> tuple[Elements, ...]:
         """Bending and twist of single rods. Isotropic rods bend without their frames: see `ElasticRod`."""
         mesh, parts = self.mesh, self.parts
-        inner = np.ones(len(mesh.rod_nodes), dtype=bool)
-        inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False
         stiffness = self.stiffness if self.twist else self.stiffness[:, :1]  # without twist angles all are alike
-        nodes, per_length = parts.bends, stiffness.compress(inner, axis=0) / mesh.voronoi_lengths[:, None]
+        nodes, per_length = parts.bends, stiffness[mesh.bend_entries] / mesh.voronoi_lengths[:, None]
         if len(self.ghosts):
             rows = np.column_stack([_inner_nodes(parts), parts.ends.ravel(), self.ghosts])
-            ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
-            at_clamps = stiffness[ends] / (0.5 * last_edges(mesh)[:, None])
+            at_clamps = stiffness[mesh.end_entries] / (0.5 * last_edges(mesh)[:, None])
         if self.isotropic:
             bends, of_bends = nodes, per_length[:, 0]
             if len(self.ghosts):
@@ -390,9 +387,9 @@ class _Builder:
         bend_twist = self._bend_twist(nodes, angles, per_length[:, :2], per_length[:, 2])
         if not self.curved:
             return (bend_twist,)
-        at_rest = mesh.rest_curvatures.compress(inner) * mesh.voronoi_lengths
+        at_rest = mesh.rest_curvatures[mesh.bend_entries] * mesh.voronoi_lengths
         if len(self.ghosts):
-            at_rest = np.append(at_rest, mesh.rest_curvatures[ends] * 0.5 * last_edges(mesh))
+            at_rest = np.append(at_rest, mesh.rest_curvatures[mesh.end_entries] * 0.5 * last_edges(mesh))
         turned = -2.0 * np.tan(0.5 * at_rest)  # m2 = t x z is on the right
         return (replace(bend_twist, natural_curvature=np.column_stack([0.0 * turned, turned])),)
 

@@ -15,11 +15,10 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, NetLimitError
-from rodshell.geometry.curves import nearest_four
+from rodshell.geometry.curves import on_curve
 from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
-from rodshell.layout.flatgrid import Family
-from rodshell.layout.gridlayout import piece_names, rod_names
+from rodshell.layout.gridlayout import FAMILIES, lattice_rod, piece_names, rod_names
 from rodshell.nets.compass import ON_SURFACE, Axes, axes
 from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
@@ -77,10 +76,14 @@ class ChebyshevNet:
     def _along(self, rods: Sequence[FlatRod], start: Ints, s: Floats, nodes: Ints, count: int) -> Floats:
         """Points (count, 3) [m] of the `nodes` (k,) at the material coordinates `s` (k,) [m] of rods one after the
         other, which begin at `start` (m,) in `s`."""
-        offset, across = np.array([rod.offset for rod in rods]), np.array([rod.family == "v" for rod in rods])
-        line = np.where(across, _nearest(self.net.u, offset), _nearest(self.net.v, offset))
         result, start = np.empty((count, 3)), np.append(start, len(s))
-        _interpolate(self.net.u, self.net.v, self.net.points, line, across, start, s, nodes, result)
+        for k, rod in enumerate(rods):
+            first, here = rod.family == FAMILIES[0], slice(start[k], start[k + 1])
+            knots, others = (self.net.u, self.net.v) if first else (self.net.v, self.net.u)
+            line = int(_nearest(others, np.array([rod.offset]))[0])
+            points = self.net.points[:, line] if first else self.net.points[line]
+            known = np.isfinite(points[:, 0])
+            result[nodes[here]] = on_curve(knots[known], points[known], s[here])
         return result
 
     def __repr__(self) -> str:
@@ -264,43 +267,6 @@ def _nearest(ascending: Floats, values: Floats) -> Ints:
     return np.asarray(np.searchsorted(0.5 * (ascending[1:] + ascending[:-1]), values))
 
 
-@njit("f1 f1 f3 i1 b1 i1 f1 i1 f2")
-def _interpolate(u, v, points, line, across, start, s, nodes, result):  # type: ignore[no-untyped-def]
-    """Points of the `nodes` (k,), put into `result`, at the places `s` (k,) of lines of a net, by cubics through the
-    four nearest known nodes.
-
-    line, across : (m,) index of each line in its family, and whether that is family v.
-    start : (m + 1,) where each line begins in `s`.
-    """
-    most = max(len(u), len(v))
-    at, there, shares = np.empty(most), np.empty((most, 3)), np.empty((1, 4))  # the known nodes of a line
-    for m in range(len(line)):
-        knots, count = (v if across[m] else u), 0
-        for n in range(len(knots)):
-            i, j = (line[m], n) if across[m] else (n, line[m])
-            if np.isfinite(points[i, j, 0]):
-                at[count] = knots[n]
-                for d in range(3):
-                    there[count, d] = points[i, j, d]
-                count += 1
-        near, after = min(4, count), 0
-        for e in range(start[m], start[m + 1]):
-            while after > 0 and at[after - 1] >= s[e]:
-                after -= 1
-            while after < count and at[after] < s[e]:
-                after += 1
-            if after < count and at[after] == s[e]:  # itself
-                for d in range(3):
-                    result[nodes[e], d] = there[after, d]
-                continue
-            first = nearest_four(at, s[e], after, 0, count - 1, shares, 0)
-            for d in range(3):
-                value = 0.0
-                for j in range(near):
-                    value += shares[0, j] * there[first + j, d]
-                result[nodes[e], d] = value
-
-
 def _extrapolate(
     target: Target, lines: LatticeLines, nets: tuple[Covering, Covering], spacing: float
 ) -> tuple[tuple[Cuts, Cuts], float, Floats]:
@@ -340,10 +306,8 @@ def _name_rods(
     """Rods from the lines: those of the layout get their names, all other lines are virtual; those that are dropped;
     and the names of the pieces of rods that have several."""
     rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), dict[str, tuple[str, ...]]()
-    families: tuple[tuple[Family, Floats, Cuts], ...] = (("u", lines.v, ends[0]), ("v", lines.u, ends[1]))
     spacing = max(layout.spacing)
-    for family, every, cuts in families:
-        make = FlatRod.u if family == "u" else FlatRod.v
+    for family, (every, cuts) in enumerate(zip((lines.v, lines.u), ends, strict=True)):
         pieces: dict[float, list[list[float]]] = {}  # of each line that touches the target, by its offset
         for offset, piece in zip(every[cuts.line].tolist(), cuts.ends.tolist(), strict=True):
             pieces.setdefault(offset, []).append(piece)
@@ -360,12 +324,15 @@ def _name_rods(
             parts = pieces.pop(offset)
             names = piece_names(name, len(parts))
             for label, (start, end) in zip(names, parts, strict=True):
-                rods.append(make(label, offset, start, end, virtual=label in layout.left_out))
+                rods.append(lattice_rod(family, label, offset, start, end, virtual=label in layout.left_out))
             if len(parts) > 1:
                 broken[name] = tuple(names)
         for offset, parts in pieces.items():
-            labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
-            rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
+            labels = piece_names(f"virtual {FAMILIES[family].upper()} {offset:+.4f}", len(parts))
+            rods += [
+                lattice_rod(family, label, offset, *part, virtual=True)
+                for label, part in zip(labels, parts, strict=True)
+            ]
     return tuple(rods), dropped, broken
 
 
@@ -384,7 +351,7 @@ def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:
         return
 
     def needed(rod: FlatRod) -> float:
-        middle = layout.middle(rod.family)
+        middle = layout.middle(rod)
         return 2 * max(rod.end - middle, middle - rod.start)
 
     longest = max((rod for rod in rods if not rod.virtual), key=needed, default=None)

@@ -153,86 +153,27 @@ def geodesics(
     for k, s in enumerate(steps):
         chords[: len(s), k] = s
     path = np.full((*chords.shape, 3), np.nan)
-    row, turn, change = np.arange(count), np.zeros(count), np.empty(count)
-    here, tangent, flat, normal = start.copy(), direction.copy(), np.empty((count, 3)), np.empty((count, 3))
-    count = _still_going(chords, 0, row, count, here, tangent, turn)
+    here, tangent, turn, going = start.copy(), direction.copy(), np.zeros(count), np.arange(count)
     for n, chord in enumerate(chords):
-        if count == 0:
+        going = going[(chord[going] > 0.0) & np.isfinite(here[going, 0])]
+        if not len(going):
             break
-        going = row[:count]
-        ahead = _begin_chords(chord, going, here, tangent, target.level(here[:count])[1], flat, normal, turn)
+        x, before, step = here[going], tangent[going], chord[going, None]
+        normal = unit(target.level(x)[1])
+        flat = unit(before - np.einsum("mi,mi->m", before, normal)[:, None] * normal)
+        angle = turn[going, None]  # of the last chord out of the tangent plane, the first guess of the next one's
         for _ in range(NEWTON_STEPS):
-            value, gradient = target.level(ahead)
-            if not _turn_chords(chord, going, here, flat, normal, value, gradient, tolerance, turn, change, ahead):
+            value, gradient = target.level(x + step * (np.cos(angle) * flat + np.sin(angle) * normal))
+            slope = (gradient * (np.cos(angle) * normal - np.sin(angle) * flat)).sum(axis=1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                change = value[:, None] / (step * slope[:, None])
+            angle = angle - change
+            if (np.abs(change) < tolerance).all():
                 break
-        count = _end_chords(chords, n, row, here, ahead, tolerance, turn, change, tangent, path)
+        ahead = x + step * (np.cos(angle) * flat + np.sin(angle) * normal)
+        ahead[~((np.abs(angle) < 1.2) & (np.abs(change) < tolerance))[:, 0]] = np.nan
+        tangent[going], turn[going], here[going], path[n, going] = (ahead - x) / step, angle[:, 0], ahead, ahead
     return [path[: len(s), k] for k, s in enumerate(steps)]
-
-
-@njit("f2 i i1 i f2 f2 f1")
-def _still_going(chords, n, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
-    """Of the first `count` geodesics those that have a chord n and were not lost, moved to the front."""
-    left = 0
-    for m in range(count if n < len(chords) else 0):
-        if chords[n, row[m]] > 0.0 and np.isfinite(here[m, 0]):
-            row[left], turn[left] = row[m], turn[m]
-            for k in range(3):
-                here[left, k], tangent[left, k] = here[m, k], tangent[m, k]
-            left += 1
-    return left
-
-
-@njit("f1 i1 f2 f2 f2 f2 f2 f1")
-def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # type: ignore[no-untyped-def]
-    """Unit normals at the points `here`, unit tangents `flat` across them, and a first guess (n, 3) of the next points:
-    chords that `turn` out of the tangent plane as the last ones did."""
-    ahead = np.empty((len(row), 3))
-    for m in range(len(row)):
-        steep, out, square = np.sqrt(dot(gradient[m], gradient[m])), 0.0, 0.0
-        for k in range(3):
-            normal[m, k] = gradient[m, k] / steep
-            out += tangent[m, k] * normal[m, k]
-        for k in range(3):
-            flat[m, k] = tangent[m, k] - out * normal[m, k]
-            square += flat[m, k] * flat[m, k]
-        cos, sin = np.cos(turn[m]), np.sin(turn[m])
-        for k in range(3):
-            flat[m, k] /= np.sqrt(square)
-            ahead[m, k] = here[m, k] + chord[row[m]] * (cos * flat[m, k] + sin * normal[m, k])
-    return ahead
-
-
-@njit("f1 i1 f2 f2 f2 f1 f2 f f1 f1 f2")
-def _turn_chords(  # type: ignore[no-untyped-def]
-    chord, row, here, flat, normal, value, gradient, tolerance, turn, change, ahead
-):
-    """One Newton step of the angles `turn` between chords and tangent planes, in place, with the points `ahead` that
-    follow. Returns whether another step is needed."""
-    going = False
-    for m in range(len(row)):
-        cos, sin, slope, h = np.cos(turn[m]), np.sin(turn[m]), 0.0, chord[row[m]]
-        for k in range(3):
-            slope += gradient[m, k] * (cos * normal[m, k] - sin * flat[m, k])
-        change[m] = value[m] / (h * slope)
-        turn[m] -= change[m]
-        cos, sin = np.cos(turn[m]), np.sin(turn[m])
-        for k in range(3):
-            ahead[m, k] = here[m, k] + h * (cos * flat[m, k] + sin * normal[m, k])
-        if not abs(change[m]) < tolerance:
-            going = True
-    return going
-
-
-@njit("f2 i i1 f2 f2 f f1 f1 f2 f3")
-def _end_chords(chords, n, row, here, ahead, tolerance, turn, change, tangent, path):  # type: ignore[no-untyped-def]
-    """Continue from the points `ahead` (m, 3), at which the chords n of the first m geodesics of `row` end; NaN in
-    `path` (len(chords), k, 3) for those that found none. Returns how many have a next chord, see `_still_going`."""
-    for m in range(len(ahead)):
-        lost = not (abs(turn[m]) < 1.2 and abs(change[m]) < tolerance)
-        for k in range(3):
-            tangent[m, k] = (ahead[m, k] - here[m, k]) / chords[n, row[m]]
-            here[m, k] = path[n, row[m], k] = np.nan if lost else ahead[m, k]
-    return _still_going(chords, n + 1, row, len(ahead), here, tangent, turn)
 
 
 def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tolerance: float = TOLERANCE) -> None:
@@ -251,7 +192,9 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
         if len(nodes) == 0:
             return
         found, change, sine = _compass(target, net.heights, known, chords, tolerance)
-        _keep(nodes, found, chords, change, sine, tolerance, net.points, tried)
+        # none that did not converge, nor where the net folds: (P - B) x (P - A) no longer points along the normal
+        good = (change < tolerance) & (sine * chords[2] > SMALLEST_SINE)
+        net.points[tuple(nodes.T)], tried[tuple(nodes.T)] = np.where(good[:, None], found, np.nan), True
 
 
 @njit("f3 b2 f1 f1 i i i")
@@ -301,18 +244,6 @@ def _compass(
         if not _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, change, sine):
             break
     return p, change, sine
-
-
-@njit("i2 f2 f2 f1 f1 f f3 b2")
-def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type: ignore[no-untyped-def]
-    """Put the points that were `found` (n, 3) in their places; not those that did not converge, nor where the net
-    folds: (P - B) x (P - A) no longer points along the normal."""
-    for n in range(len(nodes)):
-        i, j = nodes[n, 0], nodes[n, 1]
-        tried[i, j] = True
-        good = change[n] < tolerance and sine[n] * chords[2, n] > SMALLEST_SINE
-        for k in range(3):
-            points[i, j, k] = found[n, k] if good else np.nan
 
 
 @njit("f2 f2 f2 f2 ff f1 f2 f3 f f1 f1")

@@ -1,7 +1,6 @@
 """Where the lines of a net end on a target: runs of inside nodes, and the cuts between nodes."""
 
 from collections.abc import Sequence
-from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -72,61 +71,18 @@ def _region(target: Target, net: Net) -> Bools:
 
     A square of nodes whose corners are closer to its middle than the end is needs only one evaluation.
     """
-    middles, points, way = _squares(net.points, net.u, net.v)
-    asked, points, inside = _by_squares(net.points, middles, target.margin(points), way)
-    _set_inside(asked, target.margin(points), inside)
-    return np.asarray(inside)
-
-
-@njit("f3 f1 f1")
-def _squares(points, u, v):  # type: ignore[no-untyped-def]
-    """The middle of each square of nodes that are all known: its indices (n, 2) and point (n, 3); and path lengths (n,)
-    to the square's corners."""
-    half, count = SQUARE // 2, 0
-    middles = np.empty(((len(u) // SQUARE) * (len(v) // SQUARE), 2), dtype=np.intp)
-    at, way = np.empty((len(middles), 3)), np.empty(len(middles))
-    for i in range(half, len(u) - half, SQUARE):
-        for j in range(half, len(v) - half, SQUARE):
-            known = True
-            for p in range(i - half, i + half + 1):
-                for q in range(j - half, j + half + 1):
-                    known &= not np.isnan(points[p, q, 0])
-            if known:
-                middles[count, 0], middles[count, 1] = i, j
-                for k in range(3):
-                    at[count, k] = points[i, j, k]
-                way[count] = max(u[i + half] - u[i], u[i] - u[i - half]) + max(v[j + half] - v[j], v[j] - v[j - half])
-                count += 1
-    return middles[:count], at[:count], way[:count]
-
-
-@njit("f3 i2 f1 f1")
-def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
-    """Indices (m, 2) and points (m, 3) of the known nodes that are in no square whose end is further than its corners;
-    and which of the other nodes (nu, nv) are inside."""
-    nu, nv = points.shape[:2]
-    half, count = SQUARE // 2, 0
-    inside, clear = np.zeros((nu, nv), dtype=np.bool_), np.zeros((nu, nv), dtype=np.bool_)
-    asked, at = np.empty((nu * nv, 2), dtype=np.intp), np.empty((nu * nv, 3))
-    for n in range(len(middles)):
-        if abs(margin[n]) > way[n]:
-            for i in range(middles[n, 0] - half, middles[n, 0] + half + 1):
-                for j in range(middles[n, 1] - half, middles[n, 1] + half + 1):
-                    clear[i, j], inside[i, j] = True, margin[n] > 0.0
-    for i in range(nu):
-        for j in range(nv):
-            if not clear[i, j] and not np.isnan(points[i, j, 0]):
-                asked[count, 0], asked[count, 1] = i, j
-                for k in range(3):
-                    at[count, k] = points[i, j, k]
-                count += 1
-    return asked[:count], at[:count], inside
-
-
-@njit("i2 f1 b2")
-def _set_inside(asked, margin, inside):  # type: ignore[no-untyped-def]
-    for n in range(len(asked)):
-        inside[asked[n, 0], asked[n, 1]] = margin[n] > 0.0
+    half, known = SQUARE // 2, np.isfinite(net.points[..., 0])
+    count = known.shape[0] // SQUARE, known.shape[1] // SQUARE
+    in_squares = known[: count[0] * SQUARE, : count[1] * SQUARE].reshape(count[0], SQUARE, count[1], SQUARE)
+    squares = np.nonzero(in_squares.all(axis=(1, 3)))
+    i, j = (SQUARE * row + half for row in squares)
+    reach = [np.maximum(s[k + half] - s[k], s[k] - s[k - half]) for s, k in ((net.u, i), (net.v, j))]
+    margin, signs, side = target.margin(net.points[i, j]), np.zeros(count), np.zeros(known.shape)
+    signs[squares] = np.sign(margin) * (np.abs(margin) > reach[0] + reach[1])
+    side[: count[0] * SQUARE, : count[1] * SQUARE] = signs.repeat(SQUARE, axis=0).repeat(SQUARE, axis=1)
+    asked, inside = known & (side == 0), side > 0
+    inside[asked] = target.margin(net.points[asked]) > 0
+    return inside
 
 
 class Lines(NamedTuple):
@@ -152,33 +108,18 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
         depth: pieces that are nowhere further inside than this only graze the end and are ignored [m].
     """
     runs = _deep(target, sets, [_runs(lines.inside) for lines in sets], depth)
-    count = 2 * sum(len(run) for run in runs)
-    knots, points = np.empty((count, 4)), np.empty((count, 4, 3))
-    outer, inner = np.empty(count), np.empty(count)
-    stops = list(accumulate((2 * len(run) for run in runs), initial=0))
-    for (s, nodes, _), run, begin, stop in zip(sets, runs, stops, stops[1:], strict=False):
-        here = slice(begin, stop)
-        _around_ends(s, nodes, run, knots[here], points[here], outer[here], inner[here])
-    ends = _roots(target, knots, points, outer, inner).reshape(-1, 2)
-    return [
-        Cuts(run[:, 0].copy(), ends[begin // 2 : stop // 2])
-        for run, begin, stop in zip(runs, stops, stops[1:], strict=False)
-    ]
+    around = [_around_ends(lines, run) for lines, run in zip(sets, runs, strict=True)]
+    ends = _roots(target, *(np.concatenate(parts) for parts in zip(*around, strict=True))).reshape(-1, 2)
+    pieces = np.split(ends, np.cumsum([len(run) for run in runs])[:-1])
+    return [Cuts(run[:, 0].copy(), piece) for run, piece in zip(runs, pieces, strict=True)]
 
 
-@njit("b2")
-def _runs(inside):  # type: ignore[no-untyped-def]
+def _runs(inside: Bools) -> Ints:
     """(k, 3) the line, the first and the last node of each run of nodes of `inside` (m, n)."""
-    lines, nodes = inside.shape
-    runs, count = np.empty((lines * ((nodes + 1) // 2), 3), dtype=np.intp), 0
-    for m in range(lines):
-        for n in range(nodes):
-            if inside[m, n]:
-                if n == 0 or not inside[m, n - 1]:
-                    runs[count, 0], runs[count, 1] = m, n
-                    count += 1
-                runs[count - 1, 2] = n
-    return runs[:count].copy()
+    begins, ends = inside.copy(), inside.copy()
+    begins[:, 1:] &= ~inside[:, :-1]
+    ends[:, :-1] &= ~inside[:, 1:]
+    return np.column_stack([*np.nonzero(begins), np.nonzero(ends)[1]])
 
 
 def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float) -> list[Ints]:
@@ -198,24 +139,18 @@ def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float)
     return kept
 
 
-@njit("f1 f3 i2 f2 f3 f1 f1")
-def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[no-untyped-def]
-    """Four nodes around both ends of each of the `runs` (k, 3): their places `knots` (2k, 4) and points `around`
-    (2k, 4, 3); and the places of the nodes between which the end is, `outer` and `inner` (2k,)."""
-    for e in range(len(outer)):
-        line, last = runs[e // 2, 0], e % 2 == 1
-        i = runs[e // 2, 2] if last else runs[e // 2, 1] - 1  # the cut is between nodes i and i + 1
-        outer[e], inner[e] = (s[i + 1], s[i]) if last else (s[i], s[i + 1])
-        window = min(max(i - 1, 0), len(s) - 4)
-        for shift in (-1, 1):  # near the net's limit, four nodes further inside
-            for k in range(window, window + 4):
-                if not np.isfinite(points[line, k, 0]):
-                    window = min(max(i - 1 + shift, 0), len(s) - 4)
-                    break
-        for k in range(4):
-            knots[e, k] = s[window + k]
-            for d in range(3):
-                around[e, k, d] = points[line, window + k, d]
+def _around_ends(lines: Lines, runs: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+    """Four nodes around both ends of each of the `runs` (k, 3): their places (2k, 4) and points (2k, 4, 3); and the
+    places (2k,) of the nodes outside and inside, between which the end is."""
+    s, most, line = lines.s, len(lines.s) - 4, runs[:, :1].repeat(2, axis=0)
+    last = np.tile([0, 1], len(runs))
+    i = runs[:, 1:].ravel() + last - 1  # the cut is between nodes i and i + 1
+    window = np.clip(i - 1, 0, most)
+    for shift in (-1, 1):  # near the net's limit, four nodes further inside
+        lost = ~np.isfinite(lines.points[line, window[:, None] + np.arange(4), 0]).all(axis=1)
+        window = np.where(lost, np.clip(i - 1 + shift, 0, most), window)
+    four = window[:, None] + np.arange(4)
+    return s[four], lines.points[line, four], s[i + last], s[i + 1 - last]
 
 
 def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: Floats) -> Floats:

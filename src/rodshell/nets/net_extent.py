@@ -6,14 +6,13 @@ same net in longer steps; the first of these nets has only a few long steps.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
-from rodshell.kernels import njit
 from rodshell.layout import GridLayout
-from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import auto_edge
 from rodshell.layout.mesh import MOST_NODES, edge_counts
 from rodshell.nets.compass import ON_SURFACE, Axes, Heights, Net, fill_quadrants, lay_axes
@@ -98,45 +97,26 @@ def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats
 
 
 def _want_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats, wanted: Bools) -> bool:
-    """Add to the nodes `wanted` (nu, nv) those of `wanted_nodes`; return whether any was not wanted before."""
-    if near.inside.any():
-        return bool(_want(near.inside, near.u, near.v, past, u, v, *margin, wanted))
-    added = not wanted.all()
-    wanted[:] = True
-    return added
-
-
-@njit("b2 f1 f1 i f1 f1 f f b2")
-def _want(inside, known_u, known_v, past, u, v, margin_u, margin_v, wanted):  # type: ignore[no-untyped-def]
-    """Add to the `wanted` nodes, see `wanted_nodes`; return whether any was not wanted before. In each quadrant they
-    are below a staircase that only descends, away from the axis."""
-    i_axis, j_axis, (nu, nv) = np.argmin(np.abs(u)), np.argmin(np.abs(v)), inside.shape
-    added = False
-    for quadrant in range(4):
-        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
-        ends, height = np.full(nu + 1, np.inf), np.full(nu + 1, -np.inf)  # end and height of each step
-        for k in range(nu - 1, -1, -1):
-            i, height[k] = (k if i_side > 0 else nu - 1 - k), height[k + 1]
-            ends[k] = i_side * known_u[min(max(i + i_side * past, 0), nu - 1)]
-            for m in range(nv - 1, -1, -1):
-                j = m if j_side > 0 else nv - 1 - m
-                if inside[i, j]:
-                    height[k] = max(height[k], j_side * known_v[min(max(j + j_side * past, 0), nv - 1)])
-                    break
-        k, shifted, count = 0, 0, len(v) - j_axis if j_side > 0 else j_axis + 1
-        for i in range(i_axis, len(u) if i_side > 0 else -1, i_side):
-            while ends[k] < abs(u[i]):
-                k += 1
-            while ends[shifted] + margin_u < abs(u[i]):
-                shifted += 1
-            highest = max(height[shifted], height[k] + margin_v)
-            while count > 0 and abs(v[j_axis + j_side * (count - 1)]) > highest:
-                count -= 1
-            first = j_axis if j_side > 0 else j_axis + 1 - count
-            for j in range(first, first + count):
-                added |= not wanted[i, j]
-                wanted[i, j] = True
-    return added
+    """Add to the nodes `wanted` (nu, nv) those of `wanted_nodes`; return whether any was not wanted before. In each
+    quadrant they are below a staircase that only descends, away from the axis."""
+    before, (i, j) = int(wanted.sum()), (int(np.abs(s).argmin()) for s in (u, v))
+    if not near.inside.any():
+        wanted[:] = True
+        return before < wanted.size
+    for i_side, j_side in product((1, -1), (1, -1)):
+        inside = near.inside[::i_side, ::j_side]
+        ends, heights = (
+            side * known[::side][np.clip(np.arange(len(known)) + past, 0, len(known) - 1)]
+            for side, known in ((i_side, near.u), (j_side, near.v))
+        )
+        last = inside.shape[1] - 1 - inside[:, ::-1].argmax(axis=1)
+        steps = np.append(np.where(inside.any(axis=1), heights[last], -np.inf), -np.inf)
+        steps = np.maximum.accumulate(steps[::-1])[::-1]  # height of each step up to its end
+        along, across = np.abs(u[i::i_side]), np.abs(v[j::j_side])
+        here, shifted = np.searchsorted(ends, along), np.searchsorted(ends + margin[0], along)
+        highest = np.maximum(steps[shifted], steps[here] + margin[1])
+        wanted[i::i_side, j::j_side] |= across <= highest[:, None]
+    return int(wanted.sum()) > before
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +173,7 @@ def find_lines(
         if (needed <= reach + 1e-12).all():
             break
         reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
-    u, v = _lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3])
+    u, v = _lattice(layout, 1, needed[0], needed[1]), _lattice(layout, 0, needed[2], needed[3])
     across, along = _steps(u, layout.edge), _steps(v, layout.edge)
     _refuse_too_many(target, layout, int(across.sum()) + 1, int(along.sum()) + 1)
     return LatticeLines(u, v, (_divided(u, across), _divided(v, along))), near
@@ -223,9 +203,9 @@ def _around(inside: Bools) -> Bools:
     return around
 
 
-def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:
+def _lattice(layout: GridLayout, family: int, below: float, above: float) -> Floats:
     """Offsets of the lattice lines of a family from -below to above, and of the axis."""
-    spacing = layout.spacing[0 if family == "u" else 1]
+    spacing = layout.spacing[family]
     offsets = layout.lattice(family, -below, above)
     offsets[np.abs(offsets) < 1e-9 * spacing] = 0.0
     return offsets if (offsets == 0.0).any() else np.sort(np.append(offsets, 0.0))

@@ -8,7 +8,7 @@ three rounds, whatever the number of nodes. The equations, and so the net, are t
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import resampled
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
@@ -78,19 +78,8 @@ def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
     if coarse <= _CLEARLY * fine:
         return near
     points = interpolated(coarser, near.u, near.v)
-    _add_change(near.points, points, (fine - requested) / (coarse - fine))
-    return Net(near.u, near.v, points)
-
-
-@njit("f3 f3 f")
-def _add_change(near, coarser, share):  # type: ignore[no-untyped-def]
-    """Put into `coarser` (nu, nv, 3) the points `near` (nu, nv, 3) with a share of their change from there, if both are
-    known."""
-    for i in range(near.shape[0]):
-        for j in range(near.shape[1]):
-            for k in range(3):
-                change = near[i, j, k] - coarser[i, j, k]
-                coarser[i, j, k] = near[i, j, k] + share * (0.0 if np.isnan(change) else change)
+    share = (fine - requested) / (coarse - fine)
+    return Net(near.u, near.v, near.points + share * np.nan_to_num(near.points - points))
 
 
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
@@ -102,10 +91,10 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
 
 def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> bool:
     """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
-    i0, j0 = net.origin
     starts = np.repeat(start.anchor[None], 4, axis=0)
-    net.points[i0, j0] = start.anchor
-    points, steps, stops = _arms(net.points, net.u, net.v, i0, j0)
+    net.points[net.origin] = start.anchor
+    rows, columns, steps, stops = _arms(net)
+    points = net.points[rows, columns]
     if not np.isfinite(points).all():
         return False
     layers = list[tuple[Layer, slice]]()
@@ -128,40 +117,23 @@ def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> boo
         return False
     if layers:
         points = np.concatenate([layer.below(points[part]) for layer, part in layers])
-    _put_arms(points, stops, i0, j0, net.points)
+    net.points[rows, columns] = points
     return True
 
 
-@njit("f3 f1 f1 i i")
-def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
-    """The nodes (n, 3) of the axes but the anchor, one arm after the other, outwards as `Axes.tangents`; the
-    steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
-    stops = np.zeros(5, dtype=np.intp)
-    for arm in range(4):
-        lines, origin = (u, i0) if arm < 2 else (v, j0)
-        stops[arm + 1] = stops[arm] + (len(lines) - 1 - origin if arm % 2 == 0 else origin)
-    x, steps = np.empty((stops[4], 3)), np.empty(stops[4])
-    for arm in range(4):
-        side = 1 - 2 * (arm % 2)
-        for n in range(stops[arm], stops[arm + 1]):
-            k = side * (n - stops[arm] + 1)
-            i, j = (i0 + k, j0) if arm < 2 else (i0, j0 + k)
-            steps[n] = side * ((u[i] - u[i - side]) if arm < 2 else (v[j] - v[j - side]))
-            for d in range(3):
-                x[n, d] = points[i, j, d]
-    return x, steps, stops
-
-
-@njit("f2 i1 i i f3")
-def _put_arms(x, stops, i0, j0, points):  # type: ignore[no-untyped-def]
-    for arm in range(4):
-        for n in range(stops[arm], stops[arm + 1]):
-            k = (1 - 2 * (arm % 2)) * (n - stops[arm] + 1)
-            for d in range(3):
-                if arm < 2:
-                    points[i0 + k, j0, d] = x[n, d]
-                else:
-                    points[i0, j0 + k, d] = x[n, d]
+def _arms(net: Net) -> tuple[Ints, Ints, Floats, Ints]:
+    """The nodes (n,) of the axes but the anchor by their indices, one arm after the other, outwards as `Axes.tangents`;
+    the steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
+    i0, j0 = net.origin
+    (right, left), (ahead, back) = (
+        (np.arange(origin + 1, len(lines)), np.arange(origin - 1, -1, -1))
+        for origin, lines in ((i0, net.u), (j0, net.v))
+    )
+    stops = np.cumsum([0, len(right), len(left), len(ahead), len(back)])
+    rows = np.concatenate([right, left, np.full(len(ahead) + len(back), i0)])
+    columns = np.concatenate([np.full(len(right) + len(left), j0), ahead, back])
+    du, dv = np.diff(net.u), np.diff(net.v)
+    return rows, columns, np.concatenate([du[i0:], du[:i0][::-1], dv[j0:], dv[:j0][::-1]]), stops
 
 
 @njit("f2 f2 f1 i1 f2 f1 f2 f3")
@@ -219,8 +191,12 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
     A round evaluates the target only where the last one moved a node: elsewhere its model is still good.
     """
     i0, j0 = net.origin
-    row, moved, new = np.empty(wanted.shape, dtype=np.intp), np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
-    models, whole = _chosen(net.points, wanted, i0, j0, row)
+    row, moved, new = np.full(wanted.shape, -1), np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
+    asked = wanted.copy()
+    asked[i0], asked[:, j0] = True, True
+    known = asked & np.isfinite(net.points[..., 0])
+    models, whole = net.points[known], bool(known.sum() == asked.sum())
+    row[known], net.points[~known] = np.arange(len(models)), np.nan
     value, gradient, hessian = target.implicit(models)
     layered, limit = net.heights != ON_SURFACE, converged * target.size
     tolerance = converged**1.5 if layered else converged
@@ -235,53 +211,15 @@ def _refine(target: Target, net: Net, wanted: Bools, converged: float) -> bool:
         whole &= found
         if furthest < limit:
             return bool(whole)
-        rows = _rows_to_renew(net.points, row, moved, limit, new, models)
-        now = target.implicit(models.take(rows, axis=0))
+        new[:] = moved >= limit
+        rows = row[new]
+        models[rows] = net.points[new]
+        now = target.implicit(models[rows])
         if not layered and np.abs(now.value).max() <= converged**3 * target.size:
             return bool(whole)  # models with F = 0 there were exact, as those of quadrics are
         value[rows], gradient[rows], hessian[rows] = now
     _forget(net.points, moved >= limit, i0, j0)
     return False
-
-
-@njit("f3 b2 i i i2")
-def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
-    """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes, the others become NaN;
-    and whether there is one of each. `row` (nu, nv) is the index of each in the result, -1 for the others."""
-    chosen, count, whole = np.empty((row.size, 3)), 0, True
-    for i in range(row.shape[0]):
-        for j in range(row.shape[1]):
-            asked, row[i, j] = wanted[i, j] or i == i0 or j == j0, -1
-            if asked and not np.isnan(points[i, j, 0]):
-                row[i, j] = count
-                for k in range(3):
-                    chosen[count, k] = points[i, j, k]
-                count += 1
-            else:
-                whole &= not asked
-                for k in range(3):
-                    points[i, j, k] = np.nan
-    return chosen[:count], whole
-
-
-@njit("f3 i2 f2 f b2 f2")
-def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-untyped-def]
-    """The rows (n,) of nodes that have `moved` by more than the `limit`, whose `models` are put where they are now and
-    which alone are `new`."""
-    count = 0
-    for i in range(row.shape[0]):
-        for j in range(row.shape[1]):
-            new[i, j] = moved[i, j] >= limit
-            count += new[i, j]
-    rows, filled = np.empty(count, dtype=np.intp), 0
-    for i in range(row.shape[0]):
-        for j in range(row.shape[1]):
-            if new[i, j]:
-                rows[filled] = row[i, j]
-                filled += 1
-                for k in range(3):
-                    models[row[i, j], k] = points[i, j, k]
-    return rows
 
 
 @njit("f3 f2 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2 f")

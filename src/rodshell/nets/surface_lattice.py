@@ -3,21 +3,25 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, sin
+from typing import NamedTuple, Self
 
 import numpy as np
+from scipy.ndimage import label, maximum_position
 
-from rodshell.arrays import Floats
-from rodshell.errors import InputError
+from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError, NetLimitError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout.flatgrid import Crossings
 from rodshell.layout.gridlayout import piece_names
 from rodshell.layout.lattices import Curves, Geodesic, SurfaceLattice
 from rodshell.nets.drawn_curves import drawn_curves
-from rodshell.nets.surface_curves import SurfaceCurves, asymptotic, geodesic, trace
+from rodshell.nets.surface_curves import Law, SurfaceCurves, asymptotic, geodesic, trace
 from rodshell.targets import Target
 from rodshell.units import length_text
 
-LETTERS = "UVW"  # of the families
+FAMILIES = "uvw"
+SHORTEST = 3.0  # spacings: a shorter rod in a corner has too few joints not to swing
+PLACES = 24  # on an outermost rod at which room next to it is looked for
 MOVED = 1e-3  # of the size: lines that lie further off the target are said to be moved
 
 
@@ -28,6 +32,7 @@ class SurfaceNet:
     Args:
         curves: of the rods, from past an end of the target to past another.
         names: of the rods.
+        families: of the rods, by their names; "free" of those along lines that are given.
         crossings: of the rods, with the arc lengths of `curves`.
         warnings: sentences.
     """
@@ -35,6 +40,7 @@ class SurfaceNet:
     lattice: SurfaceLattice
     curves: SurfaceCurves
     names: tuple[str, ...]
+    families: tuple[str, ...]
     crossings: Crossings
     warnings: tuple[str, ...] = ()
 
@@ -87,20 +93,99 @@ def surface_net(target: Target, lattice: SurfaceLattice, *, anchor: tuple[float,
     law = geodesic if isinstance(lattice, Geodesic) else asymptotic
     headings = _of_geodesics(target, place, lattice) if law is geodesic else _of_asymptotes(target, place, lattice)
     guides = trace(target, law, np.repeat(place, len(headings), axis=0), _across(target, place, headings, law))
-    points, tangents, family = list[Floats](), list[Floats](), list[int]()
+    families = list[_Family]()
     for k in range(len(headings)):
         shift = 0.5 if k == 2 else 0.0  # of three families: else three rods nearly meet
         spacing = lattice.spacings[k]
         low, high = guides.ends[k] / spacing
         s = spacing * (np.arange(np.ceil(low - shift), np.floor(high - shift) + 1) + shift)
         x, along = guides.at(np.full(len(s), k), s)
-        points.append(x)
-        tangents.append(_off(target, x, along, law))
-        family += [k] * len(s)
-    curves = trace(target, law, np.concatenate(points), np.concatenate(tangents))
-    families = np.array(family)
-    names = [f"{LETTERS[k]}{number:02d}" for k in range(len(headings)) for number in range(1, family.count(k) + 1)]
-    return SurfaceNet(lattice, curves, tuple(names), curves.crossings(families))
+        families.append(_Family(spacing, x, _off(target, x, along, law)))
+    curves = _trace_all(target, law, families)
+    if _fill_corners(target, law, families, curves):
+        curves = _trace_all(target, law, families)
+    counts = [len(family.points) for family in families]
+    names = [f"{FAMILIES[k].upper()}{number:02d}" for k in range(len(counts)) for number in range(1, counts[k] + 1)]
+    return _joined(lattice, curves, names, np.repeat(np.arange(len(counts)), counts))
+
+
+def _joined(lattice: SurfaceLattice, curves: SurfaceCurves, names: list[str], family: Ints) -> SurfaceNet:
+    """The rods with their joints, and a warning where those of one family cross, which no joint holds."""
+    every = curves.crossings(np.arange(len(curves)))
+    within = family[every.rods[:, 0]] == family[every.rods[:, 1]]
+    low, high = curves.ends[every.rods].transpose(2, 0, 1)
+    built = [name not in lattice.left_out for name in names]
+    met = within & ((low <= every.at) & (every.at <= high)).all(axis=1) & np.array(built)[every.rods].all(axis=1)
+    warnings = tuple[str, ...]()
+    if met.any():
+        first, second = (names[k] for k in every.rods[np.argmax(met)])
+        warnings = (
+            "rods of one family cross each other without a joint, as the target's curvature makes them converge: "
+            f"{np.count_nonzero(met)} times, such as {first} and {second}; leave some of them out (layout.left_out), "
+            "or choose a larger spacing, another anchor or heading",
+        )
+    of = tuple(FAMILIES[k] for k in family)
+    return SurfaceNet(lattice, curves, tuple(names), of, every.select(~within), warnings)
+
+
+class _Family(NamedTuple):
+    """Rods of one family in their order across it: their spacing [m], points (n, 3) and their tangents (n, 3) there."""
+
+    spacing: float
+    points: Floats
+    tangents: Floats
+
+    def with_rod(self, last: bool, point: Floats, tangent: Floats) -> Self:
+        """With one more rod, as the last or the first one."""
+        place = len(self.points) if last else 0
+        return self._replace(
+            points=np.insert(self.points, place, point, axis=0),
+            tangents=np.insert(self.tangents, place, tangent, axis=0),
+        )
+
+
+def _trace_all(target: Target, law: Law, families: list[_Family]) -> SurfaceCurves:
+    return trace(target, law, *(np.concatenate([family[part] for family in families]) for part in (1, 2)))
+
+
+def _fill_corners(target: Target, law: Law, families: list[_Family], rods: SurfaceCurves) -> bool:
+    """Add rods on both sides of families, where the target continues next to the curves that set them out.
+
+    Along each part of an outermost rod that has room next to it, a rod is laid a spacing away, where there is most. One
+    that is shorter than three spacings would swing, and is left out.
+
+    Args:
+        rods: of the families, one after the other.
+
+    Returns:
+        Whether there are any.
+    """
+    family, last = np.divmod(np.arange(2 * len(families)), 2)
+    stop = np.cumsum([len(each.points) for each in families])
+    outer = np.column_stack([np.append(0, stop[:-1]), stop - 1]).ravel()
+    share, added = (np.arange(PLACES) + 0.5) / PLACES, False
+    while len(outer):
+        ends = rods.ends[outer]
+        x, along = rods.at(np.repeat(outer, PLACES), (ends[:, :1] + np.diff(ends) * share).ravel())
+        outward = np.where(last, -1.0, 1.0)[:, None]
+        try:
+            across = trace(target, law, x, np.repeat(outward, PLACES, axis=0) * _off(target, x, along, law))
+        except NetLimitError:  # one of them does not arrive
+            break
+        spacing = np.array([each.spacing for each in families])[family]
+        room = across.ends[:, 1].reshape(-1, PLACES)
+        parts, count = label(room > spacing[:, None], structure=[[0, 0, 0], [1, 1, 1], [0, 0, 0]])
+        if not count:
+            break
+        of, place = np.array(maximum_position(room, parts, np.arange(1, count + 1)), dtype=np.intp).T
+        x, along = across.at(of * PLACES + place, spacing[of])
+        tangents = _off(target, x, -outward[of] * along, law)
+        rods = trace(target, law, x, tangents)
+        outer = np.flatnonzero(np.diff(rods.ends)[:, 0] > SHORTEST * spacing[of])
+        family, last = family[of[outer]], last[of[outer]]
+        for k, end, point, tangent in zip(family, last, x[outer], tangents[outer], strict=True):
+            families[k], added = families[k].with_rod(bool(end), point, tangent), True
+    return added
 
 
 def _of_lines(target: Target, lattice: Curves) -> SurfaceNet:
@@ -114,7 +199,7 @@ def _of_lines(target: Target, lattice: Curves) -> SurfaceNet:
     warnings = tuple[str, ...]()
     if moved > MOVED * target.size:
         warnings = (f"the lines of the rods lie up to {length_text(moved)} off the target, and were moved onto it",)
-    return SurfaceNet(lattice, curves, tuple(names), curves.crossings(line), warnings)
+    return SurfaceNet(lattice, curves, tuple(names), ("free",) * len(names), curves.crossings(line), warnings)
 
 
 def _normal(target: Target, x: Floats) -> Floats:

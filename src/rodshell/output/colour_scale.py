@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import document, label, number, tag
 from rodshell.results.archive import Archive, made_once
 from rodshell.results.states import is_shell, shells_among
+from rodshell.results.strength_used import by_code
 from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
 
@@ -69,12 +70,8 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
             there is no target.
     """
     nodes = archive.states["rod_nodes"]
-    if colour == "stress":
-        return None if shape.stress is None else _stress_scale(archive, shape)
-    if colour == "curvature":
-        return None if shape.curvature is None else _curvature_scale(archive, shape)
-    if colour == "force":
-        return None if shape.force is None else _force_scale(archive, shape)
+    if colour != "gap":
+        return _SCALES[colour](archive, shape, shape.known[colour]) if colour in shape.known else None
     if shape.gap is not None:
         return gap_scale(shape.gap[nodes], _largest_of_all_gaps(archive))
     if shape.flat or archive.results.target:
@@ -94,7 +91,7 @@ def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
     """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too."""
     assert shape.gap is not None
     points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
-    worst = int(np.argmax(np.abs(gaps)))
+    worst = largest_at(np.abs(gaps))
     found = next((gap for ends, gap in archive.results.agreement.items() if shape.name == f"popped_{ends}"), None)
     if found is None or found.where is None or found.max is None:
         return float(gaps[worst]), points[worst]
@@ -117,11 +114,10 @@ def _of_all_shapes(archive: Archive, what: str) -> Iterator[tuple[str, Floats]]:
             yield name, values
 
 
-def _stress_scale(archive: Archive, shape: Shape) -> Scale:
-    """Utilisation where the strength is known, else the stress in a unit of its size."""
-    assert shape.stress is not None
+def _stress_scale(archive: Archive, shape: Shape, stress: Floats) -> Scale:
+    """Utilisation where the strength is known and the stress alone decides, else the stress in a unit of its size."""
     bending, final = archive.results.bending, is_shell(shape.name)
-    strength = bending.strength if bending else None
+    strength = bending.strength if bending and not by_code(archive.results) else None
     erection = (bending.erection_strength if bending else None) or strength
     known = [(name, float(np.max(values))) for name, values in _of_all_shapes(archive, "stress")]
     if strength and erection:
@@ -133,23 +129,24 @@ def _stress_scale(archive: Archive, shape: Shape) -> Scale:
         top = max(largest for _, largest in known)
         unit, name = next((entry for entry in PRESSURES if top >= entry[0]), PRESSURES[-1])
         caption, top = f"stress in {name}", top / unit
-    values = shape.stress / unit
+    values = stress / unit
     return _scale(values, max(top, FINEST), STRESS, f"{caption}, here up to {float(np.max(values)):.3g}")
 
 
-def _curvature_scale(archive: Archive, shape: Shape) -> Scale:
-    assert shape.curvature is not None
+def _curvature_scale(archive: Archive, _: Shape, curvature: Floats) -> Scale:
     top = max(float(np.max(values)) for _, values in _of_all_shapes(archive, "curvature"))
-    caption = f"curvature in 1/m, here up to {float(np.max(shape.curvature)):.3g}"
-    return _scale(np.asarray(shape.curvature, dtype=float), max(top, FINEST), STRESS, caption)
+    caption = f"curvature in 1/m, here up to {float(np.max(curvature)):.3g}"
+    return _scale(np.asarray(curvature, dtype=float), max(top, FINEST), STRESS, caption)
 
 
-def _force_scale(archive: Archive, shape: Shape) -> Scale:
+def _force_scale(archive: Archive, _: Shape, force: Floats) -> Scale:
     """Normal forces; signed as gaps are, so that rods without a force are drawn in ink."""
-    assert shape.force is not None
     top = max(float(np.abs(values).max()) for _, values in _of_all_shapes(archive, "force"))
     unit, name = (1e3, "kN") if top >= 1e3 else (1.0, "N") if top >= 1.0 else (1e-3, "mN")
-    return _scale(shape.force / unit, max(top / unit, FINEST), SIGNED, f"normal force in {name}, + tension")
+    return _scale(force / unit, max(top / unit, FINEST), SIGNED, f"normal force in {name}, + tension")
+
+
+_SCALES = {"stress": _stress_scale, "curvature": _curvature_scale, "force": _force_scale}
 
 
 def _scale(values: Floats, largest: float, colours: tuple[str, ...], caption: str) -> Scale:

@@ -4,7 +4,7 @@ import pathlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import compress, pairwise
+from itertools import compress
 from math import cos, sin
 from typing import Literal, NamedTuple, TypeVar
 
@@ -302,27 +302,10 @@ def within(box: Floats, low: Floats, high: Floats) -> bool:
 
 
 def _inside(points: Floats, low: Floats, high: Floats) -> Iterator[Floats]:
-    """The pieces of a polyline (k, 2) inside a rectangle [Liang and Barsky 1984]."""
-    (left, bottom), (right, top) = low.tolist(), high.tolist()
-    piece: list[tuple[float, float]] = []
-    for (ax, ay), (bx, by) in pairwise(points.tolist()):
-        x, y, enter, leave = bx - ax, by - ay, 0.0, 1.0
-        for slope, room in ((-x, ax - left), (-y, ay - bottom), (x, right - ax), (y, top - ay)):
-            if slope == 0:
-                enter = enter if room >= 0 else 2.0
-            elif slope < 0:
-                enter = max(enter, room / slope)
-            else:
-                leave = min(leave, room / slope)
-        if enter > leave:
-            continue
-        if enter > 0 or not piece:
-            if len(piece) > 1:
-                yield np.array(piece)
-            piece = [(ax + enter * x, ay + enter * y)]
-        piece.append((ax + leave * x, ay + leave * y))
-        if leave < 1:
-            yield np.array(piece)
-            piece = []
-    if len(piece) > 1:
-        yield np.array(piece)
+    """The pieces of a polyline (k, 2) inside a rectangle."""
+    from ezdxf.math import Vec2  # here, as few drawings are cut into sheets
+    from ezdxf.math.clipping import ClippingRect2d
+
+    window = ClippingRect2d(Vec2(low.tolist()), Vec2(high.tolist()))
+    for piece in window.clip_polyline(Vec2.list(points.tolist())):
+        yield np.array([(point.x, point.y) for point in piece])

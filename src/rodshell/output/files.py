@@ -6,21 +6,16 @@ Modules that need a library of one kind of file alone are imported when such a f
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from shlex import quote
 from warnings import warn
 
 from rodshell.errors import InputError, OutOfTimeError, OutputWarning
-from rodshell.output.drawing import Drawing
-from rodshell.output.drawings import drawing_set, sheet_set
-from rodshell.output.drawings.flat import FlatPlan, flat_plan
+from rodshell.output.drawings import drawing_set, drawing_svgs, sheet_set
 from rodshell.output.grid import shape_names, shape_of
 from rodshell.output.models import compas_json, glb_bytes, obj_text, rhino_bytes, time_series, vtp_text
 from rodshell.output.pictures import deployment_picture, picture
 from rodshell.output.schedules import SCHEDULES, table_csv
-from rodshell.output.svg import drawing_svg
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results.archive import Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
@@ -64,11 +59,11 @@ def save(
         put_archive(archive, place)
         for name, text in more.items():
             place.put(name, text)
-        content, left = Content(archive), list(wanted)
+        left = list(wanted)
         with suppress(OutOfTimeError):
             while left:
                 progress("files", left[0], 0.0)
-                for name, made in KINDS[left[0]](content):
+                for name, made in KINDS[left[0]](archive):
                     place.put(name, made)
                 del left[0]
         if left:
@@ -109,44 +104,14 @@ def export(
     return names
 
 
-@dataclass(frozen=True)
-class Content:
-    """An archive, and what several kinds of files are made from."""
-
-    archive: Archive
-
-    @cached_property
-    def plan(self) -> FlatPlan:
-        return flat_plan(self.archive)
-
-    @cached_property
-    def drawings(self) -> dict[str, Drawing]:
-        return drawing_set(self.archive)
-
-    @cached_property
-    def svgs(self) -> dict[str, str]:
-        return {name: drawing_svg(drawing) for name, drawing in self.drawings.items()}
-
-    @property
-    def meshed(self) -> bool:
-        """Whether the nodes of each rod are known."""
-        return "rod_nodes" in self.archive.states
-
-    def models(self, suffix: str, make: Callable[[Archive, str], str | bytes], states: Iterable[str | None]) -> Files:
-        """A file for each of some states that are known."""
-        for state in filter(None, states):
-            yield f"model/{state}.{suffix}", make(self.archive, state)
-
-
 def files_of(archive: Archive, kinds: str | Iterable[str] | None = None) -> Files:
     """Names in the result's folder and contents of the files of some kinds, as of `save`.
 
     Raises:
         InputError: an unknown kind, or one that needs a package that is not installed.
     """
-    content = Content(archive)
     for kind in wanted_kinds(kinds):
-        yield from KINDS[kind](content)
+        yield from KINDS[kind](archive)
 
 
 def reserved(kinds: str | Iterable[str] | None = None) -> list[str]:
@@ -187,77 +152,85 @@ def _require_archive(value: object) -> None:
         )
 
 
-def _dxf(content: Content) -> Files:
+def _dxf(archive: Archive) -> Files:
     from rodshell.output.dxf import drawing_dxf
 
-    style = content.archive.results.drawings
+    style = archive.results.drawings
     names = style.layers if style else None
-    for name, drawing in content.drawings.items():
+    for name, drawing in drawing_set(archive).items():
         yield f"drawings/{name}.dxf", drawing_dxf(drawing, names)
 
 
-def _svg(content: Content) -> Files:
-    for name, svg in content.svgs.items():
+def _svg(archive: Archive) -> Files:
+    for name, svg in drawing_svgs(archive).items():
         yield f"drawings/{name}.svg", svg
 
 
-def _pdf(content: Content) -> Files:
+def _pdf(archive: Archive) -> Files:
     from rodshell.output.pdf import drawings_pdf
 
-    sheets, paper = sheet_set(content.archive)
-    yield "drawings/drawings.pdf", drawings_pdf(sheets, paper, content.archive.name)
+    sheets, paper = sheet_set(archive)
+    yield "drawings/drawings.pdf", drawings_pdf(sheets, paper, archive.name)
 
 
-def _csv(content: Content) -> Files:
+def _csv(archive: Archive) -> Files:
     for name, schedule in SCHEDULES.items():
-        if schedule.known(content.archive):
-            yield f"schedule/{name}.csv", table_csv(schedule.table(content.archive))
+        if schedule.known(archive):
+            yield f"schedule/{name}.csv", table_csv(schedule.table(archive))
 
 
-def _obj(content: Content) -> Files:
-    return content.models("obj", obj_text, shells_among(content.archive.states))
+def _models(archive: Archive, suffix: str, make: Callable[[Archive, str], str | bytes], states: Iterable[str]) -> Files:
+    for state in states:
+        yield f"model/{state}.{suffix}", make(archive, state)
 
 
-def _gltf(content: Content) -> Files:
-    return content.models("glb", glb_bytes, [content.archive.final] if content.meshed else [])
+def _obj(archive: Archive) -> Files:
+    return _models(archive, "obj", obj_text, shells_among(archive.states))
 
 
-def _vtp(content: Content) -> Files:
-    yield from content.models("vtp", vtp_text, shells_among(content.archive.states) if content.meshed else [])
-    for name, text in time_series(content.archive):
+def _gltf(archive: Archive) -> Files:
+    return _models(archive, "glb", glb_bytes, _meshed(archive, archive.final))
+
+
+def _vtp(archive: Archive) -> Files:
+    yield from _models(archive, "vtp", vtp_text, _meshed(archive, *shells_among(archive.states)))
+    for name, text in time_series(archive):
         yield f"model/{name}", text
 
 
-def _compas(content: Content) -> Files:
-    return content.models("json", compas_json, [content.archive.final] if content.meshed else [])
+def _compas(archive: Archive) -> Files:
+    return _models(archive, "json", compas_json, _meshed(archive, archive.final))
 
 
-def _rhino(content: Content) -> Files:
-    yield "model/rodshell.3dm", rhino_bytes(content.archive, content.plan)
+def _rhino(archive: Archive) -> Files:
+    yield "model/rodshell.3dm", rhino_bytes(archive)
 
 
-def _png(content: Content) -> Files:
+def _png(archive: Archive) -> Files:
     from rodshell.output.png import drawing_png
 
-    archive = content.archive
-    shown = [name for name in shape_names(archive) if name in ("flat", archive.final)]
-    for name in shown if content.meshed else []:
+    for name in _meshed(archive, *(name for name in shape_names(archive) if name in ("flat", archive.final))):
         shape = shape_of(archive, name)
-        if shape.gap is not None or shape.stress is None:
-            yield f"pictures/{name}.png", drawing_png(picture(archive, name))
-        if shape.stress is not None:
+        if shape.gap is not None or "stress" not in shape.known:
+            yield f"pictures/{name}.png", drawing_png(picture(archive, name, "gap"))
+        if "stress" in shape.known:
             yield f"pictures/{name}-stress.png", drawing_png(picture(archive, name, "stress"))
-    if "history" in archive.states and content.meshed:
+    if {"history", "rod_nodes"} <= archive.states.keys():
         yield "pictures/pop_up.png", drawing_png(deployment_picture(archive))
 
 
-def _report(content: Content) -> Files:
+def _meshed(archive: Archive, *states: str | None) -> list[str]:
+    """Those of some states that are known; none where the nodes of each rod are not."""
+    return [*filter(None, states)] if "rod_nodes" in archive.states else []
+
+
+def _report(archive: Archive) -> Files:
     from rodshell.output.report import report_html
 
-    yield "report.html", report_html(content.archive, content.plan, content.drawings, content.svgs)
+    yield "report.html", report_html(archive)
 
 
-KINDS: dict[str, Callable[[Content], Files]] = {
+KINDS: dict[str, Callable[[Archive], Files]] = {
     "dxf": _dxf, "svg": _svg, "pdf": _pdf, "csv": _csv, "obj": _obj, "gltf": _gltf, "vtp": _vtp, "compas": _compas,
     "3dm": _rhino, "png": _png, "report": _report,
 }  # fmt: skip

@@ -1,8 +1,8 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -177,9 +177,10 @@ def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
     return {joint.id: positions[nodes[entries]].mean(axis=0) for joint, entries in joint_entries(archive)}
 
 
-def outlines_of(rods: list[GridRod]) -> list[Ints]:
+@made_once
+def outlines_of(archive: Archive) -> list[Ints]:
     """Rod ends along each outline of the flat grid, those of rod k being 2 k and 2 k + 1, see `outlines`."""
-    return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
+    return outlines(np.array([rod.flat for rod in rods_of(archive)], dtype=float).reshape(-1, 2, 2))
 
 
 @made_once
@@ -196,12 +197,6 @@ def joint_entries(archive: Archive) -> list[tuple[GridJoint, list[int]]]:
         return starts[rod] + int(np.abs(stations[rod] - at).argmin())
 
     return [(joint, [*map(entry, joint.rods, joint.at)]) for joint in joints_of(rods)]
-
-
-@lru_cache(maxsize=4)
-def _outlines(flat: bytes) -> list[Ints]:
-    """Kept for the next drawing of the same grid."""
-    return outlines(np.frombuffer(flat).reshape(-1, 2, 2))
 
 
 def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
@@ -225,17 +220,15 @@ class Shape:
         name: "flat", "draped", "popped_pinned", "popped_clamped", or "stage_1", ... of the deployment.
         positions: (n, 3) [m].
         gap: (n,) signed distances to the target [m], where known.
-        stress: (k,) [Pa], curvature : (k,) [1/m] and force : (k,) normal forces [N], tension positive, at each entry of
-            `rod_nodes`, where known.
+        known: (k,) at each entry of `rod_nodes`, where known: "stress" [Pa], "curvature" [1/m] and "force", the normal
+            force [N], tension positive.
     """
 
     name: str
     caption: str
     positions: Floats
     gap: Floats | None = None
-    stress: Floats | None = None
-    curvature: Floats | None = None
-    force: Floats | None = None
+    known: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
     def flat(self) -> bool:
@@ -281,13 +274,11 @@ def shape_of(archive: Archive, name: str) -> Shape:
     if name.startswith(STAGE):
         k = int(name.removeprefix(STAGE))
         caption = f"Deployment at {100 * states['history_share'][k]:.0f} %"
-        curvature, stress = (states[f"history_{what}"][k] if f"history_{what}" in states else None for what in BENT)
-        return Shape(name, caption, np.asarray(states["history"][k], dtype=float), None, stress, curvature)
+        bent = {what: states[f"history_{what}"][k] for what in BENT if f"history_{what}" in states}
+        return Shape(name, caption, np.asarray(states["history"][k], dtype=float), known=bent)
     ends = name.removeprefix(POPPED)
-    curvature, stress = (states.get(f"{what}_{ends}") for what in BENT)
-    gap = states.get(GAP + ends)
-    force = states.get(f"force_{ends}")
-    return Shape(name, caption_of(archive, name), np.asarray(states[name], dtype=float), gap, stress, curvature, force)
+    bent = {what: states[f"{what}_{ends}"] for what in (*BENT, "force") if f"{what}_{ends}" in states}
+    return Shape(name, caption_of(archive, name), np.asarray(states[name], dtype=float), states.get(GAP + ends), bent)
 
 
 def deployed_shape(archive: Archive, name: str) -> Shape:
@@ -347,7 +338,7 @@ def _line(ends: Floats) -> FlatRod:
     along = ends[1] - ends[0]
     length = float(np.hypot(*along))
     (x, y), (dx, dy) = ends[0].tolist(), (along / length).tolist()
-    return FlatRod("", "free", 0.0, 0.0, length, (x, y), (dx, dy))
+    return FlatRod("", "free", None, 0.0, length, (x, y), (dx, dy))
 
 
 def opens(outline: Floats) -> bool:

@@ -98,6 +98,10 @@ class Room:
             self.take(box)
         return free
 
+    def first(self, texts: Iterable[Text]) -> Text | None:
+        """The first of some texts that finds room, which it takes."""
+        return next((text for text in texts if self.claim(text.box())), None)
+
     def join(self, other: "Room") -> None:
         """Take all that the other has taken."""
         for box in other._boxes:

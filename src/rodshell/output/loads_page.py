@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from rodshell.arrays import largest_at
 from rodshell.figures.loads import LoadedShell, Utilisations
 from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
-from rodshell.output.schedules import loaded_shells
 from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
 from rodshell.results.wording import millimetres, percent, rounded, rounded_down, rounding_of, shown_factor, stress
@@ -37,8 +37,8 @@ STATED = (
     "Loads are fixed forces on the areas of the surface that belong to each node. Wind does not turn with the shell.",
     "Large displacements and the rods' stresses from bending are in every figure; supports do not yield unless a load "
     "moves them.",
-    "Stiffness is the mean one, and not reduced: neither by partial factors nor by creep. Relaxation of bent rods, "
-    "pressure at bolts, cladding and its stiffness, fatigue, fire and accidental loads are not checked.",
+    "Stiffness in all figures is the mean one, not reduced by factors or creep; relaxation of bent rods changes "
+    "neither shape nor stability. Pressure at bolts, cladding, fatigue, fire and accidental loads are not checked.",
 )
 SEAMS = (
     "The seams between patches are held in place, as supports are: what carries them has to withstand the forces "
@@ -49,7 +49,7 @@ SEAMS = (
 def loads_page(archive: Archive) -> dict[str, Any] | None:
     """What the page shows; None where no loads were checked."""
     results = archive.results
-    shells = list(loaded_shells(results))
+    shells = list(results.loaded_shells())
     if not shells:
         return None
     pictures = [
@@ -84,10 +84,32 @@ def _strengths(results: Results) -> Iterator[str]:
     if not known:
         yield "No design strength is known, and none was judged: give [strength]."
     else:
+        along = percent(used.axial or 1.0)
+        if used.compression is not None and used.compression != used.axial:
+            along += f" and {percent(used.compression)}"
         yield (
-            f"Design strengths in bending: {known}. In tension and compression {percent(used.axial or 1.0)}, in shear "
+            f"Design strengths in bending: {known}. In tension and compression {along}, in shear "
             f"{percent(used.shear or 0.0)} of that. From: {used.source}."
         )
+    if used.code is not None:
+        if len(used.depth):
+            first, second = (f"{factor:.3g}" for factor in used.depth.tolist())
+            yield (
+                f"By their depth, strengths are {first} times these for bends out of the shell and {second} times "
+                f"within it (k_h); of the smaller of the two shares {used.biaxial or 1.0:g} counts (k_m)."
+            )
+        if used.service_class is None:
+            yield "No service class was given: 2 (covered) was taken."
+        if used.relaxed:
+            yield (
+                f"Of the unloaded shell's stress {percent(used.relaxed)} is gone after months, as given: at "
+                "first it is judged by the strength under short loads, then what is left by the permanent one."
+            )
+        if used.stiffness is not None:
+            yield (
+                f"Factors are those of the mean modulus; {used.code} asks for {percent(used.stiffness)} of it in "
+                "stability, which lowers them by as much (with cables of steel by less, as long as these stiffen it)."
+            )
     if used.erection_utilisation is not None:
         yield f"Erection uses at most {percent(used.erection_utilisation)} of {stress(used.erection or 0.0)}."
     if used.creep is not None:
@@ -183,14 +205,14 @@ def _foundation(results: Results, shell: LoadedShell) -> Row:
     sums = (shell.load_sum, shell.reaction_sum)
     load, held = (np.zeros(3) if total is None else np.nan_to_num(total) for total in sums)
     across = np.linalg.norm(forces[:, :2], axis=1)
-    down = int(np.argmax(forces[:, 2]))
+    down = largest_at(forces[:, 2])
     names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
-    lifted = f"{_kilo(shell.uplift)} at {names[int(np.argmin(forces[:, 2]))]}" if shell.uplift else "none"
+    lifted = f"{_kilo(shell.uplift)} at {names[largest_at(-forces[:, 2])]}" if shell.uplift else "none"
     return {
         "Loads x, y, z": ", ".join(map(_kilo, load)),
         "Reactions x, y, z": ", ".join(map(_kilo, held)),
         "Largest vertical": f"{_kilo(forces[down, 2])} at {names[down]}",
-        "Largest horizontal": f"{_kilo(across.max())} at {names[int(np.argmax(across))]}",
+        "Largest horizontal": f"{_kilo(across.max())} at {names[largest_at(across)]}",
         "Largest uplift": lifted,
     }
 
@@ -215,12 +237,13 @@ def _joints(shell: LoadedShell) -> Row:
 
 def _bracing(results: Results, shell: LoadedShell) -> Row:
     forces = np.array([force for force in shell.bracing if force is not None])
-    braces = results.fabrication.bracing if results.fabrication else ()
     pull, push = max(0.0, float(forces.max(initial=0.0))), max(0.0, -float(forces.min(initial=0.0)))
     where = int(np.argmax([abs(force or 0.0) for force in shell.bracing]))
-    most = f"{braces[where].start} to {braces[where].end}" if where < len(braces) else ""
+    most = f"{results.bracing[where].start} to {results.bracing[where].end}" if where < len(results.bracing) else ""
+    before = [force for force in shell.bracing_unloaded if force is not None]
     return {
         "Braces": str(len(forces)),
+        "Before loads": f"{_kilo(min(before))} to {_kilo(max(before))}" if before else "not known",
         "Largest tension": _kilo(pull),
         "Largest compression": _kilo(push),
         "Largest in": most,

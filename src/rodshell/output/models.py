@@ -20,14 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.errors import InputError
-from rodshell.figures.form import Section, Stiffness
+from rodshell.errors import needs_package
 from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
-from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.grid import (
     STAGE,
-    GridRod,
     Shape,
     deployed_shape,
     joint_places,
@@ -36,6 +34,7 @@ from rodshell.output.grid import (
     shape_names,
     shape_of,
 )
+from rodshell.output.sections import section_outline, section_widths
 from rodshell.output.svg import tag
 from rodshell.results import Archive
 
@@ -87,9 +86,9 @@ def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
 def _known(shape: Shape, nodes: Ints) -> Iterator[tuple[str, Floats]]:
     if shape.gap is not None and np.isfinite(shape.gap).all():
         yield "gap", shape.gap[nodes]
-    for key, values in (("stress", shape.stress), ("curvature", shape.curvature)):
-        if values is not None:
-            yield key, np.asarray(values, dtype=np.float64)
+    for key in ("stress", "curvature"):
+        if key in shape.known:
+            yield key, np.asarray(shape.known[key], dtype=np.float64)
 
 
 def _data_array(name: str, values: NDArray[np.generic], **attributes: str) -> str:
@@ -143,16 +142,14 @@ def compas_json(archive: Archive, state: str) -> str:
     return json.dumps({"rods": lines, "grid": graph}, ensure_ascii=False) + "\n"
 
 
-def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
+def rhino_bytes(archive: Archive) -> bytes:
     """The whole model.
 
     Raises:
         InputError: rhino3dm is not installed.
     """
-    try:
+    with needs_package("a 3dm file", "rhino3dm", "rhino"):
         import rhino3dm as r
-    except ImportError as error:
-        raise InputError('a 3dm file needs the package rhino3dm: pip install "rodshell[rhino]"') from error
 
     model: Any = r.File3dm()
     model.Settings.ModelUnitSystem = r.UnitSystem.Millimeters
@@ -175,6 +172,7 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
             result.Add(x, y, z)
         return result
 
+    plan = flat_plan(archive)
     mm = plan.rounding.mm
     for rod, course in zip(plan.rods, plan.courses, strict=True):
         figures = {"length_mm": mm(rod.length), "cut_length_mm": mm(rod.cut_length)}
@@ -199,8 +197,6 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
         return path.read_bytes()
 
 
-ROUND = 8  # sides of a circle
-SLENDER = 1e-3  # of the shell's size: thickness of a rod whose section has no shape
 FLOAT, INDEX, VERTICES, ELEMENTS = 5126, 5125, 34962, 34963  # glTF's numbers for types and uses
 
 
@@ -220,40 +216,6 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
         shades = None if colours is None else np.repeat(colours[k], len(outline), axis=0)
         file.add(rod.id, points, normals, faces, shades)
     return file.content()
-
-
-def section_outline(section: Section | None, size: float) -> Floats:
-    """(s, 2) corners of the rods' section [m], across and up; of a section without a shape, a thin circle.
-
-    Up is m1, the normal of the grid: a rectangle's width and an ellipse's a lie there.
-
-    Args:
-        size: of the shell [m], for the thickness of a section without a shape.
-    """
-    section = section or Section()
-    if section.kind == "rectangle" and section.height is not None and section.width is not None:
-        w, h = 0.5 * section.height, 0.5 * section.width
-        return np.array([[w, -h], [w, h], [-w, h], [-w, -h]])
-    radius = section.radius or SLENDER * size
-    a, b = section.a or radius, section.b or radius
-    angle = np.linspace(0, 2 * np.pi, ROUND, endpoint=False)
-    return np.column_stack([b * np.cos(angle), a * np.sin(angle)])
-
-
-def section_widths(archive: Archive, rod: GridRod) -> Floats | None:
-    """(k, 2) widths across and up of a rod's section at its nodes, over those of the unchanged one; None: it does not
-    change, or the flat grid is not known."""
-    along, flat = rod.record.stiffness, archive.states.get("flat")
-    return None if along is None or flat is None else widths_along(along, flat[rod.nodes])
-
-
-def widths_along(along: Stiffness, flat: Floats) -> Floats:
-    """The same of a rod whose nodes are `flat` (k, 3) in the flat grid [m]."""
-    factors = np.interp(np.linalg.norm(flat - flat[0], axis=1), along.at, along.factors)
-    same = np.ones_like(factors)
-    if along.varies in ("laths", "width", "a"):
-        return np.column_stack([same, factors if along.varies == "laths" else np.cbrt(factors)])
-    return np.column_stack([factors, same] if along.varies in ("height", "b") else 2 * [np.sqrt(np.sqrt(factors))])
 
 
 def swept(curve: Floats, outline: Floats, widths: Floats | None = None) -> tuple[Floats, Floats, NDArray[np.uint32]]:

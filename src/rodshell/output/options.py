@@ -1,9 +1,9 @@
 """Options of checks, fabrication and drawings: all that does not decide the form."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from rodshell.checks.bending import VON_MISES, require_known_stress
+from rodshell.checks.bending import require_known_stress
 from rodshell.fabrication.settings import Fabrication
 from rodshell.joints import Joint
 from rodshell.loads.strength import Limits
@@ -21,13 +21,11 @@ class OutputOptions(CheckOptions):
 
     Args:
         rod_chosen: which of the rod's "material" and "section" the program chose to fit the target.
-        strength_of: the preset material that the strengths are of, where they were not given.
     """
 
     fabrication: Fabrication = field(default_factory=Fabrication)
     drawings: DrawingStyle = field(default_factory=DrawingStyle)
     rod_chosen: tuple[str, ...] = ()
-    strength_of: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -37,34 +35,6 @@ class OutputOptions(CheckOptions):
         for part in chosen:
             choice("each of rod_chosen", part, ("material", "section"))
         object.__setattr__(self, "rod_chosen", chosen)
-        if self.strength_of is not None:
-            instance("strength_of", self.strength_of, str, "the name of a material")
-
-    @property
-    def shear_weight(self) -> float:
-        """Strength over shear strength; that of von Mises where no shear strength is given."""
-        if self.strength is None or self.shear_strength is None:
-            return VON_MISES
-        return self.strength / self.shear_strength
-
-    def judged_by(self, rod: Rod) -> "OutputOptions":
-        """The same with the strengths of the rod's preset material, where none was given.
-
-        A strength that is given alone, such as a reduced one, has a shear strength in the preset's proportion.
-        """
-        material = rod.material
-        if material is None or material.bending_strength is None:
-            return self
-        if self.strength is not None:
-            if self.shear_strength is not None or material.shear_strength is None:
-                return self
-            return replace(self, shear_strength=self.strength * material.shear_strength / material.bending_strength)
-        return replace(
-            self,
-            strength=material.bending_strength,
-            shear_strength=material.shear_strength,
-            strength_of=material.name,
-        )
 
     def limits(self, rod: Rod, asked: "Strength") -> "Limits":
         """What rods are judged by, with loads and without.
@@ -72,7 +42,7 @@ class OutputOptions(CheckOptions):
         Raises:
             InputError: a service class is given, and nothing depends on it.
         """
-        return Limits.of(rod, asked, given=self.strength, shear_weight=self.judged_by(rod).shear_weight)
+        return Limits.of(rod, asked, given=self.strength, shear_given=self.shear_strength)
 
     def require_known_stress(self, rod: Rod, joint: Joint) -> None:
         """InputError where a strength is given and the stress that it stands against cannot be known."""

@@ -13,7 +13,6 @@ from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, larg
 from rodshell.output.drawing import FAMILIES, Drawing, Path, Pen, Pencil
 from rodshell.output.grid import (
     STAGE,
-    GridRod,
     Shape,
     deployed_shape,
     end_nodes,
@@ -136,22 +135,9 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
     return picture_document(picture(archive, state, colour))
 
 
+@made_once
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
     """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format."""
-    kept = _pictures(archive)
-    if (state, colour) not in kept:
-        kept[state, colour] = _laid_out(archive, state, colour)
-    return kept[state, colour]
-
-
-@made_once
-def _pictures(archive: Archive) -> dict[tuple[str, Colour], Drawing]:
-    """The pictures of the archive that were asked for so far."""
-    return {}
-
-
-def _laid_out(archive: Archive, state: str, colour: Colour) -> Drawing:
-    """A picture, see `picture`."""
     shape = shape_of(archive, state)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)
@@ -159,7 +145,7 @@ def _laid_out(archive: Archive, state: str, colour: Colour) -> Drawing:
     ends = end_nodes(meshed_rods(archive))
     front = view.depth(points[ends]) > 0.5
     ground_axes(pencil, view, SOFT, 12.5)
-    _ground_curves(pencil, view, shape, meshed_rods(archive))
+    _ground_curves(pencil, view, shape, archive)
     drawn = _Rods.of(archive, view, shape, scale)
     drawn.draw(pencil, range(DEPTHS // 2))
     _supports(pencil, view, points[ends[~front]], state, len(ends))
@@ -194,7 +180,7 @@ def deployment_picture(archive: Archive) -> Drawing:
     known = shape_names(archive)
     names = [name for name in known if name.startswith(STAGE) or name in ("flat", archive.deployed)]
     chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
-    view, whole, last = _view_of_all(archive), Pencil(), None
+    view, whole, last = _view_of(archive, stages=True), Pencil(), None
     width = WIDTH + 2 * SIDE
     share = (width - 2 * GUTTER) / COLUMNS / WIDTH
     cell = np.array([share * WIDTH, -share * float(view.size[1]) - CAPTION])
@@ -202,7 +188,7 @@ def deployment_picture(archive: Archive) -> Drawing:
         shape, ground = deployed_shape(archive, name), Pencil()
         scale = scale_of(archive, shape, "stress")
         last = scale or last
-        _ground_curves(ground, view, shape, meshed_rods(archive))
+        _ground_curves(ground, view, shape, archive)
         corner = cell * (k % COLUMNS, k // COLUMNS) + (GUTTER - SIDE, 0.0)
         whole.paths += ground.done("", "", 12.5).placed(share, corner).paths
         drawn = _Rods.of(archive, view, shape, scale, share)
@@ -230,18 +216,13 @@ def _view(archive: Archive, shape: Shape) -> View:
     """One view for all shapes in space, and one for the flat grid; stages spread further than the final shell."""
     if shape.flat:
         return View.of(shape.positions, WIDTH)
-    return _view_of_shells(archive) if is_shell(shape.name) else _view_of_all(archive)
+    return _view_of(archive, stages=not is_shell(shape.name))
 
 
 @made_once
-def _view_of_shells(archive: Archive) -> View:
-    return View.of(np.concatenate([archive.states[name] for name in shells_among(archive.states)]), WIDTH)
-
-
-@made_once
-def _view_of_all(archive: Archive) -> View:
+def _view_of(archive: Archive, *, stages: bool) -> View:
     shells = [archive.states[name] for name in shells_among(archive.states)]
-    return View.of(np.concatenate([*shells, *archive.states["history"]]), WIDTH)
+    return View.of(np.concatenate([*shells, *(archive.states["history"] if stages else ())]), WIDTH)
 
 
 def _pieces(archive: Archive, length: float) -> tuple[Ints, Ints, Ints]:
@@ -335,10 +316,11 @@ def _polylines(first: Ints, layer: Ints, shade: Ints) -> Polylines:
     return lines
 
 
-def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[GridRod]) -> None:
+def _ground_curves(pencil: Pencil, view: View, shape: Shape, archive: Archive) -> None:
     """The boundary: closed curves through the rods' ends, openings on top of what they open."""
+    rods = meshed_rods(archive)
     ends = end_nodes(rods)
-    for loop in outlines_of(rods):
+    for loop in outlines_of(archive) if rods else ():
         outline = shape.positions[ends[loop]]
         fill = ""
         if np.ptp(outline[:, 2]) < LEVEL * np.ptp(outline[:, :2]):

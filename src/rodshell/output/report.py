@@ -5,7 +5,7 @@ and draws nothing between them.
 """
 
 import base64
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -15,8 +15,8 @@ from rodshell.figures.checks import OTHER_SHAPES, Clearance, Reactions, SelfWeig
 from rodshell.figures.fabrication import Stock
 from rodshell.figures.form import Agreement, Drape, Gate, PopUp
 from rodshell.figures.records import Ends, Record
-from rodshell.output.drawing import Drawing
-from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.drawings import drawing_set, drawing_svgs
+from rodshell.output.drawings.flat import FlatPlan, flat_plan
 from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
 from rodshell.output.grid import caption_of, shape_names
 from rodshell.output.loads_page import loads_page
@@ -46,8 +46,8 @@ GUIDED = "; between {start} and {stop} of the deployment it has to be guided, an
 NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between are not known."
 
 
-def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing], files: Mapping[str, str]) -> str:
-    """The whole page; `plan`, `drawings` and the same as SVG `files` are the archive's."""
+def report_html(archive: Archive) -> str:
+    """The whole page."""
     environment = Environment(
         loader=PackageLoader("rodshell.output", "templates"),
         autoescape=True,
@@ -59,7 +59,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     def shown(svg: str) -> Markup:
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
-    results = archive.results
+    results, plan, drawings, files = archive.results, flat_plan(archive), drawing_set(archive), drawing_svgs(archive)
     shown_as = ("flat", *shells_among(archive.states))
     states = [name for name in shape_names(archive) if name in shown_as and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
@@ -280,8 +280,11 @@ def checks_table(results: Results) -> dict[str, Any] | None:
     met = results.contact
     near = [met.of("deployment" if column == stages else column) for column in columns] if met else []
     rows += _side_by_side(_CLEARANCE, [found or Clearance() for found in near], rounding)
-    held = {str(end): reactions for end, reactions in results.reactions.items()}
-    rows += _side_by_side(_REACTIONS, [held.get(column) or Reactions() for column in columns], rounding)
+    held = [results.reactions.get(column) or Reactions() for column in columns]
+    rows += _side_by_side(_REACTIONS, held, rounding)
+    for name in dict.fromkeys(name for each in held for name in each.figures):
+        said = [wording.figure(*each.figures.get(name, (None, "")), rounding) for each in held]
+        rows.append((name[:1].upper() + name[1:], said))
     deployment = f"deployment above {whole_percent(unknown)}" if unknown else "deployment"
     heads = [deployment if column == stages else column for column in columns]
     return {"columns": heads, "rows": rows} if rows else None
@@ -355,7 +358,11 @@ def _weight_rows(results: Results, ends: Sequence[Ends], rounding: Rounding) -> 
     whose = "the weakest patch, its seam held," if results.patches else "it"
     deflection = (("Largest deflection under its own weight", "deflection", wording.millimetres),)
     weights = [weight or SelfWeight() for weight in found]
-    return [(f"Own weight that {whose} carries", shares), *_side_by_side(deflection, weights, rounding)]
+    rows = [(f"Own weight that {whose} carries", shares), *_side_by_side(deflection, weights, rounding)]
+    if results.snow:
+        snow = [wording.snow_text(results.snow[end]) if end in results.snow else wording.UNKNOWN for end in ends]
+        rows.append(("Even snow on the plan that it carries on top, unbraced", snow))
+    return rows
 
 
 def _listed(record: Record | None, listed: tuple[Entry, ...], rounding: Rounding) -> list[Row]:

@@ -17,11 +17,11 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.figures.checks import JointLoad
-from rodshell.figures.fabrication import Brace, Stock
+from rodshell.figures.fabrication import Stock
 from rodshell.figures.form import Meeting, Stiffness
-from rodshell.figures.loads import LoadedShell
-from rodshell.figures.records import Ends, printable
+from rodshell.figures.records import printable
 from rodshell.geometry.frames import unit
+from rodshell.output.blanks import boards_of
 from rodshell.output.grid import GridJoint, GridRod, end_nodes, joints_of, lies_flat, node_stations, rods_of
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
@@ -41,6 +41,7 @@ UNITS = {
     "Nm": "N m",
 }
 UNKNOWN = (np.nan, np.nan, np.nan)  # force
+FINE, OF_SHORTENING = 0.1, 20.0  # mm, of cables whose shortening is under so many steps of the other lengths
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
 Show = Callable[[float | None], str]
 
@@ -64,6 +65,7 @@ def rods_table(archive: Archive) -> Table:
 
     Splices and joints are measured from the cut end of the rod's start, as on the strips.
 
+    `boards_mm` are length x width of the board that each piece of a rod that is curved at rest is cut from.
     Bending is that of the final shape; in columns named `pop_up` it is the worst of all shapes of the deployment.
     """
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
@@ -91,6 +93,9 @@ def rods_table(archive: Archive) -> Table:
         "second_laths_mm": lambda rod: "; ".join(mm(stop - start) for start, stop in laths_on(rod.record)),
         "second_laths_splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
     }
+    if any(rod.record.rest_curvature for rod in rods):
+        boards = {rod.id: boards_of(archive, rod) for rod in rods}
+        columns["boards_mm"] = lambda rod: "; ".join(f"{mm(long)} x {mm(wide)}" for long, wide in boards[rod.id])
     table = {name: [cell(rod) for rod in rods] for name, cell in columns.items()}
     for end in (0, 1):
         table |= _by_axis("flat_", f"{end}_mm", [rod.flat[end] for rod in rods], mm, "xy")
@@ -184,6 +189,9 @@ def joints_table(archive: Archive) -> Table:
         "final_deg": [_number(angle, 2) for angle in angles.tolist()],
         "scissor_deg": [_number(angle, 2) for angle in (angles - flats).tolist()],
     }
+    slots = {(rod.id, on.other): on.slot for rod in rods for on in rod.record.joints if on.slot}
+    if slots:
+        table["slot_mm"] = [mm(slots.get((a.id, b.id))) for a, b in pairs]
     loads = {load.rods: load for load in archive.results.joint_loads.get((final or "").removeprefix(POPPED), ())}
     if loads:
         joint_loads = [loads.get((a.id, b.id), JointLoad(rods=(a.id, b.id))) for a, b in pairs]
@@ -232,10 +240,11 @@ def seams_table(archive: Archive) -> Table:
 
 def bracing_table(archive: Archive) -> Table:
     """One row a diagonal: its length flat and in the final shape, of cables also free of stress; where loads were
-    checked its axial force under each combination, tension positive, and which leave it slack.
+    checked the force that a cable is to be stressed to, its axial force under each combination, tension positive, and
+    which leave it slack.
     """
-    results, mm = archive.results, rounding_of(archive.results).mm
-    braces = _bracing_of(archive)
+    results, rounding = archive.results, rounding_of(archive.results)
+    mm, braces = rounding.mm, results.bracing
     table = {
         "from": [brace.start for brace in braces],
         "to": [brace.end for brace in braces],
@@ -244,8 +253,13 @@ def bracing_table(archive: Archive) -> Table:
     }
     cables = any(brace.cut is not None for brace in braces)
     if cables:
-        table["cut_mm"] = [mm(brace.cut) for brace in braces]
-    loaded = {(name, ends): shell.bracing for name, ends, shell in loaded_shells(results) if shell.bracing}
+        shortened = [(brace.final or 0.0) - brace.cut for brace in braces if brace.cut is not None]
+        fine = 1e3 * min(shortened) < OF_SHORTENING * rounding.step
+        to_cut = Rounding(min(FINE, rounding.step)) if fine else rounding
+        table["cut_mm"] = [to_cut.mm(brace.cut) for brace in braces]
+        before = {ends: shell.bracing_unloaded for _, ends, shell in results.loaded_shells() if shell.bracing_unloaded}
+        table |= {f"stress_to_N_{ends}": [_six(force) for force in forces] for ends, forces in before.items()}
+    loaded = {(name, ends): shell.bracing for name, ends, shell in results.loaded_shells() if shell.bracing}
     for (name, ends), forces in loaded.items():
         table[f"force_N_{ends}_{name}"] = [_six(force) for force in forces]
     if loaded and cables:
@@ -262,18 +276,11 @@ def foundations_table(archive: Archive) -> Table:
     results = archive.results
     table = {"id": [f"{rod.id}.{end}" for rod in rods_of(archive) for end in (0, 1)]}
     table |= _by_axis("", "_mm", results.boundary, rounding_of(results).mm)
-    for name, ends, shell in loaded_shells(results):
+    for name, ends, shell in results.loaded_shells():
         table |= _by_axis("force_", f"_N_{ends}_{name}", shell.support_forces, _six)
         if np.nan_to_num(shell.support_moments).any():
             table |= _by_axis("moment_", f"_Nm_{ends}_{name}", shell.support_moments, _six)
     return table
-
-
-def loaded_shells(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
-    """Every combination of loads with each end condition, and the shell under it."""
-    for name, by_ends in results.loads.items():
-        for ends, shell in by_ends.items():
-            yield name, ends, shell
 
 
 def stock_table(archive: Archive) -> Table:
@@ -405,10 +412,6 @@ def _stock_of(archive: Archive) -> Stock | None:
     return archive.results.fabrication.stock if archive.results.fabrication else None
 
 
-def _bracing_of(archive: Archive) -> Sequence[Brace]:
-    return archive.results.fabrication.bracing if archive.results.fabrication else ()
-
-
 SCHEDULES = {
     "rods": Schedule(
         "Rods", rods_table, ("family", "offset_mm", "start_mm", "end_mm", "max_*_curvature_per_m", "max_twist_*",
@@ -416,7 +419,7 @@ SCHEDULES = {
     ),
     "joints": Schedule("Joints", joints_table, ("rod_?", "flat_?_mm", "final_state", "scissor_deg", "*_N", "*_Nm")),
     "supports": Schedule("Supports", supports_table, ("rod", "end", "force_*", "moment_*"), ("tangent_*",)),
-    "bracing": Schedule("Bracing", bracing_table, ("force_*",), known=lambda archive: bool(_bracing_of(archive))),
+    "bracing": Schedule("Bracing", bracing_table, ("force_*",), known=lambda archive: bool(archive.results.bracing)),
     "foundations": Schedule("Foundations", foundations_table, known=lambda archive: bool(archive.results.loads)),
     "stock": Schedule("Stock", stock_table, known=lambda archive: _stock_of(archive) is not None),
     "sections": Schedule(

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Floats
 from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
 from rodshell.formfinding.methods import MethodName
 from rodshell.formfinding.trim import ends_past_net
 from rodshell.layout import FlatGrid
+from rodshell.output.drawing import FAMILIES
 from rodshell.output.svg import label, tag
 from rodshell.paper.figure import (
     CASES,
-    FAMILY,
     FINAL,
     FLAT,
     HEIGHT,
@@ -28,6 +28,8 @@ from rodshell.paper.figure import (
     Case,
     Figure,
     PanelScale,
+    Part,
+    Row,
     closed,
     dots,
     from_above,
@@ -41,7 +43,7 @@ from rodshell.results.wording import nice_ticks
 
 FALL = Fall(height=HEIGHT)  # shared DOFs: the paper's *mapping*
 METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")
-_METHOD_COLOURS = {"paper": FAMILY["v"], "gravity": FAMILY["u"], "bound": FLAT}
+_METHOD_COLOURS = {"paper": FAMILIES[1], "gravity": FAMILIES[0], "bound": FLAT}
 WORDS = {"paper": "paper's, in time", "gravity": "gravity statics", "bound": "bound to the target"}
 COLUMNS = (
     "target", "rods", "method", "unknowns", "time [s]", "ends off the net, max [mm]", "rms [mm]", "how it rests",
@@ -56,7 +58,7 @@ _WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
 
 
 @dataclass(frozen=True, eq=False)
-class DrapeRun:
+class DrapeRun(Part):
     """One case by one method.
 
     Args:
@@ -81,6 +83,13 @@ class DrapeRun:
         return np.column_stack([self.net[:, 0] - self.ends[:, 0], self.ends[:, 1] - self.net[:, 1]]).ravel()
 
     @property
+    def status(self) -> str:
+        """ "converged", or that it did not come to rest."""
+        if self.draped.converged:
+            return "converged"
+        return f"({self.case.label}) by method {self.method} {self.draped.report.status.sentence}"
+
+    @property
     def rest(self) -> str:
         """Whether it is at rest, and stable, in a few words."""
         rest = self.draped.rest
@@ -95,17 +104,15 @@ class DrapeRun:
         modes = self.draped.report.negative_modes
         return ("stable" if modes == 0 else f"{modes} negative modes") + held
 
-    def row(self) -> tuple[str, ...]:
-        """Its row of the table."""
+    def rows(self) -> list[Row]:
         error = 1e3 * np.abs(self.errors)
-        return (
+        return [(
             f"({self.case.label}) {self.case.target.name}, {1e3 * self.case.spacing:g} mm",
             f"{self.case.rods[0]}x{self.case.rods[1]}", WORDS[self.method], str(self.draped.report.dofs),
             f"{self.seconds:.3g}", f"{error.max():.2f}", f"{np.sqrt(np.mean(error**2)):.2f}", self.rest,
-        )  # fmt: skip
+        )]  # fmt: skip
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json, SI."""
         rods = self.trimmed.mesh.grid.rods
         return {
             "case": self.case.label, "target": self.case.target.parameters(), "method": self.method,
@@ -122,13 +129,7 @@ class DrapeRun:
 def drape_all(
     cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[MethodName] = METHODS
 ) -> tuple[DrapeRun, ...]:
-    """Every case by every method, the falls with the settings `fall`.
-
-    Args:
-        progress: is called at each iteration.
-        fall: settings of the paper's method.
-        methods: by which each case is draped.
-    """
+    """Every case by every method, the falls with the settings `fall`."""
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
 
@@ -172,26 +173,18 @@ def _panels(run: DrapeRun) -> list[list[str]]:
 
 
 def _differences_svg(drapes: Sequence[DrapeRun]) -> str:
-    """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm.
-
-    Args:
-        drapes: case by case, each by every method.
-    """
+    """A panel for each case: how far each rod end lies past the exact net's, by every method, in mm."""
     panels = []
     for name in dict.fromkeys(run.case.label for run in drapes if run.draped.converged):
         same = [run for run in drapes if run.case.label == name and run.draped.converged]
         drawn = [(WORDS[run.method], _METHOD_COLOURS[run.method], 1e3 * run.errors) for run in same]
         if (sought := _sought(same[0])) is not None:
-            along = np.abs(np.where(_along_u(same[0]), sought[:, 0], sought[:, 1]))
+            rods = same[0].trimmed.mesh.grid.rods
+            along = np.abs((sought * np.repeat([rod.direction for rod in rods], 2, axis=0)).sum(axis=1))
             drawn.append(("genetic algorithm", FINAL, 1e3 * (along - np.abs(same[0].net.ravel()))))
         offsets = 1e3 * np.repeat([rod.offset for rod in same[0].trimmed.mesh.grid.rods], 2)
         panels.append((f"({name})  {same[0].case.target.name}", list(_scatter(offsets, drawn))))
     return rows_of_panels([("Rod ends past those of the exact net [mm], against the offset of their rod [mm]", panels)])
-
-
-def _along_u(run: DrapeRun) -> Bools:
-    """(2m,) whether the ends are those of rods along x."""
-    return np.repeat([rod.family == "u" for rod in run.trimmed.mesh.grid.rods], 2)
 
 
 def _scatter(x: Floats, drawn: Sequence[tuple[str, str, Floats]]) -> Iterator[str]:
@@ -233,9 +226,7 @@ def _sought(run: DrapeRun) -> Floats | None:
 
 def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:
     """(2m, 2) ends of rods (m, 2) in the plane of the flat grid [m]."""
-    along, across = ends.ravel(), np.repeat([rod.offset for rod in grid.rods], 2)
-    of_u = np.repeat([rod.family == "u" for rod in grid.rods], 2)
-    return np.column_stack([np.where(of_u, along, across), np.where(of_u, across, along)])
+    return np.vstack([rod.point(cuts) for rod, cuts in zip(grid.rods, ends, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -243,40 +234,19 @@ class DrapeFigure(Figure):
     """Every case by every method.
 
     Args:
-        name: of the figure, such as "fig6".
-        drapes: case by case, each by every method.
+        parts: case by case, each by every method.
     """
 
     name: str
     title: str
-    drapes: tuple[DrapeRun, ...]
-    columns = COLUMNS
-
-    @property
-    def status(self) -> str:
-        """ "converged", or which drape did not come to rest."""
-        for run in self.drapes:
-            if not run.draped.converged:
-                return f"({run.case.label}) by method {run.method} {run.draped.report.status.sentence}"
-        return "converged"
-
-    def heading(self) -> str:
-        """The title."""
-        return self.title
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each case and method."""
-        return [run.row() for run in self.drapes]
-
-    def content(self) -> dict[str, Any]:
-        """The drapes."""
-        return {"drapes": [run.result() for run in self.drapes]}
+    parts: tuple[DrapeRun, ...]
+    columns, key = COLUMNS, "drapes"
 
     def pictures(self) -> dict[str, str]:
         """The paper's method in NAME.svg, each other in NAME-METHOD.svg; the ends of all in NAME-differences.svg."""
-        return {f"{self.name}-differences": _differences_svg(self.drapes)} | {
+        return {f"{self.name}-differences": _differences_svg(self.parts)} | {
             self.name if method == "paper" else f"{self.name}-{method}": rows_svg(
-                [run for run in self.drapes if run.method == method]
+                [run for run in self.parts if run.method == method]
             )
             for method in METHODS
         }

@@ -22,6 +22,8 @@ from rodshell.paper.figure import (
     Case,
     Figure,
     PanelScale,
+    Part,
+    Row,
     closed,
     dots,
     from_above,
@@ -45,7 +47,7 @@ ROWS = (
 
 
 @dataclass(frozen=True)
-class PopUpCase:
+class PopUpCase(Part):
     """One shell, and the time from target to popped up, pinned and clamped [s]."""
 
     case: Case
@@ -53,27 +55,30 @@ class PopUpCase:
     seconds: float
 
     @property
+    def status(self) -> str:
+        """ "converged", or the first stage that did not converge."""
+        return self.form.status
+
+    @property
     def stable(self) -> bool:
         """Whether it is stable, pinned and clamped."""
         return all(popup.report.stable for popup in self.form.popped.values())
 
-    def row(self) -> tuple[str, ...]:
-        """Its row of the table."""
+    def rows(self) -> list[Row]:
         grid, gaps = self.form.footprint.mesh.grid, self.form.agreement
         lengths = [1e3 * (rod.end - rod.start) for rod in grid.rods]
         curves = (self.form.footprint.points, self.form.trimmed.boundary.points)
         areas = [1e4 * _area(points[:, :2]) for points in curves]
-        return (
+        return [(
             self.case.target.name, f"{self.case.rods[0]}x{self.case.rods[1]}", str(len(grid.crossings.rods)),
             f"{min(lengths):.1f} to {max(lengths):.1f}", *(f"{area:.0f}" for area in areas),
             *(f"{1e3 * gap:.3f}" for ends in SUPPORTS for gap in (gaps[ends].rms, gaps[ends].max)),
             "yes" if self.stable else "no", f"{self.seconds:.2g}",
-        )  # fmt: skip
+        )]  # fmt: skip
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json, SI."""
         return {
-            "case": self.case.label, "target": self.case.target.parameters(), "status": self.form.status,
+            "case": self.case.label, "target": self.case.target.parameters(), "status": self.status,
             "stable": self.stable, "seconds": self.seconds, "footprint": self.form.footprint.points.tolist(),
             "boundary": self.form.trimmed.boundary.points.tolist(),
             "gap": {ends: {"rms": gap.rms, "max": gap.max} for ends, gap in self.form.agreement.items()},
@@ -103,42 +108,19 @@ class PopUpCase:
 class Fig1(Figure):
     """The three shells."""
 
-    shells: tuple[PopUpCase, ...]
-    name = "fig1"
-    columns = COLUMNS
-
-    @property
-    def status(self) -> str:
-        """ "converged", or that of the first shell that is not."""
-        return next((shell.form.status for shell in self.shells if shell.form.status != "converged"), "converged")
-
-    def heading(self) -> str:
-        """The title."""
-        return TITLE
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each shell."""
-        return [shell.row() for shell in self.shells]
-
-    def content(self) -> dict[str, Any]:
-        """The shells."""
-        return {"shells": [shell.result() for shell in self.shells]}
+    parts: tuple[PopUpCase, ...]
+    name, title, columns, key = "fig1", TITLE, COLUMNS, "shells"
 
     def pictures(self) -> dict[str, str]:
         """The paper's layout: shells above, boundaries below."""
-        names = [f"{k}  {shell.case.target.name}" for k, shell in enumerate(self.shells, start=1)]
-        shells, plans = ([draw(shell) for shell in self.shells] for draw in (PopUpCase.shell, PopUpCase.plan))
+        names = [f"{k}  {shell.case.target.name}" for k, shell in enumerate(self.parts, start=1)]
+        shells, plans = ([draw(shell) for shell in self.parts] for draw in (PopUpCase.shell, PopUpCase.plan))
         above, below = (list(zip(names, panels, strict=True)) for panels in (shells, plans))
         return {"fig1": rows_of_panels([(ROWS[0], above), (ROWS[1], below)])}
 
 
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, edge: float = EDGE) -> Fig1:
-    """Form and pop up all `cases` with edges of the length `edge` [m], the first twice: compilation does not count.
-
-    Args:
-        progress: is called at each iteration.
-        edge: length of the edges [m].
-    """
+    """Form and pop up all `cases` with edges of the length `edge` [m], the first twice: compilation does not count."""
     _popped(replace(cases[0], edge=edge), progress)
     return Fig1(tuple(_popped(replace(case, edge=edge), progress) for case in cases))
 

@@ -1,8 +1,7 @@
-"""Figure 4: does rod 2 follow, and with what lag? Both demonstrations, every coupling, linkers and pins [HQK 2.3].
+"""Figure 4: of two rods that cross at one joint the first is twisted or turned at a constant rate; does rod 2 follow,
+and with what lag? Both demonstrations, every coupling, linkers and pins [HQK 2.3].
 
 The pictures are instants in the paper's layout, an animation, and the lag against time.
-
-Two rods that cross at one joint, of which the first is twisted or turned at a constant rate [HQK 2.3, Fig 4].
 
 Rods of 5 nodes and 4 edges, the paper's section and material. Rod 1 runs from (L/2, 0, 0) to (-L/2, 0, 0), so that
 its first node starts where Eq 7 puts it; rod 2 along y.
@@ -27,7 +26,7 @@ from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell
 from rodshell.output.pictures import RIGHT, UP
 from rodshell.output.svg import document, label, number, tag
-from rodshell.paper.figure import INK, PAPER, ROD, SOFT, Figure
+from rodshell.paper.figure import INK, PAPER, ROD, SOFT, Figure, Part, Row, joined
 from rodshell.progress import Progress
 from rodshell.results.wording import nice_ticks
 from rodshell.solve.implicit_euler import Motion
@@ -47,7 +46,7 @@ _STATIC_STEPS = 60  # of such a revolution
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Part):
     """A demonstration.
 
     Args:
@@ -103,6 +102,18 @@ class Run:
         """Whether rod 2 turns with rod 1."""
         return abs(self.rate_error) < 1e-3
 
+    def rows(self) -> list[Row]:
+        return [(
+            f"({LETTER[self.demonstration]}) {self.demonstration}", self.joint, self.coupling,
+            "statics" if self.step is None else f"{1e3 * self.step:.3g}",
+            f"{np.degrees(self.start_up_lag):.3g}", f"{np.degrees(self.steady_lag):.2g}",
+            f"{100 * self.rate_error:.2g}", "yes" if self.follows else "no",
+        )]  # fmt: skip
+
+    def result(self) -> dict[str, Any]:
+        names = ("demonstration", "joint", "coupling", "step", "start_up_lag", "steady_lag", "rate_error", "follows")
+        return {name: getattr(self, name) for name in names}
+
 
 def run_in_time(
     demonstration: Demonstration,
@@ -118,14 +129,7 @@ def run_in_time(
         until: end of the motion [s].
         step: of the record [s]; with explicit ties the time step divides it until it is stable.
     """
-    shell = _shell(joint, coupling)
-    motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE))
-    start = shell.state(shell.mesh.flat)
-    every = 1
-    if isinstance(coupling, ExplicitPenalty):
-        every = int(np.ceil(step / (_SAFE * step_limit(motion, start))))
-    series = simulate(motion, start, until=until, step=step / every, every=every)
-    return _record(shell, demonstration, joint, coupling, step / every, series.times, series.states)
+    return _run(demonstration, joint, coupling, until, step)
 
 
 def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, *, until: float = 2 * pi / RATE) -> Run:
@@ -134,17 +138,29 @@ def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, 
     Args:
         until: end of the motion [s].
     """
-    shell = _shell(joint, coupling)
-    motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE / SLOW))
-    step = SLOW * 2 * pi / RATE / _STATIC_STEPS
-    series = simulate(motion, shell.state(shell.mesh.flat), until=SLOW * until, step=step)
-    return _record(shell, demonstration, joint, coupling, None, series.times / SLOW, series.states)
+    return _run(demonstration, joint, coupling, until, 2 * pi / RATE / _STATIC_STEPS, slower=SLOW)
 
 
-def _shell(joint: Joint, coupling: Coupling) -> Shell:
-    half = LENGTH / 2
+def _run(
+    demonstration: Demonstration, joint: Joint, coupling: Coupling, until: float, step: float, slower: float = 1.0
+) -> Run:
+    """The motion, so many times slower; statics unless that is 1."""
+    half, statics = LENGTH / 2, slower != 1.0
     grid = straight_rods([[[half, 0], [-half, 0]], [[0, -half], [0, half]]])
-    return Shell.of(mesh_grid(grid, EDGE), ROD, joint=joint, coupling=coupling, twist=True)
+    shell = Shell.of(mesh_grid(grid, EDGE), ROD, joint=joint, coupling=coupling, twist=True)
+    motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE / slower))
+    start, every = shell.state(shell.mesh.flat), 1
+    if isinstance(coupling, ExplicitPenalty) and not statics:
+        every = int(np.ceil(step / (_SAFE * step_limit(motion, start))))
+    series = simulate(motion, start, until=slower * until, step=slower * step / every, every=every)
+    times, states = series.times / slower, series.states
+    nodes = states[:, shell.node_blocks].reshape(len(times), 2, NODES, 3)
+    twists = states[:, shell.first_angle : shell.first_angle + NODES - 1, 0]
+    second = nodes[:, 1, -1] - nodes[:, 1, 0]
+    axis = np.array([-1.0, 0.0, 0.0] if demonstration == "twisting" else [0.0, 0.0, 1.0])  # rod 1, or the normal
+    angles = np.unwrap(np.arctan2(dot(axis, cross(second[0], second)), dot(second[0], second)))
+    recorded = None if statics else step / every
+    return Run(demonstration, joint.name, coupling.name, recorded, times, angles, nodes, twists)
 
 
 def _support(shell: Shell, demonstration: Demonstration, rate: float) -> Callable[[float], Supports]:
@@ -161,23 +177,6 @@ def _support(shell: Shell, demonstration: Demonstration, rate: float) -> Callabl
         return Supports(free, moved, goals)
 
     return at
-
-
-def _record(
-    shell: Shell,
-    demonstration: Demonstration,
-    joint: Joint,
-    coupling: Coupling,
-    step: float | None,
-    times: Floats,
-    states: Floats,
-) -> Run:
-    nodes = states[:, shell.node_blocks].reshape(len(times), 2, NODES, 3)
-    twists = states[:, shell.first_angle : shell.first_angle + NODES - 1, 0]
-    second = nodes[:, 1, -1] - nodes[:, 1, 0]
-    axis = np.array([-1.0, 0.0, 0.0] if demonstration == "twisting" else [0.0, 0.0, 1.0])  # rod 1, or the normal
-    angles = np.unwrap(np.arctan2(dot(axis, cross(second[0], second)), dot(second[0], second)))
-    return Run(demonstration, joint.name, coupling.name, step, times, angles, nodes, twists)
 
 
 _DEMONSTRATIONS: tuple[Demonstration, ...] = ("twisting", "bending")
@@ -207,54 +206,24 @@ _BIG = 1.4  # panels of the animation, against those of the instants
 class Fig4(Figure):
     """All runs of the figure. Each has whether rod 2 follows: not to follow is a result, too."""
 
-    runs: tuple[Run, ...]
-    name = "fig4"
-    columns = COLUMNS
-    status = "converged"
-
-    def heading(self) -> str:
-        """The motion of rod 1."""
-        turned = np.degrees(self.runs[0].prescribed[-1])
-        return f"Fig 4 [HQK 2.3]: rod 1 of two is driven at {RATE * 30 / np.pi:g} rpm, over {turned:.0f} degrees"
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each run."""
-        return [
-            (
-                f"({LETTER[run.demonstration]}) {run.demonstration}", run.joint, run.coupling,
-                "statics" if run.step is None else f"{1e3 * run.step:.3g}",
-                f"{np.degrees(run.start_up_lag):.3g}", f"{np.degrees(run.steady_lag):.2g}",
-                f"{100 * run.rate_error:.2g}", "yes" if run.follows else "no",
-            )
-            for run in self.runs
-        ]  # fmt: skip
-
-    def content(self) -> dict[str, Any]:
-        """The runs."""
-        runs = [
-            {
-                "demonstration": run.demonstration, "joint": run.joint, "coupling": run.coupling, "step": run.step,
-                "start_up_lag": run.start_up_lag, "steady_lag": run.steady_lag, "rate_error": run.rate_error,
-                "follows": run.follows,
-            }
-            for run in self.runs
-        ]  # fmt: skip
-        return {"runs": runs}
+    title: str
+    parts: tuple[Run, ...]
+    name, columns, key = "fig4", COLUMNS, "runs"
 
     def pictures(self) -> dict[str, str]:
         """Instants, an animation, and the lag against time."""
         shown = [self._first(demonstration, joint) for demonstration, joint in SHOWN]
-        return {"fig4": _instants_svg(shown), "fig4-animated": _animation_svg(shown), "fig4-lag": _lag_svg(self.runs)}
+        return {"fig4": _instants_svg(shown), "fig4-animated": _animation_svg(shown), "fig4-lag": _lag_svg(self.parts)}
 
     def tables(self) -> Mapping[str, Iterable[Sequence[object]]]:
         """The angles of both rods against time."""
         return {
-            f"angles-{letter}": _angles([run for run in self.runs if run.demonstration == demonstration])
+            f"angles-{letter}": _angles([run for run in self.parts if run.demonstration == demonstration])
             for demonstration, letter in LETTER.items()
         }
 
     def _first(self, demonstration: Demonstration, joint: str) -> Run:
-        return next(run for run in self.runs if (run.demonstration, run.joint) == (demonstration, joint))
+        return next(run for run in self.parts if (run.demonstration, run.joint) == (demonstration, joint))
 
 
 def _angles(runs: Sequence[Run]) -> list[Sequence[object]]:
@@ -269,12 +238,7 @@ def _angles(runs: Sequence[Run]) -> list[Sequence[object]]:
 
 
 def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
-    """All runs, over so many revolutions (`turns`).
-
-    Args:
-        progress: is called before each run.
-        turns: revolutions of rod 1 [-].
-    """
+    """All runs, over so many revolutions (`turns`) of rod 1."""
     until = turns * 2 * np.pi / RATE
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
     cases: list[tuple[Joint, Coupling]] = [(Linker(), coupling) for coupling in couplings]
@@ -286,7 +250,9 @@ def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
         for joint, coupling in cases[:2]:
             progress(f"{demonstration}, {joint.name}, {coupling.name}", "statics", 0.0)
             runs.append(run_statics(demonstration, joint, coupling, until=until))
-    return Fig4(tuple(runs))
+    turned = np.degrees(runs[0].prescribed[-1])
+    title = f"Fig 4 [HQK 2.3]: rod 1 of two is driven at {RATE * 30 / np.pi:g} rpm, over {turned:.0f} degrees"
+    return Fig4(title, tuple(runs))
 
 
 # Pictures
@@ -306,7 +272,7 @@ def _instants_svg(runs: Sequence[Run]) -> str:
             panel = [
                 *_scene(run),
                 *(_polyline(_projected(run.nodes[k, rod]), colour) for rod, colour in enumerate(RODS)),
-                *_directors(run, k),
+                *(_polyline(_tick(run, k, edge), RODS[0], width=1.6) for edge in _ticked(run)),
                 *(_dots(_projected(run.nodes[k, rod]), colour) for rod, colour in enumerate(RODS)),
                 *(_names(run) if across == 0 else ()),
                 label(caption, PANEL / 2, top + height + 18, TEXT, fill=INK, text_anchor="middle"),
@@ -325,9 +291,7 @@ def _animation_svg(runs: Sequence[Run]) -> str:
         frames = np.unique(np.linspace(0, len(run.times) - 1, FRAMES).round().astype(int))
         seconds = f"{number(float(run.times[-1]), 3)}s"
         lines = [([_projected(run.nodes[k, rod]) for k in frames], RODS[rod], 4.0) for rod in range(2)]
-        if run.demonstration == "twisting":
-            ticks = [[_tick(run, k, edge) for k in frames] for edge in range(run.twists.shape[1])]
-            lines += [(tick, RODS[0], 1.6) for tick in ticks]
+        lines += [([_tick(run, k, edge) for k in frames], RODS[0], 1.6) for edge in _ticked(run)]
         moving = [_polyline(drawn[0], colour, _moves(drawn, seconds), width=wide) for drawn, colour, wide in lines]
         left = GAP + across * (_BIG * PANEL + GAP)
         panels.append(tag("g", *_title(run), transform=f"translate({number(left)} 0)"))
@@ -337,11 +301,7 @@ def _animation_svg(runs: Sequence[Run]) -> str:
 
 
 def _lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
-    """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows.
-
-    Args:
-        until: end of the time axis [s].
-    """
+    """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows."""
     shown = [run for run in runs if run.step is not None and run.follows]
     looks = dict(zip(dict.fromkeys(run.name for run in shown), _LOOKS, strict=False))
     lags = np.concatenate([np.degrees(run.lag[run.times <= until]) for run in shown])
@@ -424,18 +384,17 @@ def _scene(run: Run) -> list[str]:
     return still + [_polyline(_projected(run.nodes[0, rod]), _FAINT, width=3.0) for rod in moving]
 
 
+def _ticked(run: Run) -> range:
+    """Edges of rod 1 whose directors are drawn: they turn where it is twisted."""
+    return range(run.twists.shape[1] if run.demonstration == "twisting" else 0)
+
+
 def _tick(run: Run, k: int, edge: int) -> Floats:
     """(2, 2) the first director of an edge of rod 1, which lies along -x as long as it is only twisted."""
     middle = run.nodes[k, 0, edge : edge + 2].mean(axis=0)
     angle = run.twists[k, edge]
     director = np.array([0.0, np.sin(angle), np.cos(angle)])
     return _projected(np.array([middle, middle + 0.55 * EDGE * director]))
-
-
-def _directors(run: Run, k: int) -> list[str]:
-    if run.demonstration != "twisting":
-        return []
-    return [_polyline(_tick(run, k, edge), RODS[0], width=1.6) for edge in range(run.twists.shape[1])]
 
 
 def _names(run: Run) -> list[str]:
@@ -448,13 +407,9 @@ def _names(run: Run) -> list[str]:
     return parts
 
 
-def _points(points: Floats) -> str:
-    return " ".join(f"{number(x)},{number(y)}" for x, y in points)
-
-
 def _polyline(points: Floats, colour: str, *children: str, width: float = 4.0, dash: str = "none") -> str:
     return tag(
-        "polyline", *children, points=_points(points), fill="none", stroke=colour, stroke_width=width,
+        "polyline", *children, points=joined(points), fill="none", stroke=colour, stroke_width=width,
         stroke_linecap="round", stroke_linejoin="round", stroke_dasharray=dash,
     )  # fmt: skip
 
@@ -464,5 +419,5 @@ def _dots(points: Floats, colour: str) -> str:
 
 
 def _moves(drawn: Sequence[Floats], seconds: str) -> str:
-    values = ";".join(_points(points) for points in drawn)
+    values = ";".join(joined(points) for points in drawn)
     return tag("animate", attributeName="points", values=values, dur=seconds, repeatCount="indefinite")

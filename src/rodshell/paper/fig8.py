@@ -19,7 +19,20 @@ from rodshell.formfinding import Draped, Fall, drape, map_back, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import mesh_grid
 from rodshell.model import Potential, Shell
-from rodshell.paper.figure import CASES, INK, LENGTH, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
+from rodshell.paper.figure import (
+    CASES,
+    INK,
+    LENGTH,
+    ROD,
+    TARGET_COLOURS,
+    Case,
+    Chart,
+    Figure,
+    Part,
+    Row,
+    Series,
+    charts_svg,
+)
 from rodshell.progress import Progress, silent
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.newton_matrix import Banded
@@ -49,7 +62,7 @@ _SIGNS = {
 
 
 @dataclass(frozen=True)
-class Timing:
+class Timing(Part):
     """One run.
 
     Args:
@@ -75,47 +88,41 @@ class Timing:
     in_own: float = 0.0
     step_in_lapack: float = 0.0
 
-    def row(self) -> tuple[str, ...]:
-        """Its row of the table."""
-        return (
+    def rows(self) -> list[Row]:
+        return [(
             self.target, self.method, f"{1e3 * self.step:g}" if self.step else "-", f"{1e3 * self.edge:g}",
             str(self.dofs), f"{self.seconds:.3g}", str(self.steps) if self.steps else "-", str(self.factorizations),
             *(f"{timing:.1f}" if timing else "-" for timing in (self.in_lapack, self.in_own, self.step_in_lapack)),
-        )  # fmt: skip
+        )]  # fmt: skip
+
+    def result(self) -> dict[str, Any]:
+        return asdict(self)
 
 
 @dataclass(frozen=True)
 class Fig8(Figure):
     """All runs. Only times are compared: whether each came to rest does not matter."""
 
-    timings: tuple[Timing, ...]
-    name = "fig8"
-    columns = COLUMNS
-    status = "converged"
+    parts: tuple[Timing, ...]
+    name, columns, key = "fig8", COLUMNS, "timings"
+    title = f"Fig 8 [HQK 3.3]: processor time; {FALLING:g} s of fall in the paper's scheme"
 
     def ratios(self) -> dict[str, float]:
         """Time of the paper's explicit scheme at `USUAL_STEP` over ours with the same mesh, by target [-]."""
-        ours = {(timing.target, timing.edge): timing for timing in self.timings if timing.method == "ours"}
-        paper = [timing for timing in self.timings if timing.method == "explicit" and timing.step == USUAL_STEP]
+        ours = {(timing.target, timing.edge): timing for timing in self.parts if timing.method == "ours"}
+        paper = [timing for timing in self.parts if timing.method == "explicit" and timing.step == USUAL_STEP]
         return {timing.target: timing.seconds / ours[timing.target, timing.edge].seconds for timing in paper}
 
     def slopes(self) -> dict[str, dict[str, float]]:
-        """Exponents of the unknowns in the times of the sizes, by method and target [-]."""
-        return {
-            method: {
-                target: _slope([float(run.dofs) for run in same], [run.seconds for run in same])
-                for target, same in _by_target(of_sizes(self.timings, method)).items()
-            }
-            for method in ("explicit", "ours")
-        }
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each run."""
-        return [timing.row() for timing in self.timings]
-
-    def heading(self) -> str:
-        """What was timed."""
-        return f"Fig 8 [HQK 3.3]: processor time; {FALLING:g} s of fall in the paper's scheme"
+        """Exponents of the unknowns in the times of the sizes, by least squares of logarithms; by method and target."""
+        slopes = dict[str, dict[str, float]]()
+        for method in ("explicit", "ours"):
+            runs = of_sizes(self.parts, method)
+            for target in dict.fromkeys(run.target for run in runs):
+                same = [run for run in runs if run.target == target]
+                slope = np.polyfit(np.log([run.dofs for run in same]), np.log([run.seconds for run in same]), 1)[0]
+                slopes.setdefault(method, {})[target] = float(slope)
+        return slopes
 
     def footing(self) -> str:
         """The ratios, and the slopes."""
@@ -128,21 +135,15 @@ class Fig8(Figure):
 
     def content(self) -> dict[str, Any]:
         """The runs, the ratios and the slopes."""
-        timings = [asdict(timing) for timing in self.timings]
-        return {"falling": FALLING, "timings": timings, "ratios": self.ratios(), "slopes": self.slopes()}
+        return {"falling": FALLING, **super().content(), "ratios": self.ratios(), "slopes": self.slopes()}
 
     def pictures(self) -> dict[str, str]:
         """Both charts."""
-        return {"fig8": _times_svg(self.timings)}
+        return {"fig8": _times_svg(self.parts)}
 
 
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float = FALLING) -> Fig8:
-    """Time everything, falls of `falling` seconds; the first run of each kind, which compiles, does not count.
-
-    Args:
-        progress: is called at each time step.
-        falling: simulated time of each fall [s].
-    """
+    """Time everything, falls of `falling` seconds; the first run of each kind, which compiles, does not count."""
     couplings: tuple[Coupling, ...] = (ExplicitPenalty(C1=C1), SharedDofs(), ImplicitPenalty())
     for coupling in couplings:
         _fall(cases[0], coupling, USUAL_STEP, 0.05, silent)
@@ -167,30 +168,17 @@ def sizes_of(case: Case) -> list[Case]:
     return sizes
 
 
-def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """Exponent of x in y, by least squares of their logarithms."""
-    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
-
-
 def of_sizes(timings: Sequence[Timing], method: str) -> list[Timing]:
     """The runs of a method at all sizes."""
     return [run for run in timings if run.method == method and run.step in (0.0, _SIZE_STEP)]
 
 
-def _by_target(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
-    names = dict.fromkeys(timing.target for timing in timings)
-    return {name: [timing for timing in timings if timing.target == name] for name in names}
-
-
 def _timed_fall(
     case: Case, coupling: Coupling, step: float, falling: float, progress: Progress, *, counted: bool = True
 ) -> Timing:
-    """A fall in the paper's scheme, of `falling` seconds with the time step `step` [s]; without its bare solves.
+    """A fall of `falling` seconds in the paper's scheme, with the time step `step` [s]; without its bare solves.
 
     Args:
-        step: time step [s].
-        falling: simulated time [s].
-        progress: is called at each time step.
         counted: whether explicit ties are counted in bare solves.
     """
     bare = BareSolves(case, coupling, step) if counted and isinstance(coupling, ExplicitPenalty) else None

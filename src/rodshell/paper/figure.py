@@ -13,6 +13,8 @@ from scipy.spatial import ConvexHull
 
 from rodshell.arrays import Bools, Floats
 from rodshell.layout import GridLayout, GridMesh
+from rodshell.output.drawing import FAMILIES
+from rodshell.output.grid import family_numbers
 from rodshell.output.pictures import RIGHT, TOWARDS, UP
 from rodshell.output.schedules import csv_text
 from rodshell.output.svg import document, label, number, tag
@@ -64,7 +66,6 @@ WIDE_CASES = (
 
 
 PAPER, INK, SOFT, _BODY = "#fdfdfb", "#22282f", "#7b838a", "#e2dccd"
-FAMILY = {"u": "#1f5f8b", "v": "#a8552a"}
 FLAT, FINAL = "#2f8f4e", "#8a3fa0"  # G0, G
 PANEL, GAP, HEAD, TEXT = 230.0, 16.0, 40.0, 12.0  # drawing units
 TARGET_COLOURS = {"hemisphere": "#1f5f8b", "paraboloid": "#a8552a", "ellipsoid": "#2f8f4e"}
@@ -124,46 +125,34 @@ def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool =
     near = np.ones(len(positions), dtype=bool)
     if hides:
         near = target.contact(positions).normal @ TOWARDS >= 0
-    filled = tag("polygon", points=joined(_hull(to_panel(_from_aside(body)))), fill=_BODY, stroke="none")
+    outline = to_panel(_from_aside(body))
+    filled = tag("polygon", points=joined(outline[ConvexHull(outline).vertices]), fill=_BODY, stroke="none")
     return [filled, *rod_lines(mesh, to_panel(_from_aside(positions)), near)]
 
 
-def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attributes: Any) -> Iterator[str]:
-    """Every rod by its nodes' points `at` (n, 2); pale where a node of an edge is not `near` (n,).
-
-    Args:
-        at: (n, 2) points of its nodes in the drawing.
-        near: (n,) bool, nodes in front; None: all.
-    """
-    for k, rod in enumerate(mesh.grid.rods):
+def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None) -> Iterator[str]:
+    """Every rod by its nodes' points `at` (n, 2) in the drawing; pale where a node of an edge is not `near` (n,)."""
+    families = family_numbers(rod.family for rod in mesh.grid.rods)
+    for k in range(len(mesh.grid.rods)):
         nodes = mesh.nodes_of(k)
         seen = np.ones(len(nodes) - 1, dtype=bool) if near is None else near[nodes[1:]] & near[nodes[:-1]]
         changes = [0, *(np.flatnonzero(seen[1:] != seen[:-1]) + 1).tolist(), len(seen)]
         for first, last in pairwise(changes):
             shade = {} if seen[first] else {"stroke_opacity": FAR}
             yield tag(
-                "polyline", points=joined(at[nodes[first : last + 1]]), fill="none", stroke=FAMILY[rod.family],
-                stroke_width=0.8, stroke_linejoin="round", **shade, **attributes,
+                "polyline", points=joined(at[nodes[first : last + 1]]), fill="none", stroke=FAMILIES[families[k]],
+                stroke_width=0.8, stroke_linejoin="round", **shade,
             )  # fmt: skip
 
 
 def dots(at: Floats, colour: str, radius: float = 2.2) -> Iterator[str]:
-    """Dots at the points `at` (n, 2).
-
-    Args:
-        at: (n, 2) points in the drawing.
-        radius: [drawing units].
-    """
+    """Dots at the points `at` (n, 2) in the drawing."""
     for x, y in at.tolist():
         yield tag("circle", cx=x, cy=y, r=radius, fill=colour)
 
 
 def closed(at: Floats, colour: str, **attributes: Any) -> str:
-    """A closed curve through the points `at` (n, 2), in the order of their angle about their middle.
-
-    Args:
-        at: (n, 2) points in the drawing.
-    """
+    """A closed curve through the points `at` (n, 2) in the drawing, in the order of their angle about their middle."""
     apart = at - at.mean(axis=0)
     order = np.argsort(np.arctan2(apart[:, 1], apart[:, 0]))
     look = {"fill": "none", "stroke_width": 1.0} | attributes
@@ -188,10 +177,6 @@ def _body(target: Target) -> Floats:
     ground = points.copy()
     ground[:, 2] = target.base
     return np.vstack([points, ground])
-
-
-def _hull(points: Floats) -> Floats:
-    return points[ConvexHull(points).vertices]
 
 
 # Logarithmic charts
@@ -285,37 +270,55 @@ Row = tuple[str, ...]
 VERSION = 1  # of the keys of a figure's result.json
 
 
+class Part(ABC):
+    """What a figure has several of: a shell, a run, a line of its table."""
+
+    @property
+    def status(self) -> str:
+        """ "converged", or what did not converge."""
+        return "converged"
+
+    @abstractmethod
+    def rows(self) -> list[Row]:
+        """Its rows of the table, mostly one."""
+
+    @abstractmethod
+    def result(self) -> dict[str, Any]:
+        """Its entry in result.json, SI."""
+
+
 class Figure(ABC):
     """A figure or a study of the paper, computed.
 
     Attributes:
         name: such as "fig6".
+        title: the line above the table.
         columns: heads of the table's columns.
+        key: of the parts in result.json.
     """
 
     name: str
+    title: str
     columns: Row
-
-    @property
-    @abstractmethod
-    def status(self) -> str:
-        """ "converged", or what did not converge."""
-
-    @abstractmethod
-    def heading(self) -> str:
-        """A line above the table."""
-
-    @abstractmethod
-    def rows(self) -> list[Row]:
-        """The table."""
-
-    @abstractmethod
-    def content(self) -> dict[str, Any]:
-        """The figure's part of result.json, SI."""
+    key: str
+    parts: tuple[Part, ...]
 
     @abstractmethod
     def pictures(self) -> dict[str, str]:
         """SVG drawings by name."""
+
+    @property
+    def status(self) -> str:
+        """ "converged", or that of the first part that did not converge."""
+        return next((part.status for part in self.parts if part.status != "converged"), "converged")
+
+    def rows(self) -> list[Row]:
+        """The table."""
+        return [row for part in self.parts for row in part.rows()]
+
+    def content(self) -> dict[str, Any]:
+        """The figure's part of result.json, SI."""
+        return {self.key: [part.result() for part in self.parts]}
 
     def tables(self) -> Mapping[str, Iterable[Sequence[object]]]:
         """Further tables with their heads, by name."""
@@ -331,7 +334,7 @@ class Figure(ABC):
 
     def summary(self) -> str:
         """The table as text."""
-        parts = (self.heading(), _aligned(self.columns, self.rows()), self.footing())
+        parts = (self.title, _aligned(self.columns, self.rows()), self.footing())
         return "\n\n".join(part for part in parts if part)
 
     def result(self) -> dict[str, Any]:

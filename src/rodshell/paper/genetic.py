@@ -16,7 +16,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, Stages, agreement, find_stages
-from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
+from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Part, Row, Series, charts_svg
 from rodshell.paper.genetic_records import History, stored
 from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
 from rodshell.progress import Progress, silent
@@ -33,7 +33,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Sought:
+class Sought(Part):
     """What one search found.
 
     Args:
@@ -54,17 +54,16 @@ class Sought:
             return f"the best footprint of {search} does not pop up again as it did"
         return "converged" if history.converged else f"{search} has not converged: {history.ending}"
 
-    def row(self) -> tuple[str, ...]:
-        """Its row of the table."""
+    def rows(self) -> list[Row]:
         history, apart = self.history, 1e3 * self.apart
-        return (
+        row = (
             history.target, f"genetic algorithm, seed {history.seed}", str(len(history.variables)), str(history.runs),
             f"{history.seconds:.0f}", *_shape(self.best), f"{apart.max():.2f}", f"{np.sqrt(np.mean(apart**2)):.2f}",
             f"{'converged' if history.converged else 'NOT CONVERGED'}: {history.ending}",
         )  # fmt: skip
+        return [row]
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json, SI."""
         history, best = self.history, self.best
         return {
             "seed": history.seed, "status": self.status, "forward_runs": history.runs, "seconds": history.seconds,
@@ -76,7 +75,7 @@ class Sought:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Part):
     """One target by both methods.
 
     Args:
@@ -90,7 +89,6 @@ class Comparison:
 
     @property
     def status(self) -> str:
-        """ "converged", or the first problem."""
         return next((search.status for search in self.searches if search.status != "converged"), "converged")
 
     @property
@@ -98,10 +96,9 @@ class Comparison:
         """Processor time of the direct method on the machine of the best search [s]."""
         return self.searches[0].history.direct_seconds
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Its rows of the table."""
+    def rows(self) -> list[Row]:
         direct = (self.case.target.name, "direct method", "-", "1", f"{self.direct_seconds:.2g}", *_shape(self.direct))
-        return [(*direct, "-", "-", "-"), *(search.row() for search in self.searches)]
+        return [(*direct, "-", "-", "-"), *(row for search in self.searches for row in search.rows())]
 
     def spread(self) -> str:
         """The popped shapes of the searches in a clause."""
@@ -114,7 +111,6 @@ class Comparison:
         return f"{self.case.target.name}: {ratios}, for {runs} times the runs"
 
     def result(self) -> dict[str, Any]:
-        """Its part of result.json, SI."""
         return {
             "target": self.case.target.parameters(), "status": self.status, "direct_seconds": self.direct_seconds,
             "direct": {"rms": self.direct.rms, "max": self.direct.max},
@@ -126,40 +122,21 @@ class Comparison:
 class Genetic(Figure):
     """All targets."""
 
-    comparisons: tuple[Comparison, ...]
-    name = "genetic"
-    columns = COLUMNS
-
-    @property
-    def status(self) -> str:
-        """ "converged", or the first problem."""
-        problems = (comparison.status for comparison in self.comparisons if comparison.status != "converged")
-        return next(problems, "converged")
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table: for each target the direct method, then the searches."""
-        return [row for comparison in self.comparisons for row in comparison.rows()]
-
-    def heading(self) -> str:
-        """What is compared."""
-        return "The genetic algorithm [HQK 3.2] and the direct method: ends pinned, 15 mm edges, every run from flat"
+    parts: tuple[Comparison, ...]
+    name, columns, key = "genetic", COLUMNS, "comparisons"
+    title = "The genetic algorithm [HQK 3.2] and the direct method: ends pinned, 15 mm edges, every run from flat"
 
     def footing(self) -> str:
-        """The gains."""
-        gains = "; ".join(comparison.spread() for comparison in self.comparisons)
+        gains = "; ".join(comparison.spread() for comparison in self.parts)
         return f"rms of the direct method over that of the genetic algorithm: {gains}"
-
-    def content(self) -> dict[str, Any]:
-        """The comparisons."""
-        return {"comparisons": [comparison.result() for comparison in self.comparisons]}
 
     def pictures(self) -> dict[str, str]:
         """The convergence."""
-        return {"genetic": convergence_svg(self.comparisons)}
+        return {"genetic": convergence_svg(self.parts)}
 
     def texts(self) -> dict[str, str]:
         """Each history."""
-        histories = [search.history for comparison in self.comparisons for search in comparison.searches]
+        histories = [search.history for comparison in self.parts for search in comparison.searches]
         return {f"{history.target}-{history.seed}.json": history.json() for history in histories}
 
 
@@ -209,11 +186,7 @@ def find(
     case: Case, folder: Path, *, seed: int, jobs: int = 1, population: int = POPULATION, most: int = MOST,
     progress: Progress = silent,
 ) -> History:  # fmt: skip
-    """A whole search (see `search`), whose values are written to `folder`.
-
-    Args:
-        seed, jobs, population, most, progress: see `search`.
-    """
+    """A whole search, whose values are written to `folder`; all else is as of `search`."""
     times = []
     for _ in range(REPEATS):
         begun = process_time()
@@ -221,10 +194,11 @@ def find(
         times.append(process_time() - begun)
     design, name = Design.of(direct), case.target.name
     file = folder / f"{name}-seed{seed}.json"
-    found = search(design, file, seed=seed, jobs=jobs, population=population, most=most, progress=progress)
-    rods = tuple(line.name for line in design.lines)
-    footprint = design.footprint(found.variables).points
-    return History(name, seed, population, found.generations, found.variables, rods, footprint, min(times))
+    generations, variables = search(
+        design, file, seed=seed, jobs=jobs, population=population, most=most, progress=progress
+    )
+    rods, footprint = tuple(line.name for line in design.lines), design.footprint(variables).points
+    return History(name, seed, population, generations, variables, rods, footprint, min(times))
 
 
 def compare(case: Case, histories: Sequence[History]) -> Comparison:

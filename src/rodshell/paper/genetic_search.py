@@ -1,28 +1,24 @@
 """The genetic search of an inverse design: what is sought, and the run, seeded and in several processes."""
 
-import os
-import signal
-import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import repeat
 from math import inf
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from pathlib import Path
 from time import process_time
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.errors import InputError
+from rodshell.errors import needs_package
 from rodshell.formfinding import Stages, agreement, pop_up
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
-from rodshell.layout.flatgrid import Family
-from rodshell.layout.gridlayout import require_chebyshev
+from rodshell.layout.gridlayout import FAMILIES, require_chebyshev
 from rodshell.layout.mesh import CROWDED
 from rodshell.paper.figure import ROD
 from rodshell.paper.genetic_records import GAIN, Evaluate, Generation, Judged, StoredValues, gain
@@ -30,6 +26,7 @@ from rodshell.progress import Progress
 from rodshell.rods.supports import PINNED
 from rodshell.sweeps.asktell import AskTell
 from rodshell.targets import Target
+from rodshell.threads import work_for_parent
 
 PATIENCE = 100  # Newton iterations of a pop-up from flat; smooth footprints mostly need 25 to 60
 SAME = 1e-4  # times the size: ends of G are much further apart
@@ -82,7 +79,7 @@ class Design:
     def footprint(self, variables: Floats) -> Footprint:
         """The flat grid of `variables` (n,), meshed as by the direct method: a node at every line of the lattice."""
         reach = variables[self.orbit].reshape(-1, 2)
-        middles = [self.layout.middle(line.family) for line in self.lines]
+        middles = [self.layout.middle(line) for line in self.lines]
         rods = [
             line.cut(middle - before, middle + after)
             for line, middle, (before, after) in zip(self.lines, middles, reach.tolist(), strict=True)
@@ -92,8 +89,8 @@ class Design:
 
     def _lattice(self, rod: FlatRod) -> list[float]:
         """Positions along a rod at which the lattice's lines cross it, without those too near its ends [m]."""
-        across: Family = "v" if rod.family == "u" else "u"
-        step, first = self.layout.spacing[0 if across == "u" else 1], self.layout.phase(across)
+        across = 1 - FAMILIES.index(rod.family)
+        step, first = self.layout.spacing[across], self.layout.phase(across)
         clear = CROWDED * self.layout.edge
         low, high = np.ceil((rod.start + clear - first) / step), np.floor((rod.end - clear - first) / step)
         return [first + step * k for k in range(int(low), int(high) + 1)]
@@ -103,9 +100,6 @@ class Design:
 
         None if a rod has too few joints, or after `patience` iterations. Always from flat: a shell has other stable
         states than the one that it reaches from there.
-
-        Args:
-            variables: (n,) distances of the rod ends from the middle of their rods [m].
         """
         footprint = self.footprint(variables)
         if footprint.mesh.grid.joint_counts().min() < FEWEST_JOINTS:
@@ -132,9 +126,6 @@ class Design:
         The distance is that of nodes and of the middles of edges. A shell that is not stable counts as one at the
         distance of the target's size: a rod with fewer than three joints, no stable state with the ends on G, or none
         within `PATIENCE` iterations.
-
-        Args:
-            variables: (n,) distances of the rod ends from the middle of their rods [m].
         """
         popped = self.pop_up(variables, patience=PATIENCE)
         if popped is None or not popped.report.stable:
@@ -145,9 +136,6 @@ class Design:
         """(count, n) random footprints, smooth except for a share `roughness` of the bounds at every end.
 
         Along each side of each family the share of the bounds is a parabola of Bernstein form with random coefficients.
-
-        Args:
-            roughness: share of the bounds that is random at every end [-].
         """
         sides = np.array([[f"{line.family}-", f"{line.family}+"] for line in self.lines]).ravel()
         offsets = np.repeat([line.offset for line in self.lines], 2)
@@ -187,7 +175,7 @@ def _orbits(target: Target, lines: tuple[FlatRod, ...], points: Floats) -> Ints:
     """
     plan, size = points[:, :2] - target.summit, target.size
     orbit = np.arange(len(points))
-    offsets = np.repeat([abs(line.offset) for line in lines], 2)
+    offsets = np.abs(np.repeat([line.offset for line in lines], 2))
     for turn in _SQUARE:
         apart = np.linalg.norm((plan @ turn.T)[:, None] - plan[None], axis=2)
         image = apart.argmin(axis=1)
@@ -206,18 +194,10 @@ _SQUARE = [
 # The run
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """The generations of a search and its best variables (n,) [m]."""
-
-    generations: tuple[Generation, ...]
-    variables: Floats
-
-
 def search(
     design: Design, file: Path, *, seed: int, jobs: int = 1, population: int = POPULATION, most: int = MOST,
     progress: Progress,
-) -> Found:  # fmt: skip
+) -> tuple[tuple[Generation, ...], Floats]:  # fmt: skip
     """Search from the random footprints of a seed, or continue, until the best gains less than `GAIN` in `WINDOW`
     generations.
 
@@ -227,7 +207,9 @@ def search(
         file: of all values, written after each generation and when interrupted; the search continues from it.
         jobs: number of processes; the result does not depend on it.
         most: generations after which a search that has not converged ends.
-        progress: is called after each value.
+
+    Returns:
+        The generations, and the best variables (n,) [m].
 
     Raises:
         InputError: pymoo is not installed; the file is broken or of a different search.
@@ -252,7 +234,7 @@ def search(
         raise KeyboardInterrupt(f"{file} has the values found so far; the same command continues from there") from None
     progress(stage, "done", 0.0)
     points, errors = algorithm.survivors
-    return Found(tuple(generations), points[int(np.argmin(errors[:, 0]))])
+    return tuple(generations), points[int(np.argmin(errors[:, 0]))]
 
 
 def _generation(
@@ -267,10 +249,8 @@ def _generation(
 def _algorithm(design: Design, seed: int, population: int) -> AskTell:
     """Ready to be asked."""
     first = design.random(np.random.default_rng(seed), population, ROUGHNESS)
-    try:
+    with needs_package("the genetic algorithm", "pymoo", "paper"):
         return AskTell(design.lower, design.upper, first, seed=seed)
-    except ImportError as error:
-        raise InputError('the genetic algorithm needs the package pymoo: pip install "rodshell[paper]"') from error
 
 
 @contextmanager
@@ -279,24 +259,11 @@ def _evaluators(design: Design, jobs: int) -> Iterator[Evaluate]:
     if jobs == 1:
         yield lambda individuals: (_judge(design, variables) for variables in individuals)
         return
-    pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_follow_parent)
+    pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=work_for_parent)
     try:
         yield lambda individuals: pool.map(_judge, repeat(design), individuals)
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _follow_parent() -> None:
-    """End together with the parent process, however it ends; Ctrl-C, which reaches every process, is ignored."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 def _judge(design: Design, variables: Floats) -> Judged:

@@ -14,8 +14,9 @@ from rodshell.joints import Coupling, ImplicitPenalty, Linker, SharedDofs
 from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell
 from rodshell.model.elastic_rod import ElasticRod
+from rodshell.output.drawing import FAMILIES
 from rodshell.output.svg import label, tag
-from rodshell.paper.figure import FAMILY, FINAL, FLAT, INK, PANEL, ROD, SOFT, Figure, joined, rows_of_panels
+from rodshell.paper.figure import FINAL, FLAT, INK, PANEL, ROD, SOFT, Figure, Part, Row, joined, rows_of_panels
 from rodshell.progress import Progress
 from rodshell.rods.elements import is_bends
 from rodshell.targets import Hemisphere
@@ -27,33 +28,28 @@ Drawn = dict[int, Floats]  # of blocks, in a panel
 
 
 @dataclass(frozen=True)
+class Counted(Part):
+    """The unknowns and stencils of one drawing, as the table shows them."""
+
+    cells: Row
+
+    def rows(self) -> list[Row]:
+        return [self.cells]
+
+    def result(self) -> dict[str, Any]:
+        return dict(zip(COLUMNS, self.cells, strict=True))
+
+
+@dataclass(frozen=True)
 class Stencils(Figure):
     """A rod, and the basic element with shared and with separate unknowns."""
 
+    parts: tuple[Counted, ...]
     rod: ElasticRod
     shared: Shell
     separate: Shell
-    name = "stencils"
-    columns = COLUMNS
-    status = "converged"
-
-    def heading(self) -> str:
-        """What is counted."""
-        return "Figs 2, 3, 5 [HQK]: unknowns and stencils, of a rod of 5 nodes and of two such rods with two linkers"
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table."""
-        rod = ("Fig 2", f"rod of N = {NODES} nodes, 4N - 1", str(self.rod.freedom().size), str(NODES - 2), "-", "-")
-        return [
-            rod,
-            ("Fig 3 (a)", "two rods and linkers on shared unknowns", *_counts(self.shared)),
-            ("Fig 3 (b)", "the same as rods of their own", *_counts(self.separate)),
-            ("Fig 5", "node in contact", "2 of 3", "-", "-", "-"),
-        ]
-
-    def content(self) -> dict[str, Any]:
-        """The table."""
-        return {"rows": [dict(zip(COLUMNS, row, strict=True)) for row in self.rows()]}
+    name, columns, key = "stencils", COLUMNS, "rows"
+    title = "Figs 2, 3, 5 [HQK]: unknowns and stencils, of a rod of 5 nodes and of two such rods with two linkers"
 
     def pictures(self) -> dict[str, str]:
         """Both rows of panels."""
@@ -69,7 +65,14 @@ class Stencils(Figure):
 def make(_: Progress) -> Stencils:
     """The rod and the elements."""
     line = np.linspace([0.0, 0.0, 0.0], [(NODES - 1) * EDGE, 0.0, 0.0], NODES)
-    return Stencils(ElasticRod.of(line, ROD), _shell(SharedDofs()), _shell(ImplicitPenalty()))
+    rod, shared, separate = ElasticRod.of(line, ROD), _shell(SharedDofs()), _shell(ImplicitPenalty())
+    rows = (
+        ("Fig 2", f"rod of N = {NODES} nodes, 4N - 1", str(rod.freedom().size), str(NODES - 2), "-", "-"),
+        ("Fig 3 (a)", "two rods and linkers on shared unknowns", *_counts(shared)),
+        ("Fig 3 (b)", "the same as rods of their own", *_counts(separate)),
+        ("Fig 5", "node in contact", "2 of 3", "-", "-", "-"),
+    )
+    return Stencils(tuple(map(Counted, rows)), rod, shared, separate)
 
 
 def _shell(coupling: Coupling) -> Shell:
@@ -78,7 +81,7 @@ def _shell(coupling: Coupling) -> Shell:
     return Shell.of(mesh_grid(grid, EDGE), ROD, joint=Linker(), coupling=coupling, twist=True)
 
 
-def _counts(shell: Shell) -> tuple[str, ...]:
+def _counts(shell: Shell) -> Row:
     bends = sum(len(element.blocks) for element in shell.elements if element.blocks.shape[1] == NODES)
     nodes = shell.like < shell.mesh.node_count
     of_nodes = [bool(nodes[tie[0]]) for element in shell.between for tie in element.blocks]
@@ -91,7 +94,7 @@ def _rod(rod: ElasticRod) -> Iterator[str]:
     nodes = 0.5 * PANEL + 0.42 * PANEL * np.column_stack([np.sin(turn) / np.sin(0.9), 1.2 - 1.6 * np.cos(turn)])
     drawn = dict(enumerate(nodes)) | {NODES + k: (nodes[k] + nodes[k + 1]) / 2 for k in range(NODES - 1)}
     yield _line(nodes, INK, 1.2)
-    yield _line(np.array([drawn[block] for block in rod.elements[0].blocks[1]]), FAMILY["u"], 3.5)
+    yield _line(np.array([drawn[block] for block in rod.elements[0].blocks[1]]), FAMILIES[0], 3.5)
     for block, at in drawn.items():
         node, number = block < NODES, block % NODES + 1
         yield from _mark(at, f"x{number}" if node else f"\N{GREEK SMALL LETTER THETA}{number}", INK, hollow=not node)
@@ -106,12 +109,12 @@ def _element(shell: Shell) -> Iterator[str]:
         yield _line(np.array([drawn[block] for block in blocks[::2]]), FLAT, 3.0 if apart else 8.0, stroke_opacity=0.6)
         for k, block in enumerate(blocks[::2] if apart else ()):
             yield from _mark(drawn[block], f"x^{number + 1},{k + 1}", FLAT)
-    for rod, family in enumerate("uv"):
+    for rod in (0, 1):
         blocks = shell.node_blocks[rod * NODES : (rod + 1) * NODES]
-        yield _line(np.array([drawn[block] for block in blocks.tolist()]), FAMILY[family], 1.6)
+        yield _line(np.array([drawn[block] for block in blocks.tolist()]), FAMILIES[rod], 1.6)
         for k, block in enumerate(blocks.tolist()):
             yield from _mark(
-                drawn[block], f"x{rod + 1},{k + 1}" if apart or k != 2 else "joint" if rod else "", FAMILY[family]
+                drawn[block], f"x{rod + 1},{k + 1}" if apart or k != 2 else "joint" if rod else "", FAMILIES[rod]
             )
     for element in shell.between:
         for a, b in element.blocks.tolist():

@@ -21,7 +21,7 @@ from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, L
 from rodshell.layout import GridLayout
 from rodshell.layout.gridlayout import require_chebyshev
 from rodshell.nets import chebyshev_net
-from rodshell.paper.figure import EDGE, HEIGHT, LENGTH, ROD, Chart, Figure, Series, charts_svg
+from rodshell.paper.figure import EDGE, HEIGHT, LENGTH, ROD, Chart, Figure, Part, Row, Series, charts_svg
 from rodshell.progress import Progress
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, GivenSection, Rod
@@ -51,7 +51,7 @@ LEAST = 1e-5  # [mm]: smaller changes are not drawn
 
 
 @dataclass(frozen=True)
-class Line:
+class Line(Part):
     """One run.
 
     Args:
@@ -73,40 +73,29 @@ class Line:
     strain: float
     rests: str
 
-    def row(self) -> tuple[str, ...]:
-        """Its row of the table."""
+    def rows(self) -> list[Row]:
         errors = (self.change_rms, self.change_max, self.off_net)
-        return (
+        return [(
             self.changed, self.value, f"{self.factor:g}", self.on,
             *("-" if np.isnan(error) else f"{1e3 * error:.2g}" for error in errors),
             "-" if np.isnan(self.strain) else f"{self.strain:.1e}", self.rests,
-        )  # fmt: skip
+        )]  # fmt: skip
+
+    def result(self) -> dict[str, Any]:
+        """None in the place of NaN."""
+        return {name: None if value != value else value for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True)
 class Studies(Figure):
     """All runs. That a grid does not drape is a result, too."""
 
-    lines: tuple[Line, ...]
-    name = "studies"
-    columns = COLUMNS
-    status = "converged"
-
-    def heading(self) -> str:
-        """The title."""
-        return TITLE
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """The table, a row for each run."""
-        return [line.row() for line in self.lines]
-
-    def content(self) -> dict[str, Any]:
-        """The runs; None for a run that was not made."""
-        return {"lines": [{k: None if v != v else v for k, v in asdict(line).items()} for line in self.lines]}
+    parts: tuple[Line, ...]
+    name, title, columns, key = "studies", TITLE, COLUMNS, "lines"
 
     def pictures(self) -> dict[str, str]:
         """Both charts."""
-        return {"studies": _studies_svg(self.lines)}
+        return {"studies": _studies_svg(self.parts)}
 
 
 def make(progress: Progress) -> Studies:
@@ -115,11 +104,7 @@ def make(progress: Progress) -> Studies:
 
 
 def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Line]:
-    """E, r, g, EA and EI by gravity statics.
-
-    Args:
-        progress: is called before each drape.
-    """
+    """E, r, g, EA and EI by gravity statics."""
     base = drape(layout, ROD, TARGET, method=Gravity())
     for changed, (powers, given) in _PARAMETERS.items():
         for factor in (10.0**power for power in powers):
@@ -130,12 +115,7 @@ def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Lin
 
 
 def of_height(progress: Progress, *, factors: tuple[float, ...] = HEIGHTS) -> Iterator[Line]:
-    """H, by falls.
-
-    Args:
-        progress: is called before each fall.
-        factors: heights over the paper's [-].
-    """
+    """H, by falls; `factors` are heights over the paper's."""
     base = _fallen(Fall(drag=DRAG))
     for factor in factors:
         height = HEIGHT * factor

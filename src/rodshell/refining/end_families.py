@@ -42,11 +42,7 @@ class Directions:
     common = False
 
     def tangents(self, values: Floats) -> Floats:
-        """(2m, 3) directions of the clamps.
-
-        Args:
-            values: (4m,) of the variables.
-        """
+        """(2m, 3) directions of the clamps by `values` (4m,)."""
         first = self.structure.popped.boundary.tangents
         tilt, turn = values.reshape(-1, 2).T[:, :, None] * self.axes
         return unit(first + tilt + turn)
@@ -115,13 +111,10 @@ class Slides:
     common = False
 
     def moved(self, values: Floats) -> Floats:
-        """(2m, 3) displacements of the rod ends [m].
+        """(2m, 3) displacements of the rod ends by `values` (2m,) [m].
 
         Each end goes along a straight line, and from there back to the surface and to its distance from the end. What
         that does to an end that is not moved at all is taken away: so no variable has an effect at zero.
-
-        Args:
-            values: (2m,) of the variables [m].
         """
         return np.asarray(self._placed(values) - self._placed(0.0 * values))
 

@@ -74,7 +74,6 @@ def gates(
         form: the design, popped up with one end condition.
         all_of_them: try the others too after a gate has refused it.
         span_error: largest error of each span as it is built [m]; None: `SPAN_ERROR` of the target's size.
-        progress: called as progress(stage, detail, residual).
     """
     passed, first, factorizations = dict[str, bool](), "", 0
     for name in GATES:
@@ -99,6 +98,9 @@ def _stable(form: Stages, *_: object) -> tuple[str, int]:
 
 
 def _flat(form: Stages, *_: object) -> tuple[str, int]:
+    """Rods along curves of the target keep their holes."""
+    if form.flat_state is not None:
+        return "", 0
     worst = misfit(form.footprint.mesh) / form.target.size
     if worst <= MISFIT:
         return "", 0
@@ -138,7 +140,6 @@ def worst_with_errors(form: Stages, span_error: float, progress: Progress = sile
     Args:
         form: the design, popped up with one end condition.
         span_error: largest error of each span's length [m].
-        progress: called as progress(stage, detail, residual).
 
     Returns:
         None in place of the gap where one of them has no stable state nearby.
@@ -154,6 +155,9 @@ def worst_with_errors(form: Stages, span_error: float, progress: Progress = sile
 
 
 def _from_flat(form: Stages, _: object, progress: Progress) -> tuple[str, int]:
+    """Shells that do not lie straight in the plane may be assembled in place."""
+    if form.flat_state is not None:
+        return "", 0
     (shell,) = form.popped.values()
     found = pop_up(
         form.footprint, form.boundary, form.rod, ends=shell.support, start="flat", joint=form.joint,

@@ -85,7 +85,8 @@ def gauss_newton(
             break
         if fresh:
             r, jacobian = residuals(objectives, here), slopes(objectives, here) * box.scale
-            reduced, right = _reduced(jacobian, r)
+            q, reduced = np.linalg.qr(jacobian)  # a square problem with the same minima
+            right = -q.T @ r
             cost, fresh = float(r @ r), False
         low = np.maximum((box.lower - here.values) / box.scale, -radius)
         high = np.minimum((box.upper - here.values) / box.scale, radius)
@@ -122,12 +123,6 @@ def gauss_newton(
             stopped = str(late)
             break
     return Found(tuple(accepted), converged, factorizations, tuple(steps), stopped)
-
-
-def _reduced(jacobian: Floats, r: Floats) -> tuple[Floats, Floats]:
-    """A square problem with the same minima."""
-    q, upper = np.linalg.qr(jacobian)
-    return upper, -q.T @ r
 
 
 def _least_squares(matrix: Floats, right: Floats, low: Floats, high: Floats) -> Floats:

@@ -11,7 +11,7 @@ from scipy.sparse import csc_array, csr_array
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.layout import FlatGrid, FlatRod, GridMesh
+from rodshell.layout import FlatGrid, GridMesh
 from rodshell.layout.flatgrid import Crossings
 from rodshell.refining.change import Change
 from rodshell.refining.structure import Structure
@@ -19,6 +19,7 @@ from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
 
 MOST = 0.35  # of the usual span: how far a point may move along its rod
+SQUARE = 1e-6  # largest cosine of what counts as a right angle
 FIRST = 0.05  # of the usual span: the change that counts as one
 
 
@@ -43,8 +44,7 @@ class Stations:
 
     def change(self, values: Floats) -> Change:
         mesh, held = self.structure.mesh, len(self.structure.held)
-        before, after = _edge_entries(mesh)
-        slopes = csc_array(self.shifts[after] - self.shifts[before])
+        slopes = csc_array(self.shifts[mesh.edge_entries + 1] - self.shifts[mesh.edge_entries])
         none = Change.none(len(mesh.edges), held, len(values))
         return replace(none, lengths=slopes @ values, length_slopes=slopes)
 
@@ -63,7 +63,7 @@ class Tails:
     def on(self, structure: Structure) -> Stations:
         """The change of the tail at the start and the end of each rod."""
         mesh = structure.mesh
-        points, ends = moved_points(mesh), _end_entries(mesh)
+        points, ends = moved_points(mesh), mesh.end_entries
         inner = points[np.searchsorted(points, ends) + np.tile([1, -1], len(mesh.rod_start))]
         tails = np.abs(mesh.stations[ends] - mesh.stations[inner])
         span, outward = usual_span(mesh), np.tile([-1.0, 1.0], len(mesh.rod_start))
@@ -82,18 +82,18 @@ class Offsets:
         """The growth of each rod's offset.
 
         Raises:
-            InputError: rods are not of two orthogonal families.
+            InputError: rods do not all cross at right angles.
         """
         mesh, rods = structure.mesh, structure.mesh.grid.rods
-        if any(rod.family == "free" for rod in rods):
-            raise InputError("offsets can only vary in a grid of two families of parallel rods: vary something else")
-        crossing = mesh.at_crossings
+        across, along = np.array([rod.across for rod in rods]), np.array([rod.direction for rod in rods])
         count, pairs = len(rods), mesh.grid.crossings.rods
-        rows, columns = crossing[:, ::-1].ravel(), pairs.ravel()  # a rod moves the joints on those that it crosses
-        moved = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(mesh.stations), count))
-        moved.data = np.minimum(moved.data, 1.0)
+        if np.abs(np.einsum("ci,ci->c", *along[pairs].transpose(1, 0, 2))).max(initial=0.0) > SQUARE:
+            raise InputError("offsets can only vary in a grid whose rods cross at right angles: vary something else")
+        rows, columns = mesh.at_crossings[:, ::-1].ravel(), pairs.ravel()  # a rod moves joints on those that it crosses
+        moves = np.einsum("ci,ci->c", across[columns], along[pairs[:, ::-1].ravel()])
+        moved = csr_array((moves, (rows, columns)), shape=(len(mesh.stations), count))
+        moved.data = np.clip(moved.data, -1.0, 1.0)
         box = Box.about_zero(count, MOST * usual_span(mesh), FIRST * usual_span(mesh))
-        across = np.array([(0.0, 1.0) if rod.family == "u" else (1.0, 0.0) for rod in rods])
 
         def image(by: Operation) -> Image:
             return Image(by.rods, np.round(np.einsum("mi,mi->m", across @ by.turn.T, across[by.rods])))
@@ -126,12 +126,6 @@ class Holes:
         return Stations(structure, between(mesh) @ moved, box, image)
 
 
-def _edge_entries(mesh: GridMesh) -> tuple[Ints, Ints]:
-    """(e,) entries of `rod_nodes` at which each edge begins and ends."""
-    begins = np.setdiff1d(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
-    return begins, begins + 1
-
-
 def usual_span(mesh: GridMesh) -> float:
     """Median distance of neighbouring joints along rods [m]."""
     entries = np.unique(mesh.at_crossings)
@@ -139,14 +133,9 @@ def usual_span(mesh: GridMesh) -> float:
     return float(np.median(np.diff(mesh.stations[entries])[same]))
 
 
-def _end_entries(mesh: GridMesh) -> Ints:
-    """(2m,) entries of `rod_nodes` at which each rod starts and ends."""
-    return np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
-
-
 def moved_points(mesh: GridMesh) -> Ints:
     """Entries of `rod_nodes` that variables move, ascending: joints and ends of rods."""
-    return np.unique(np.append(mesh.at_crossings, _end_entries(mesh)))
+    return np.unique(np.append(mesh.at_crossings, mesh.end_entries))
 
 
 def between(mesh: GridMesh) -> csr_array:
@@ -168,9 +157,9 @@ def _restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
         across: (m,) growth of the rods' offsets [m].
     """
     stations = mesh.stations + along
-    ends = stations[_end_entries(mesh)].reshape(-1, 2)
+    ends = stations[mesh.end_entries].reshape(-1, 2)
     rods = tuple(
-        _moved(rod, float(start), float(end), float(by))
+        rod.cut(float(start), float(end), float(by))
         for rod, (start, end), by in zip(mesh.grid.rods, ends, across, strict=True)
     )
     crossings = Crossings(mesh.grid.crossings.rods, stations[mesh.at_crossings])
@@ -181,10 +170,3 @@ def _restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
     np.add.at(visits, mesh.rod_nodes, 1.0)
     placed = np.column_stack([flat / visits[:, None], mesh.heights])
     return replace(mesh, grid=FlatGrid(rods, crossings), flat=placed, stations=stations)
-
-
-def _moved(rod: FlatRod, start: float, end: float, across: float) -> FlatRod:
-    """A rod with other ends, its line moved across itself."""
-    x, y = rod.origin
-    origin = (x, y + across) if rod.family == "u" else (x + across, y)
-    return rod._replace(start=start, end=end, offset=rod.offset + across, origin=origin if across else rod.origin)

@@ -73,9 +73,6 @@ class Offer:
 def offer(stages: Stages, *, progress: Progress = silent) -> Offer | None:
     """What double laths would gain, for pinned ends if the form has them.
 
-    Args:
-        progress: called as progress(stage, detail, residual).
-
     Returns:
         None where the form has no target, no stable shell, or rods whose sections change along them; where no design of
         a patch is stable; or where the time was over.

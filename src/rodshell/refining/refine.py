@@ -13,7 +13,6 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.figures.records import Ends
-from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, Stages, agreement
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
@@ -34,6 +33,7 @@ FAMILIES: dict[str, Family] = {
 """The families of variables by the names that users write."""
 
 STIFFNESSES = ("taper", "double", "sections")  # the others work by compressing rods, too
+LENGTHS = ("tails", "holes", "offsets")  # of which rods along curves of a target have their own
 STIFFER = 1.02  # of the eigenvalue before, since EA does not follow EI
 OPPOSITE = 0.5  # of the way that lengths go, to the other side: all of it mostly has no stable equilibrium
 LEAST_EIGENVALUE = 0.5  # of the lowest one before
@@ -114,6 +114,11 @@ def refine(
         ConvergenceError: it falls under the loads, or has no stable equilibrium with the design to start from.
     """
     families = chosen_families(vary)
+    if stages.flat_state is not None and (lengths := [each.name for each in families if each.name in LENGTHS]):
+        raise InputError(
+            f"{' and '.join(lengths)} cannot vary where rods follow curves of the target, on which their joints lie: "
+            "vary taper, double or sections"
+        )
     ends = stages.ends[0] if ends is None else ends
     structure = replace(structure_of(stages, ends), weight=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)
@@ -318,13 +323,7 @@ def loaded_gap(stages: Stages, design: Point, ends: Ends) -> Agreement:
     Args:
         design: of which it is built, with its loaded equilibrium.
     """
-    popped, here, structure = stages.popped[ends], design.equilibrium, design.structure
-    load = np.zeros_like(popped.state)
-    nodes = slice(0, popped.shell.first_angle)
-    if structure.weight:
-        load[nodes, 2] = -structure.weight * STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
-    if structure.dead_loads is not None:
-        load[: len(structure.dead_loads)] += structure.dead_loads
-    shell = popped.shell.with_frames_of(here.elements)
+    popped, here = stages.popped[ends], design.equilibrium
+    load, shell = design.structure.load_on(popped.shell), popped.shell.with_frames_of(here.elements)
     problem = replace(popped.equilibrium.problem, elements=shell.elements, load=load)
     return agreement(replace(popped, equilibrium=find_equilibrium(problem, here.state, here.forces)), stages.target)

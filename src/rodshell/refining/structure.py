@@ -63,19 +63,20 @@ class Structure:
         by_stiffness = self.weight * STANDARD_GRAVITY * self.rod.mass_per_length / self.rod.stretch_stiffness
         return replace(edges, weight=np.full(len(table), by_stiffness)) if self.weight else edges
 
+    def load_on(self, shell: Shell) -> Floats:
+        """(N, 3) weight and dead loads of a shell with the same nodes [N]."""
+        nodes, load = slice(0, shell.first_angle), np.zeros((len(shell.like), 3))
+        if self.weight:
+            load[nodes, 2] = -self.weight * STANDARD_GRAVITY * shell.mass[nodes, 2]
+        if self.dead_loads is not None:
+            load[: len(self.dead_loads)] += self.dead_loads
+        return load
+
     @cached_property
     def constant_load(self) -> Floats:
         """(N, 3) the load that does not change with a design: the weight of joints, and the dead loads [N]."""
-        shell, edges = self.popped.shell, self.edges
-        result = np.zeros((len(shell.like), 3))
-        nodes = slice(0, shell.first_angle)
-        if self.weight:
-            result[nodes, 2] = (
-                -self.weight * STANDARD_GRAVITY * shell.mass[nodes, 2] - edges.load(len(result))[nodes, 2]
-            )
-        if self.dead_loads is not None:
-            result[: len(self.dead_loads)] += self.dead_loads
-        return result
+        load = self.load_on(self.popped.shell)
+        return load - self.edges.load(len(load))
 
     def load(self, edges: EdgeProperties) -> Floats | None:
         """(N, 3) the load on a design [N]; None: none."""
@@ -227,10 +228,7 @@ class Point:
         return np.asarray(-forces * lengths * flexible / np.pi**2)
 
     def tried(self, values: Floats, change: Change) -> "tuple[Point | None, int]":
-        """The equilibrium of another design, from this one's by first order.
-
-        Args:
-            values: (n,) the other design.
+        """The equilibrium of another design of values (n,), from this one's by first order.
 
         Returns:
             The point, or None where Newton's method does not lead to a stable equilibrium next to the prediction; and

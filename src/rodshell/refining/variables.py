@@ -71,20 +71,11 @@ class Variables(Protocol):
         ...
 
     def change(self, values: Floats) -> Change:
-        """What a design does, with its derivatives.
-
-        Args:
-            values: (n,) of the variables.
-        """
+        """What a design of values (n,) does, with its derivatives."""
         ...
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid built to a design.
-
-        Args:
-            grid: before, or with what other variables have changed.
-            values: (n,) of the variables.
-        """
+        """The grid built to a design of values (n,), from one before, or with what other variables have changed."""
         ...
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +134,7 @@ def _relative(name: str, folder: Path) -> str:
 
 ARCHIVE = ("result.json", "case.toml", "states.npz")  # from which every other file can be made again
 T = TypeVar("T")
+P = ParamSpec("P")
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,14 +219,15 @@ class Archive:
         return state in shells and shells[state].status not in (None, CONVERGED)
 
 
-def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
+def made_once(make: Callable[Concatenate[Archive, P], T]) -> Callable[Concatenate[Archive, P], T]:
     """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods."""
 
     @wraps(make)
-    def kept(archive: Archive) -> T:
-        if make not in archive._made:
-            archive._made[make] = make(archive)
-        found: T = archive._made[make]
+    def kept(archive: Archive, /, *args: P.args, **options: P.kwargs) -> T:
+        key = make, args, *options.items()
+        if key not in archive._made:
+            archive._made[key] = make(archive, *args, **options)
+        found: T = archive._made[key]
         return found
 
     return kept

@@ -1,12 +1,13 @@
 """From checks, fabrication and loads to what is kept of them: records of result.json and arrays of states.npz."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.checks import Checks
 from rodshell.checks.bending import Bending as BendingCheck
 from rodshell.checks.bending import worst
@@ -40,37 +41,33 @@ def checked_results(
     checks: Checks,
     fabricated: Fabricated,
     *,
-    strength: float | None,
     limits: Limits = Limits(),
     net: Floats | None = None,
-    shear_strength: float | None = None,
-    strength_of: str | None = None,
 ) -> Results:
     """The results of a form with all that was checked and made: more of each rod, and tables of the checks.
 
     Args:
         mesh: of the flat grid, its rods in the order of the results.
-        strength, shear_strength: of the rods' material [Pa]; None: not known.
         limits: design strengths of the rods, by which utilisation is counted where they are known.
         net: (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
-        strength_of: the preset material that the strengths are of, where they were not given.
     """
     material = results.rod.material if results.rod else None
     anisotropic = material is not None and material.shear is not None  # as timber is
-    torsion = checks.shear_unknown(strength) if anisotropic and shear_strength is None else ()
-    withstood = _Withstood.of(limits, strength, np.ones(len(mesh.rod_nodes)) if net is None else net)
-    bending = _bending(checks, mesh, withstood)
+    torsion = checks.shear_unknown(limits.counted) if anisotropic and limits.shear_strength is None else ()
+    withstood = _Withstood(limits, mesh, np.ones(len(mesh.rod_nodes)) if net is None else net)
+    bending = _bending(checks, withstood)
     joint = (results.joint.mass if results.joint else None) or 0.0
     way, known = bending.deployment, limits.erection is not None
     erected = way.utilisation if way and known else None
     found = results.changed(
         warnings=(*checks.warnings, *torsion, *results.warnings, *fabricated.warnings),
         rods=_rods(results.rods, mesh, checks, fabricated, withstood),
-        bending=bending.changed(shear_strength=shear_strength, strength_of=None if withstood.given else strength_of),
+        bending=bending.changed(shear_strength=limits.shear_strength, strength_of=limits.strength_of),
         strength=limits.changed(erection_utilisation=erected),
         reactions=dict(checks.reactions),
         joint_loads={ends: loads.records(mesh.grid) for ends, loads in checks.joints.items()},
         self_weight=dict(checks.self_weight),
+        snow=dict(checks.snow),
         contact=Contact(**checks.contact, **({"deployment": stage} if (stage := checks.closest_stage) else {})),
         other_shapes=dict(checks.other_shapes),
         fabrication=fabricated.changed(total_mass=(fabricated.total_mass or 0.0) + len(mesh.grid.crossings) * joint),
@@ -118,37 +115,43 @@ def _stacked(rows: list[Any]) -> NDArray[np.float32]:
     return np.array(rows, dtype=np.float32)  # for colours: single precision is plenty
 
 
-class _Withstood(NamedTuple):
-    """By what the utilisation of the final shapes and that of the deployment are counted [Pa], and by which factors
-    (k,) their stresses."""
+@dataclass(frozen=True, eq=False)
+class _Withstood:
+    """By what utilisation is counted, and by which factors (k,) stresses; `known` are those of shapes, by their id."""
 
+    limits: Limits
+    mesh: GridMesh
     net: Floats
-    standing: float | None
-    erection: float | None
-    given: bool = False
+    known: dict[int, Floats] = field(default_factory=dict)
 
-    @classmethod
-    def of(cls, limits: Limits, strength: float | None, net: Floats) -> "_Withstood":
-        """Design strengths where they are known; then a final shape has to withstand its stress permanently."""
-        if limits.bending:
-            return cls(net, limits.bending.get("permanent"), limits.erection, limits.given)
-        return cls(net, strength, limits.erection or strength)
+    @property
+    def standing(self) -> float | None:
+        """Strength that the final shapes are judged by [Pa], which have to withstand their stress permanently."""
+        return self.limits.staying if self.limits.bending else self.limits.counted
+
+    @property
+    def erection(self) -> float | None:
+        """Of the deployment [Pa]."""
+        return self.limits.erection if self.limits.bending else self.limits.erection or self.limits.counted
 
     def stressed(self, bent: BendingCheck) -> Floats:
         """The stress at each entry of `rod_nodes`, or the curvature where the stress is not known."""
-        return self.net * (bent.curvature if bent.stress is None else bent.stress)
+        if id(bent) not in self.known:  # it is asked for rod by rod
+            stress = self.limits.standing(bent, self.mesh)
+            self.known[id(bent)] = self.net * (bent.curvature if stress is None else stress)
+        return self.known[id(bent)]
 
-    def worst_place(self, bent: BendingCheck, mesh: GridMesh) -> dict[str, Any]:
+    def worst_place(self, bent: BendingCheck) -> dict[str, Any]:
         """The most stressed place: the rod, and how far along it [m]."""
-        at = int(np.argmax(self.stressed(bent)))
-        return dict(zip(("rod", "at"), mesh.place(at), strict=True))
+        at = largest_at(self.stressed(bent))
+        return dict(zip(("rod", "at"), self.mesh.place(at), strict=True))
 
     def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
         """Worst figures over a part of the rods' nodes, in any of the shapes."""
         figures: dict[str, Any] = worst([*final, *stages], where)
         judged = ((final, self.standing), (stages, self.erection))
         shares = [
-            float((self.net * shape.stress)[where].max()) / strength
+            float(self.stressed(shape)[where].max()) / strength
             for shapes, strength in judged
             for shape in shapes
             if strength is not None and shape.stress is not None
@@ -173,6 +176,10 @@ def _rods(
             "layer": int(fabricated.layer[k]),
             "splices": tuple(fabricated.splices[k]),
         }
+        if len(fabricated.slots):
+            joint, side = np.nonzero(mesh.grid.crossings.rods == k)
+            slots = fabricated.slots[joint][np.argsort(mesh.grid.crossings.at[joint, side])].tolist()
+            made["joints"] = tuple(on.changed(slot=slot) for on, slot in zip(rod.joints, slots, strict=True))
         beyond = tuple(lath.splices for lath in fabricated.laths if lath.rod == k and lath.number > 1)
         if rod.stiffness is not None and any(beyond):
             made["stiffness"] = rod.stiffness.changed(splices=beyond)
@@ -180,10 +187,10 @@ def _rods(
     return tuple(found)
 
 
-def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
+def _bending(checks: Checks, withstood: _Withstood) -> Bending:
     everywhere, shapes = slice(None), dict[str, Any]()
     for ends, bent in checks.bending.items():
-        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **withstood.worst_place(bent, mesh))
+        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **withstood.worst_place(bent))
     if checks.deployment is not None:
         stages = list(zip(checks.deployment.share.tolist(), checks.deployment_bending, strict=True))
         stage = int(np.argmax([bent.curvature.max() for bent in checks.deployment_bending]))
@@ -193,7 +200,7 @@ def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
     if checks.stages_below_final:
         share, worst = max(checks.stages_below_final, key=lambda stage: float(withstood.stressed(stage[1]).max()))
         figures = withstood.worst((), [bent for _, bent in checks.stages_below_final], everywhere)
-        shapes["deployment"] = WorstBent(**figures, share=share, **withstood.worst_place(worst, mesh))
+        shapes["deployment"] = WorstBent(**figures, share=share, **withstood.worst_place(worst))
     return Bending(strength=withstood.standing, erection_strength=withstood.erection, **shapes)
 
 
@@ -202,7 +209,10 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
     found = results.changed(
         loads={
             name: {
-                ends: shell.changed(bracing=_in_order(results, mesh, checks.braced, shell.bracing_forces))
+                ends: shell.changed(
+                    bracing=_in_order(results, mesh, checks.braced, shell.bracing_forces),
+                    bracing_unloaded=_in_order(results, mesh, checks.braced, shell.bracing_before),
+                )
                 for ends, shell in by_ends.items()
             }
             for name, by_ends in checks.shells.items()
@@ -242,5 +252,4 @@ def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) ->
     known = {
         frozenset((names[a], names[b])): force for (a, b), force in zip(braced.tolist(), forces.tolist(), strict=True)
     }
-    rows = results.fabrication.bracing if results.fabrication else ()
-    return tuple(known.get(frozenset((brace.start, brace.end))) for brace in rows) if known else ()
+    return tuple(known.get(frozenset((brace.start, brace.end))) for brace in results.bracing) if known else ()

@@ -226,6 +226,9 @@ def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, s
     for k, rod in enumerate(footprint.rods):
         if rod.profile is not None:
             rods[k] = rods[k].changed(stiffness=_stiffness(rod.profile, rod.length, kind))
+        if rod.curve is not None:
+            at, curvatures = rod.curve.between(rod.start, rod.end)
+            rods[k] = rods[k].changed(rest_curvature=figures.RestCurvature(at=at, curvatures=curvatures))
     return {
         "rods": tuple(rods),
         "dropped": tuple(figures.Dropped(id=name, reason=reason) for name, reason in dropped),

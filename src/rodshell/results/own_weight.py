@@ -147,7 +147,7 @@ def _asked(results: Results) -> str:
 
 def is_braced(results: Results) -> bool:
     """Whether the shell has bracing under its loads; its own weight alone is checked without."""
-    return any(shell.bracing for supported in results.loads.values() for shell in supported.values())
+    return any(shell.bracing for _, _, shell in results.loaded_shells())
 
 
 def _parts(factors: Mapping[Ends, float], of: str = "it") -> str:

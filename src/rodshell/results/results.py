@@ -14,13 +14,15 @@ from pydantic import FailFast, Field, ValidationError
 
 from rodshell.errors import InputError, OutputError
 from rodshell.figures import checks, form
-from rodshell.figures.fabrication import Fabrication
+from rodshell.figures.fabrication import Brace, Fabrication
 from rodshell.figures.findings import Finding, Level
-from rodshell.figures.loads import DesignStrength, LoadCases
+from rodshell.figures.loads import DesignStrength, LoadCases, LoadedShell
 from rodshell.figures.records import (
     FARTHEST,
     SHORTEST,
     ByEnds,
+    Ends,
+    Flag,
     Flat,
     Number,
     Point,
@@ -86,13 +88,14 @@ class Verdict(Record, metaclass=_Refusing):
         'checked first; "unbuildable": no end condition gives a shell that can be built; "unknown": no shell was '
         "computed, as where the computation did not converge, or one that might be built was not"
     )
+    unloaded: Flag | None = key("true: of no loads but the shell's own weight; absent where loads were checked")
     reasons: Annotated[tuple[Text, ...], FailFast()] = Field(min_length=1, description="sentences, the gravest first")
     findings: Rows[Finding] = rows("what each of these sentences says, as data; empty in results of earlier versions")
 
     @property
     def headline(self) -> str:
-        """The first sentence, after the level in words."""
-        return f"{LEVELS[self.level]}: {self.reasons[0]}"
+        """The first sentence, after the level in words; of a shell without loads these say that it is unloaded."""
+        return f"{LEVELS[self.level]}{', unloaded' if self.unloaded else ''}: {self.reasons[0]}"
 
 
 # The whole
@@ -135,6 +138,9 @@ class Results(Record, metaclass=_Refusing):
     joint_loads: ByEnds[Rows[checks.JointLoad]] = by_ends("what acts at the joints")
     ends_in_the_air: checks.EndsInTheAir | None = key("rod ends that may not stand on the ground")
     self_weight: ByEnds[checks.SelfWeight] = by_ends("how much of its own weight the shell carries")
+    snow: ByEnds[Number] = by_ends(
+        "uniform snow on the plan that the unbraced shell carries on top of its weight [Pa]; null: above 10 kPa"
+    )
     strength: DesignStrength | None = key("design strengths, by which the rods are judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
     deployment: checks.Deployment | None = key("the shell from flat to popped up")
@@ -174,6 +180,15 @@ class Results(Record, metaclass=_Refusing):
     def text(self) -> str:
         """The text of result.json."""
         return json_text(self.plain())
+
+    @property
+    def bracing(self) -> tuple[Brace, ...]:
+        """All diagonals; none where there is no fabrication."""
+        return self.fabrication.bracing if self.fabrication else ()
+
+    def loaded_shells(self) -> Iterator[tuple[str, Ends, LoadedShell]]:
+        """Every combination of loads with each end condition, and the shell under it."""
+        return ((name, ends, shell) for name, found in self.loads.items() for ends, shell in found.items())
 
 
 def read_results(path: Path) -> Results:
@@ -232,8 +247,14 @@ def contradictions(results: Results) -> Iterator[str]:
     for k, rod in enumerate(results.rods):
         lengths = [length for length in (rod.end - rod.start, rod.length, rod.cut_length) if length is not None]
         at = [rod.start, rod.end, rod.offset or 0.0, *rod.splices, *(joint.at for joint in rod.joints), *lengths]
+        at += [joint.slot for joint in rod.joints if joint.slot is not None]
         if min(lengths) < SHORTEST or max(map(abs, at)) > FARTHEST:
             yield f"rods[{k}] has a length that is not from {SHORTEST:g} to {FARTHEST:g} m"
+    section = results.rod.section if results.rod else None
+    sizes = [getattr(section, name, None) for name in ("radius", "width", "height", "a", "b")]
+    sizes += [results.fabrication.slot_depth] if results.fabrication else []
+    if not all(size is None or 0 <= size <= FARTHEST for size in sizes):
+        yield f"rod.section or fabrication.slot_depth has a length that is not from 0 to {FARTHEST:g} m"
     for name, points in _places(results):
         placed = [point for point in points if None not in point]
         if placed and (fault := far_apart(np.array(placed))):
@@ -256,14 +277,12 @@ def contradictions(results: Results) -> Iterator[str]:
     counts: dict[str, Sized] = {name: getattr(results, name) for name in ("footprint", "boundary", "end_tangents")}
     for support, held in results.reactions.items():
         counts |= {f"reactions.{support}.forces": held.forces, f"reactions.{support}.moments": held.moments}
-    for name, supported in results.loads.items():
-        for support, loaded in supported.items():
-            where = f"loads.{name}.{support}"
-            counts |= {f"{where}.reactions": loaded.reactions, f"{where}.support_forces": loaded.support_forces}
-            counts[f"{where}.support_moments"] = loaded.support_moments
-            braces = len(results.fabrication.bracing) if results.fabrication else 0
-            if len(loaded.bracing) not in (0, braces):
-                yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
+    for name, support, loaded in results.loaded_shells():
+        where, braces = f"loads.{name}.{support}", len(results.bracing)
+        counts |= {f"{where}.reactions": loaded.reactions, f"{where}.support_forces": loaded.support_forces}
+        counts[f"{where}.support_moments"] = loaded.support_moments
+        if len(loaded.bracing) not in (0, braces):
+            yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
     needed = [name for name in counts if name.startswith("reactions.") or name.endswith("support_forces")]
     for name, entries in counts.items():
         if len(entries) not in (2 * len(ids), *([] if name in needed else [0])):
@@ -292,11 +311,10 @@ def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
             yield from ((f"joint_loads.{support}[{k}].rods", name) for name in load.rods)
     bent = results.bending.shapes() if results.bending else {}
     yield from ((f"bending.{shape}.rod", worst.rod) for shape, worst in bent.items() if worst.rod is not None)
-    for name, supported in results.loads.items():
-        for support, loaded in supported.items():
-            for what, where in (("governs", loaded.governs), ("euler_at", loaded.euler_at)):
-                if where is not None:
-                    yield f"loads.{name}.{support}.{what}.rod", where.rod
+    for name, support, loaded in results.loaded_shells():
+        for what, where in (("governs", loaded.governs), ("euler_at", loaded.euler_at)):
+            if where is not None:
+                yield f"loads.{name}.{support}.{what}.rod", where.rod
     for shape, nearest in results.contact.shapes().items() if results.contact else ():
         yield from ((f"contact.{shape}.rods", name) for name in nearest.rods or ())
 

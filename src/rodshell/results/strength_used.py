@@ -2,6 +2,7 @@
 
 from rodshell.figures.checks import OTHER_SHAPES, WorstBent
 from rodshell.results.results import Results
+from rodshell.results.wording import percent
 
 THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
 
@@ -19,7 +20,16 @@ def strength_name(results: Results, shape: str) -> str:
         return "the given strength"
     if not by_design_strength(results):
         return f"{preset}'s strength, which is characteristic and short-term"
-    return f"{preset}'s {'design strength for erection' if shape in OTHER_SHAPES else 'permanent design strength'}"
+    what = "design strength for erection" if shape in OTHER_SHAPES else "permanent design strength"
+    gone = results.strength.relaxed if results.strength and shape not in OTHER_SHAPES else None
+    relaxed = f", once {percent(gone)} of the stress is gone" if gone else ""
+    return f"{preset}'s {what}{by_code(results)}{relaxed}"
+
+
+def by_code(results: Results) -> str:
+    """By which building code strengths and how they go together are, in words; "": by none."""
+    code = results.strength.code if results.strength else None
+    return f" by {code}" if code else ""
 
 
 def by_design_strength(results: Results) -> bool:

@@ -16,13 +16,16 @@ from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict
 from rodshell.results.wording import (
     NAMES,
     case_rows,
+    figure,
     percent,
     rounded,
     rounded_down,
+    rounding_of,
     share_of_weight,
     shown_factor,
     shown_length,
     small,
+    snow_text,
     stress,
     whole_percent,
 )
@@ -33,7 +36,6 @@ RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK s
 
 STAGES = ("pop_up", "deployment")  # of the deployment: with the final shape, and without
 STRAIGHT = 1e-6  # 1/m, rad/m: what is less is round-off
-HOLES = 1.001  # of its stress over the strength: a utilisation above is that of net sections
 MOST_DROPPED = 6  # rods that are listed
 
 Length = Callable[[float | None], str]
@@ -110,6 +112,11 @@ def _rod(rod: RodType, bending: Bending | None, judged_by: DesignStrength | None
         yield line
     if judged_by is not None and judged_by.permanent is not None:
         erection = "" if judged_by.erection is None else f", {stress(judged_by.erection)} during erection"
+        if judged_by.code is not None:
+            known = judged_by.service_class
+            erection += f", by {judged_by.code}, service class {known or '2 (not given)'}"
+            depths = [f"{factor:.3g}" for factor in judged_by.depth.tolist()]
+            erection += f"; {' and '.join(dict.fromkeys(depths))} times that by its depth (k_h)" if depths else ""
         yield f"            design strength {stress(judged_by.permanent)} permanently{erection}"
 
 
@@ -220,8 +227,7 @@ def _bending(results: Results, length: Length) -> Iterator[str]:
             line += f" (torsion alone {stress(bent.torsion_stress)})"
         if bent.utilisation is not None:
             line += f", {percent(bent.utilisation)} of {strength_name(results, shape)}"
-            strength = (bending.erection_strength if shape == "deployment" else None) or bending.strength
-            if strength and bent.max_stress and bent.utilisation > HOLES * bent.max_stress / strength:
+            if results.strength is not None and results.strength.hole:
                 line += ", holes at joints counted"
         yield line + (f"; unknown below {whole_percent(unknown)} of it" if shape in STAGES and unknown else "")
 
@@ -258,6 +264,8 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
         line = f"  weight    {ends:<8}{what}: {share_of_weight(weighed)}{least}"
         if weighed.deflection is not None:
             line += f"; deflection under it: {length(weighed.deflection)}"
+        if ends in results.snow:
+            line += f"; even snow on top of it: {snow_text(results.snow[ends])}"
         if weighed.braced_limit is not None:
             braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
             line += f"; with bracing: {share_of_weight(braced)}"
@@ -265,31 +273,32 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
         yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N unloaded; sums of {sums}"
+        if said := [f"{name} {figure(*each, rounding_of(results))}" for name, each in held.figures.items()]:
+            yield f"  support   {ends:<8}{'; '.join(said)}"
 
 
 def _loads(results: Results, length: Length) -> Iterator[str]:
     """What each combination of loads does, a line for each end condition."""
-    for name, by_ends in results.loads.items():
-        for ends, found in by_ends.items():
-            limit = f"up to {shown_factor(found.limit_factor)} times the loads ({found.limit_kind})"
-            if found.limit_factor is None and found.limit_kind == "none":
-                limit = "beyond 100 times the loads"
-            line = f"  loads     {ends:<8}{name}: stable {limit}"
-            if found.linear_factor is not None:
-                line += f", linear {shown_factor(found.linear_factor)}"
-            if found.imperfect_factor is not None:
-                line += f", with imperfections {shown_factor(found.imperfect_factor)}"
-            at = "" if found.at_factor == 1 else f" at {rounded_down(found.at_factor or 0.0)} times"
-            line += f"; deflection{at} {length(found.max_deflection)}"
-            if found.utilisation is not None:
-                worst = found.governs
-                of = f"the design strength{f' ({worst.by}, {worst.rod})' if worst and worst.by else ''}"
-                if worst and worst.by in ("slip", "slip_unloaded"):
-                    of = f"the force at which a joint slips ({worst.rod})"
-                if worst and worst.by in UNLOADED:
-                    of += " before loads act"
-                line += f", {percent(found.utilisation)} of {of}"
-            yield line
+    for name, ends, found in results.loaded_shells():
+        limit = f"up to {shown_factor(found.limit_factor)} times the loads ({found.limit_kind})"
+        if found.limit_factor is None and found.limit_kind == "none":
+            limit = "beyond 100 times the loads"
+        line = f"  loads     {ends:<8}{name}: stable {limit}"
+        if found.linear_factor is not None:
+            line += f", linear {shown_factor(found.linear_factor)}"
+        if found.imperfect_factor is not None:
+            line += f", with imperfections {shown_factor(found.imperfect_factor)}"
+        at = "" if found.at_factor == 1 else f" at {rounded_down(found.at_factor or 0.0)} times"
+        line += f"; deflection{at} {length(found.max_deflection)}"
+        if found.utilisation is not None:
+            worst = found.governs
+            of = f"the design strength{f' ({worst.by}, {worst.rod})' if worst and worst.by else ''}"
+            if worst and worst.by in ("slip", "slip_unloaded"):
+                of = f"the force at which a joint slips ({worst.rod})"
+            if worst and worst.by in UNLOADED:
+                of += " before loads act"
+            line += f", {percent(found.utilisation)} of {of}"
+        yield line
 
 
 def _deployment(results: Results) -> Iterator[str]:

@@ -39,7 +39,7 @@ def width(results: Results) -> float:
 
 def _forces(results: Results) -> Iterator[Floats]:
     """(2m, 3) forces of the supports, without loads and under each combination, with every end condition."""
-    loaded = [shell.support_forces for supported in results.loads.values() for shell in supported.values()]
+    loaded = (shell.support_forces for _, _, shell in results.loaded_shells())
     for forces in (*(held.forces for held in results.reactions.values()), *loaded):
         if len(forces) == len(results.boundary):
             yield forces

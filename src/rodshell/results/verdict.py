@@ -6,6 +6,7 @@ not checked, and then the result is not good.
 """
 
 from collections.abc import Iterable, Iterator
+from math import inf
 
 from rodshell.figures.checks import OTHER_SHAPES, Clearance, Deployment, WorstBent
 from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
@@ -16,7 +17,14 @@ from rodshell.figures.sentences import ANOTHER_WAY, SENTENCES
 from rodshell.results.own_weight import falling, is_braced, none_stands, reserve, weight_findings
 from rodshell.results.results import Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
-from rodshell.results.strength_used import THIN, bent_of, by_design_strength, holds_while_erected, strength_name
+from rodshell.results.strength_used import (
+    THIN,
+    bent_of,
+    by_code,
+    by_design_strength,
+    holds_while_erected,
+    strength_name,
+)
 from rodshell.results.supports import air_findings, width
 from rodshell.results.wording import (
     FORM_AGAIN,
@@ -27,6 +35,7 @@ from rodshell.results.wording import (
     rounded_down,
     rounding_of,
     shown_factor,
+    snow_text,
     whole_percent,
 )
 from rodshell.rods.design_strength import RESERVED
@@ -36,6 +45,7 @@ FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the t
 # leaves a tenth of the second
 FLAT = SENTENCES["flat"]
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
+SCATTER, SURE = 2e-3, 10.0  # m, of cables as cut and fitted on site; times that, lengths decide their forces
 LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
 NEGLIGIBLE = 1e-3  # unless that gap is below this share of the target's size already
@@ -70,10 +80,10 @@ def verdict(results: Results) -> Verdict:
     grave = [sentence for ends in in_order for sentence in faults[ends]] + deployment + [*_erection(results)]
     if results.target and results.target.flat:
         warned = [word for word in results.warnings if word.startswith(FLAT)]
-        return _verdict("unbuildable", [Said(word, said("flat").finding) for word in warned or [FLAT]])
+        return _verdict(results, "unbuildable", [Said(word, said("flat").finding) for word in warned or [FLAT]])
     failed = [] if results.status == CONVERGED else [said("not_computed", status=results.status)]
     if not shells:
-        return _verdict("unknown", failed or [said("not_computed: nothing")])
+        return _verdict(results, "unknown", failed or [said("not_computed: nothing")])
     best = _best(results, usable)
     off = 0.0 if best is None else best[1].max_relative or 0.0
     far = [_off(results, *best)] if best is not None and off > OFF else []
@@ -88,14 +98,14 @@ def verdict(results: Results) -> Verdict:
     ]  # fmt: skip
     standing, in_doubt = set(usable) - falling(results), none_stands(results, usable, lost)
     if lost and not standing and not deployment:
-        return _verdict("unknown", [*failed, *in_doubt, *to_check])
+        return _verdict(results, "unknown", [*failed, *in_doubt, *to_check])
     if not standing or deployment or off > FAR_OFF:
-        return _verdict("unbuildable", to_check)
+        return _verdict(results, "unbuildable", to_check)
     if in_doubt:
-        return _verdict("unknown", [*in_doubt, *to_check])
+        return _verdict(results, "unknown", [*in_doubt, *to_check])
     if to_check:
-        return _verdict("check", [*to_check, *_flat(results), *_perfect(results)])
-    return _verdict("good", [*_merits(results, usable), *_flat(results), *_perfect(results)])
+        return _verdict(results, "check", [*to_check, *_flat(results), *_assumed(results)])
+    return _verdict(results, "good", [*_merits(results, usable), *_flat(results), *_assumed(results)])
 
 
 def unknown_below(results: Results) -> float:
@@ -117,7 +127,7 @@ def facts(results: Results) -> list[str]:
     return [*_gaps(results), *_strength(results)]
 
 
-def _verdict(level: Level, reasons: Iterable[Said]) -> Verdict:
+def _verdict(results: Results, level: Level, reasons: Iterable[Said]) -> Verdict:
     """Each reason once, with what it says in figures; what rules out one shell is less grave where another stands."""
     once = dict[str, Finding]()
     for each in reasons:
@@ -125,7 +135,10 @@ def _verdict(level: Level, reasons: Iterable[Said]) -> Verdict:
         far = finding.code == "off_target" and (finding.figure or 0.0) > FAR_OFF
         alone = "unbuildable" if far else level_of(finding.code)
         once.setdefault(str(each), finding.changed(level=min(alone, level, key=RANKS.index)))
-    return Verdict(level=level, reasons=tuple(once), findings=tuple(once.values()))
+    stands_alone = level in ("good", "check") and not results.loads
+    return Verdict(
+        level=level, unloaded=stands_alone or None, reasons=tuple(once), findings=tuple(once.values())
+    )  # fmt: skip
 
 
 def _status(shell: PopUp | None) -> str:
@@ -149,12 +162,13 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[Said]:
 
 
 BY_WORDS = {
-    "shear": "the rods use {} of their design strength in shear",
+    "bending": "the rods use {} of their design strength{}",
+    "shear": "the rods use {} of their design strength in shear{}",
     "slip": "a joint has to transfer {} of the force at which it slips",
-    "permanent": "the erected shell, before loads act, uses {} of the rods' permanent design strength",
+    "permanent": "the erected shell, before loads act, uses {} of the rods' permanent design strength{}",
     "slip_unloaded": "before loads act a joint of the erected shell has to transfer {} of the force at which it slips",
 }
-"""What is used too much, where it is not bending."""
+"""What is used too much, and by which code."""
 SAME_USE = 1.02  # of what the erected shell uses: more is the loads' doing
 UNLOADED = ("permanent", "slip_unloaded")  # of these no load is the cause
 
@@ -162,9 +176,8 @@ UNLOADED = ("permanent", "slip_unloaded")  # of these no load is the cause
 def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
     """Combinations of loads under which the shell falls or breaks, and what is too much before they act."""
     unloaded = dict[str, Said]()
-    for name, by_ends in results.loads.items():
-        found = by_ends.get(ends)
-        if found is None:
+    for name, end, found in results.loaded_shells():
+        if end != ends:
             continue
         limit, used = found.limit_factor, found.utilisation
         if found.limit_kind == "unstable unloaded":
@@ -186,14 +199,14 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
         for by, share in before.items():
             if share > 1:
                 sentence = "slip: unloaded" if by == "slip_unloaded" else "strength: unloaded"
-                rod, what = place.rod if place else None, BY_WORDS[by].format(_too_much(share))
+                rod, what = place.rod if place else None, BY_WORDS[by].format(_too_much(share), by_code(results))
                 word = said(sentence, ends, share, 1, place=rod, what=what, where=where * (by == governs))
                 if len(word) > len(unloaded.get(by, "")):  # the same under all, or with its place
                     unloaded[by] = word
         worst = max(uses, key=lambda by: uses[by], default="")
         if uses.get(worst, 0.0) > 1:
             at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
-            what = BY_WORDS.get(worst, "the rods use {} of their design strength").format(_too_much(uses[worst]))
+            what = BY_WORDS.get(worst, BY_WORDS["bending"]).format(_too_much(uses[worst]), by_code(results))
             code, where = "slip" if worst == "slip" else "strength_under_loads", where * (worst == governs)
             yield said(code, ends, uses[worst], 1, place=name, what=what, at=at, where=where)
         if (braced := found.bracing_utilisation) is not None and braced > 1:
@@ -208,9 +221,9 @@ def _not_of_loads(results: Results, found: LoadedShell) -> Iterator[str]:
         return
     if (parts.slip_unloaded or 0.0) > 1:
         yield "slip"
-    permanent, lasting = (getattr(strength, name or "", None) for name in ("permanent", found.duration))
-    if permanent and lasting:
-        alone = (parts.permanent or 0.0) * permanent / lasting
+    staying, lasting = (getattr(strength, name or "", None) for name in ("staying", found.duration))
+    if staying and lasting:
+        alone = (parts.permanent or 0.0) * staying / lasting
         yield from (by for by in ("bending", "shear") if (getattr(parts, by) or 0.0) <= SAME_USE * alone)
 
 
@@ -364,6 +377,22 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
             elif kind == "not followed" or (imperfect is not None and imperfect < 1):
                 sentence = "imperfect: not followed" if kind == "not followed" else "imperfect"
                 yield said(sentence, end, imperfect, 1, place=name, factor=factor)
+            lower, share = _lowered(results, found)
+            if lower < 1 and stands and (imperfect is None or imperfect >= 1):
+                factor = rounded_down(lower)
+                yield said("low_stiffness", end, lower, 1, place=name, factor=factor, share=share)
+
+
+def _lowered(results: Results, found: LoadedShell) -> tuple[float, str]:
+    """The smallest limit factor with the modulus that a code asks for in stability, and how that is said; infinite: no
+    code asks, or no limit was met."""
+    strength, limits = results.strength, [found.limit_factor, found.imperfect_factor]
+    known = [limit for limit in limits if limit is not None]
+    if strength is None or strength.stiffness is None or not known:
+        return inf, ""
+    imperfect = "imperfections and " * (found.imperfect_factor is not None)
+    share = f"{imperfect}{percent(strength.stiffness)} of the mean modulus, which {strength.code} asks for in stability"
+    return strength.stiffness * min(known), share
 
 
 def _rods(results: Results, usable: list[Ends]) -> Iterator[Said]:
@@ -445,18 +474,47 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
     )  # fmt: skip
     if not results.loads:
         known = results.strength is not None and results.strength.creep is not None
-        yield said("no_loads", creep="" if known else ", nor creep, which is not known of these rods")
+        snow = [f"{snow_text(results.snow[ends])} with {ends} ends" for ends in usable if ends in results.snow]
+        yield said(
+            "no_loads",
+            snow=f"; on top of its weight it carries even snow up to {' and '.join(snow)}" if snow else "",
+            creep="" if known else ", nor creep, which is not known of these rods",
+        )
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)
-        yield said("stands_under_loads", None, least, 1, place=name, factor=shown_factor(least))
+        lower, share = min((_lowered(results, by_ends[ends]) for ends in usable if ends in by_ends), default=(inf, ""))
+        words = f", and with {share}, up to {rounded_down(lower)} times" if share else ""
+        yield said("stands_under_loads", None, least, 1, place=name, factor=shown_factor(least), stiffness=words)
 
 
-def _perfect(results: Results) -> Iterator[Said]:
-    """That factors under loads are those of the perfect shell."""
-    if any(found.imperfect_kind is None for by_ends in results.loads.values() for found in by_ends.values()):
+def _assumed(results: Results) -> Iterator[Said]:
+    """What was taken where nothing was given or is known: the perfect shell, a service class, no creep; what strengths
+    count on; and how cables are to be stressed."""
+    strength = results.strength
+    if any(found.imperfect_kind is None for _, _, found in results.loaded_shells()):
         offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
         yield said("no_imperfections", offers=(offer,), offer=offer)
+    if strength is not None and strength.code and strength.service_class is None:
+        yield said("assumed_class")
+    if strength is not None and strength.relaxed:
+        yield said("relaxed", None, strength.relaxed, share=percent(strength.relaxed))
+    if results.loads and (strength is None or strength.creep is None):
+        yield said("creep_unknown")
+    yield from _cables(results)
+
+
+def _cables(results: Results) -> Iterator[Said]:
+    """That lengths do not decide the forces of cables which are hardly shortened, and what scatter of them does."""
+    known = ((brace.cut, brace.final) for brace in results.bracing if brace.cut and brace.final)
+    shortened = [final - cut for cut, final in known if final > cut]
+    if not shortened or min(shortened) >= SURE * SCATTER or width(results) <= LARGE:
+        return
+    least, most = min(shortened), max(shortened)
+    slack = "is slack" if most <= SCATTER else "may be slack" if least <= SCATTER else "loses a part of its force"
+    short = f"{1e3 * least:.1f} to {1e3 * most:.1f} mm"
+    times, scatter = rounded(1.0 + SCATTER / least, 2), f"{1e3 * SCATTER:g} mm"
+    yield said("cables_short", None, least, SURE * SCATTER, "m", short=short, scatter=scatter, slack=slack, times=times)
 
 
 def _mm(results: Results, metres: float | None) -> str:

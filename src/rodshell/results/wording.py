@@ -152,6 +152,11 @@ def share_of_weight(found: SelfWeight) -> str:
     return f"at least {share}, unknown above" if found.limit == "not followed" else share
 
 
+def snow_text(found: float | None) -> str:
+    """How much snow a shell carries [Pa], never shown as more."""
+    return "10 kN/m2 or more" if found is None else f"{rounded_down(1e-3 * found)} kN/m2"
+
+
 def part_of_weight(factor: float) -> str:
     """A load factor below 1 as a percentage, never as 100 %."""
     return percent(factor) if factor < 0.995 else f"{rounded_down(100 * factor)} %"
@@ -171,6 +176,15 @@ newtons, newton_metres, curvature = _in(" N"), _in(" N m"), _in(" 1/m")
 twist_rate = _in("\N{DEGREE SIGN}/m", 180 / pi)
 stress = stress_text
 seconds, degrees = "{:.2f} s".format, "{:.1f}\N{DEGREE SIGN}".format
+
+
+def figure(value: float | None, unit: str, rounding: Rounding = EXACT) -> str:
+    """A value in an SI unit, in the unit in which texts show it."""
+    if value is None:
+        return UNKNOWN
+    if unit == "m":
+        return millimetres(value, rounding=rounding)
+    return stress(value) if unit == "Pa" else f"{rounded(value)} {unit}".rstrip()
 
 
 def small(value: float | None) -> str:

@@ -14,7 +14,7 @@ from rodshell.units import shown
 from rodshell.validation import brief
 
 _REPLACEABLE = ("youngs_modulus", "density", "shear", "poisson_ratio")
-PresetName = Literal["larch", "spruce", "oak", "bamboo", "gfrp", "plywood", "petg", "spring-steel", "rubber"]
+PresetName = Literal["larch", "spruce", "oak", "glulam", "bamboo", "gfrp", "plywood", "petg", "spring-steel", "rubber"]
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,14 @@ PRESETS: dict[PresetName, Preset] = {
         "strength class D30",
         _MOISTURE,
         "EN 338:2016 (class D30); density of the species by EN 350",
+    ),
+    "glulam": Preset(
+        11.5e9, 0.65e9,  # EN 14080:2013, GL24h: mean, parallel to the grain; mean shear modulus
+        420.0,  # EN 14080:2013, GL24h, mean
+        24e6, 3.5e6,  # EN 14080:2013, GL24h
+        "strength class GL24h",
+        _MOISTURE,
+        "EN 14080:2013 (class GL24h)",
     ),
     "bamboo": Preset(
         11.8e9,  # mean, bending

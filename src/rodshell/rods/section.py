@@ -367,6 +367,7 @@ TRADE_SIZES: dict[PresetName, tuple[Section, ...]] = {
     "larch": _TIMBER,
     "spruce": _TIMBER,
     "oak": _TIMBER,
+    "glulam": _laths((40, 60), (60, 80), (60, 100), (80, 100), (80, 120)),
     "bamboo": _tubes((15, 2), (20, 3), (30, 4), (40, 5), (60, 6), (80, 8), (100, 10)),  # walls of about a tenth
     "gfrp": (
         *_rods(1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12),

@@ -1,6 +1,7 @@
 """What holds the ends of rods: named values, the two that every case knows, and how those asked for are read.
 
-A support of one's own is a class of `Support` with `free`, `energies` or both; everything else goes by its name.
+A support of one's own is a class of `Support` with `free`, `energies` or both, and with its own `figures`; everything
+else goes by its name.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 from re import fullmatch
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
@@ -69,6 +71,17 @@ class Support:
             points: (2m, 3) where the ends are before they move [m].
         """
         return ()
+
+    def figures(self, moved: Floats, forces: Floats) -> Mapping[str, tuple[float, str]]:
+        """What it says of itself on the unloaded shell: value and SI unit of each figure, by what it is. Results,
+        summary and report list them. Of any support whose rod ends moved it is how far.
+
+        Args:
+            moved: (2m, 3) displacement of each rod end from where it is before ends move [m].
+            forces: (2m, 3) by which it acts on each rod end [N].
+        """
+        largest = float(np.sqrt((moved**2).sum(axis=1)).max(initial=0.0))
+        return {"largest displacement of a rod end": (largest, "m")} if largest else {}
 
 
 SUPPORTS = {name: Support(name, holds_directions=name != "pinned") for name in get_args(SupportName)}

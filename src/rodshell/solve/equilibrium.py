@@ -19,6 +19,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
+from rodshell.layout import GridLayout, Layout
 from rodshell.model import Potential
 from rodshell.rods.elements import Elements
 from rodshell.solve.newton_step import NewtonStep, TooManyModesError
@@ -40,18 +41,23 @@ class Status(Enum):
 
     @property
     def sentence(self) -> str:
-        return _SENTENCES[self]
+        """It on a lattice of straight rods."""
+        return self.sentence_on(GridLayout)
+
+    def sentence_on(self, layout: Layout | type[GridLayout]) -> str:
+        """It with the advice that fits a lattice."""
+        return _SENTENCES[self].format(closer=layout.closer, elsewhere=layout.elsewhere)
 
 
 _SENTENCES = {
     Status.CONVERGED: "converged",
-    Status.STALLED: "stopped at the largest number of iterations above its tolerance; refine the mesh or "
-    "reduce the spacing",
-    Status.DIVERGED: "the iteration diverged; reduce the spacing, or choose another anchor or heading",
+    Status.STALLED: "stopped at the largest number of iterations above its tolerance; refine the mesh, or "
+    "choose {closer}",
+    Status.DIVERGED: "the iteration diverged; choose {closer}, or {elsewhere}",
     Status.LOST_CONTACT: "the grid lost contact with the target (without friction nothing holds it there); "
     "use method = bound",
     Status.BUCKLED: "was given up at its start: released from the target, the rods would buckle between their joints "
-    "in very many places; a smaller spacing, a flatter target or, of laths, narrower ones may do",
+    "in very many places; {closer}, a flatter target or, of laths, narrower ones may do",
     Status.OUT_OF_TIME: "was out of time",
     Status.MOVING: "was not at rest when its time was over; give it a longer duration, or drag",
 }

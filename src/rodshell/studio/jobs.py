@@ -54,10 +54,6 @@ class Jobs:
             if status["status"] in ("queued", "running"):
                 self._queue.append((path.parent.name, status["case"]))
 
-    def resume(self) -> None:
-        """Run what an earlier server did not finish."""
-        self._next()
-
     def add(self, case: dict[str, Any], size: int) -> str:
         """Queue a case; the id of its job.
 
@@ -76,7 +72,7 @@ class Jobs:
         (self.folder / name).mkdir(parents=True)
         write_record(self.folder / name / "status.json", {"status": "queued", "case": case})
         self._queue.append((name, case))
-        self._next()
+        self.run_next()
         return name
 
     def get(self, name: str) -> dict[str, Any] | None:
@@ -105,7 +101,8 @@ class Jobs:
         """End the process; what it was doing is run again by the next server."""
         self._worker.end()
 
-    def _next(self) -> None:
+    def run_next(self) -> None:
+        """Run the job that has waited longest, unless one runs; the first may be of an earlier server."""
         if self._running is None and self._queue:
             name, case = self._queue.popleft()
             self._serial += 1
@@ -124,7 +121,7 @@ class Jobs:
         self._write(name, status)
         self._running = None
         self._room.forget()
-        self._next()
+        self.run_next()
 
     def _write(self, name: str, status: dict[str, Any]) -> None:
         """Keep what became of a job; where that cannot be written, the next server runs it again."""

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.form import Form
 from rodshell.layout import GridMesh
 from rodshell.output.colour_scale import Colour, gap_scale
 from rodshell.output.grid import CAPTIONS, Shape, supported
-from rodshell.output.models import section_outline
+from rodshell.output.sections import section_outline
 from rodshell.output.viewer.scene import Coloured, Drawn
 from rodshell.results import wording
 from rodshell.results.from_form import rod_type
@@ -46,7 +46,7 @@ class Preview:
         if draped is None:
             return b""
         gaps = target.gap(draped).distance - mesh.heights
-        worst = int(np.abs(gaps).argmax())
+        worst = largest_at(np.abs(gaps))
         where, largest = {"draped": draped[worst]}, {"draped": abs(float(gaps[worst]))}
         shapes = [Shape("draped", CAPTIONS["draped"], draped, gaps), Shape("flat", CAPTIONS["flat"], mesh.flat)]
         for ends, shell in form.popped.items():
@@ -99,25 +99,17 @@ def facts(form: Form) -> dict[str, Any]:
 
 def figures(form: Form) -> Figures:
     """Figures of a form in words, by their names."""
-    rods, rounding = form.footprint.rods, rounding_of(form)
-    stages = form.stages
-    angles = [part.draped.figures.min_angle for part in stages.parts]
-    return lengths([rod.length for rod in rods], rounding) + [
-        *(("smallest angle between rods", wording.degrees(degrees(min(angles)))) for _ in angles[:1]),
-        *(gap(ends, found.max, found.max_relative, rounding) for ends, found in form.agreement.items()),
-    ]
-
-
-def lengths(found: list[float], rounding: wording.Rounding) -> Figures:
-    """How many rods there are, and how long they are [m]."""
+    found, rounding = [rod.length for rod in form.footprint.rods], rounding_of(form)
+    angles = [part.draped.figures.min_angle for part in form.stages.parts]
     rows = [("rods", str(len(found))), ("all rods together", f"{sum(found):.4g} m")]
-    return rows + [("longest rod", wording.millimetres(max(found), 5, rounding)) for _ in found[:1]]
-
-
-def gap(ends: str, largest: float | None, relative: float | None, rounding: wording.Rounding) -> tuple[str, str]:
-    """The largest gap of a shell [m], and over the target's size."""
-    shown = wording.millimetres(largest, rounding=rounding)
-    return f"largest gap, {ends}", f"{shown} ({wording.percent(relative)} of the size)"
+    if found:
+        rows.append(("longest rod", wording.millimetres(max(found), 5, rounding)))
+    if angles:
+        rows.append(("smallest angle between rods", wording.degrees(degrees(min(angles)))))
+    for ends, gap in form.agreement.items():
+        largest = wording.millimetres(gap.max, rounding=rounding)
+        rows.append((f"largest gap, {ends}", f"{largest} ({wording.percent(gap.max_relative)} of the size)"))
+    return rows
 
 
 def rounding_of(form: Form) -> wording.Rounding:

@@ -30,6 +30,7 @@ from rodshell.studio.kept import Room
 from rodshell.studio.session import Session, Sessions, presets
 from rodshell.studio.worker import News
 from rodshell.untrusted import limit, raised
+from rodshell.version import __version__
 
 STATIC = files("rodshell.studio").joinpath("static")
 TYPES = {".js": "text/javascript", ".css": "text/css"}
@@ -86,7 +87,7 @@ def studio_app(settings: Settings) -> ASGIApp:
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        jobs.resume()
+        jobs.run_next()
         yield
         sessions.end()
         jobs.end()
@@ -205,8 +206,6 @@ async def _static(request: Request) -> Response:
 
 
 async def _version(_: Request) -> Response:
-    from rodshell.version import __version__
-
     return JSONResponse({"rodshell": __version__})
 
 

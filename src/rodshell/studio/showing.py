@@ -44,6 +44,8 @@ def _checked(archive: Archive) -> Figures:
             rows.append((f"utilisation, {shape}, unloaded", wording.percent(bent.utilisation)))
     for ends, weight in results.self_weight.items():
         rows.append((f"carries, {ends}", wording.share_of_weight(weight)))
+    for ends, snow in results.snow.items():
+        rows.append((f"even snow on top, {ends}", wording.snow_text(snow)))
     return rows + _refinement(archive) + _loads(archive)
 
 
@@ -61,14 +63,11 @@ def _refinement(archive: Archive) -> Figures:
 def _loads(archive: Archive) -> Figures:
     """What each combination of loads does."""
     rows, rounding = [], rounding_of(archive.results)
-    for name, by_ends in archive.results.loads.items():
-        for ends, found in by_ends.items():
-            limit = wording.shown_factor(found.limit_factor)
-            rows.append((f"{name}, {ends}: stable up to", f"{limit} times the loads ({found.limit_kind})"))
-            at = "" if found.at_factor == 1 else f" at {wording.rounded_down(found.at_factor or 0.0)} times"
-            rows.append(
-                (f"{name}, {ends}: deflection{at}", wording.millimetres(found.max_deflection, rounding=rounding))
-            )
-            if found.utilisation is not None:
-                rows.append((f"{name}, {ends}: of the strength{at}", wording.percent(found.utilisation)))
+    for name, ends, found in archive.results.loaded_shells():
+        limit = wording.shown_factor(found.limit_factor)
+        rows.append((f"{name}, {ends}: stable up to", f"{limit} times the loads ({found.limit_kind})"))
+        at = "" if found.at_factor == 1 else f" at {wording.rounded_down(found.at_factor or 0.0)} times"
+        rows.append((f"{name}, {ends}: deflection{at}", wording.millimetres(found.max_deflection, rounding=rounding)))
+        if found.utilisation is not None:
+            rows.append((f"{name}, {ends}: of the strength{at}", wording.percent(found.utilisation)))
     return rows

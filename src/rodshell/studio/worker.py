@@ -10,14 +10,11 @@ while somebody drags only once the grid of the older one was shown, so that ever
 
 import os
 import resource
-import signal
 import tempfile
-import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
-from multiprocessing import parent_process
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from pathlib import Path
 from time import monotonic, process_time
 from typing import Any
@@ -31,6 +28,7 @@ from rodshell.job import Job
 from rodshell.progress import Progress
 from rodshell.studio.preview import Preview
 from rodshell.studio.showing import checked
+from rodshell.threads import work_for_parent
 
 _TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
 PAUSE = 0.1  # s between two messages of progress at least
@@ -88,10 +86,9 @@ def run_worker(connection: Connection, memory: int = MEMORY) -> None:
         connection: receives `Order`, sends `News`.
         memory: bytes of data that the process may have.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its workers
+    work_for_parent()
     resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     worker = _Worker(connection)
-    threading.Thread(target=_end_with_the_server, daemon=True).start()
     while True:
         try:
             order = connection.recv()
@@ -99,13 +96,6 @@ def run_worker(connection: Connection, memory: int = MEMORY) -> None:
             return
         if order is not None:  # else a word about an order that came after the one that it was to end
             worker.obey(order)
-
-
-def _end_with_the_server() -> None:
-    """Also where the server was killed while an order was being obeyed."""
-    if (server := parent_process()) is not None:
-        wait([server.sentinel])
-        os._exit(1)
 
 
 def job_of(order: Order) -> Job:

@@ -5,7 +5,7 @@ together. A sample (Latin hypercube, Sobol) is such a table too, so that a sweep
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite, pi, prod, tau
@@ -135,13 +135,15 @@ def read_axes(given: Mapping[str, Any], sample: Mapping[str, Any] | None, base: 
     return found
 
 
-def flat_keys(given: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Values by dotted key; tables in tables, as [axes.layout], are opened."""
+def flat_keys(
+    given: Mapping[str, Any], ends: Set[str] = frozenset({"from", "to"}), closed: Sequence[str] = (), prefix: str = ""
+) -> Iterator[tuple[str, Any]]:
+    """Values by dotted key; tables in tables, as [axes.layout], are opened, but not with `ends` or `closed`."""
     for name, value in given.items():
         if not isinstance(name, str):
-            raise InputError(f"axes: keys are words such as layout.spacing, not {name!r}")
-        if isinstance(value, Mapping) and not {"from", "to"} & value.keys():
-            yield from flat_keys(value, f"{prefix}{name}.")
+            raise InputError(f"keys are words such as layout.spacing, not {name!r}")
+        if isinstance(value, Mapping) and name not in closed and not ends & value.keys():
+            yield from flat_keys(value, ends, closed, f"{prefix}{name}.")
         else:
             yield prefix + name, value
 

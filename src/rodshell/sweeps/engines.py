@@ -13,7 +13,7 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
-from rodshell.errors import InputError
+from rodshell.errors import InputError, needs_package
 from rodshell.sweeps.plan import Settings
 from rodshell.sweeps.watched import TICK, EngineError, Reply, Task, Workers, lost
 from rodshell.untrusted import PATIENCE, read_text
@@ -113,11 +113,9 @@ def opened_engine(settings: Settings, address: str | None = None) -> Iterator[En
 
 @contextmanager
 def _dask(settings: Settings, address: str | None) -> Iterator[Engine]:
-    try:
+    with needs_package("the engine dask", "distributed", "cluster"):
         import dask
         from distributed import Client, LocalCluster
-    except ImportError:
-        raise InputError('the engine dask needs the package distributed: pip install "rodshell[cluster]"') from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with ExitStack() as stack:
         given = dask.config.get("scheduler-address", None) if address is None else address

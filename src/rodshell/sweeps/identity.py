@@ -39,8 +39,6 @@ def content_digest(path: Path) -> str:
     try:
         stat = path.stat()
         return _digest(path.absolute(), stat.st_mtime_ns, stat.st_size)
-    except InputError:
-        raise
     except OSError as error:
         raise InputError(f"target.file = {shown(str(path))} cannot be read: {error.strerror}") from None
 

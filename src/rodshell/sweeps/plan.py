@@ -184,18 +184,14 @@ def read_origin(source: Source, tables: Sequence[str]) -> Origin:
     Raises:
         InputError: it cannot be read, has an unknown key, or its base cannot be used.
     """
-    name, text, folder, given = _opened(source)
+    if isinstance(source, Mapping):
+        name, text, folder, given = "sweep", "", Path(), source
+    else:
+        path = file_path("the sweep", source)
+        text = read_text(path)
+        name, folder, given = path.stem, path.parent, toml_of(str(path), text)
     known("", given, tables)
     return Origin(name, text, folder, given, _read_bases(given, folder))
-
-
-def _opened(source: Source) -> tuple[str, str, Path, Mapping[str, Any]]:
-    """Name, text, folder and content of a TOML file; of a mapping, which lies in the current folder."""
-    if isinstance(source, Mapping):
-        return "sweep", "", Path(), source
-    path = file_path("the sweep", source)
-    text = read_text(path)
-    return path.stem, text, path.parent, toml_of(str(path), text)
 
 
 def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rodshell.case.link import studio_link
-from rodshell.errors import InputError
+from rodshell.errors import InputError, needs_package
 from rodshell.output.pictures import picture_svg
 from rodshell.output.svg import inline
 from rodshell.results import read
@@ -50,10 +50,8 @@ class Page:
 
 def require_plotly() -> None:
     """InputError where plotly is not installed."""
-    try:
+    with needs_package("--report", "plotly", "sweep"):
         import plotly.offline  # noqa: F401
-    except ImportError:
-        raise InputError('--report needs the package plotly: pip install "rodshell[sweep]"') from None
 
 
 def write_report(store: Store, page: Page) -> Path:

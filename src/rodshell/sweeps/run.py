@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -158,7 +158,7 @@ def best_jobs(store: Store, settings: Settings) -> list[str]:
 def _page(plan: SweepPlan, found: Swept, shapes: Sequence[str]) -> Page:
     """What the report says."""
     measure = plan.settings.best
-    numbers = (key for axis in plan.axes for k, key in enumerate(axis.keys) if _varies(row[k] for row in axis.rows))
+    numbers = (key for axis in plan.axes for k, key in enumerate(axis.keys) if _varies([row[k] for row in axis.rows]))
     return Page(
         kind="rodshell sweep",
         plan=plan,
@@ -172,11 +172,6 @@ def _page(plan: SweepPlan, found: Swept, shapes: Sequence[str]) -> Page:
     )
 
 
-def _varies(values: Iterable[object]) -> bool:
+def _varies(values: Sequence[object]) -> bool:
     """Whether they are different numbers."""
-    found = set[object]()
-    for value in values:
-        if not isinstance(value, int | float):
-            return False
-        found.add(value)
-    return len(found) > 1
+    return all(isinstance(value, int | float) for value in values) and len({*values}) > 1

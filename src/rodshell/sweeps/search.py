@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.errors import InputError
+from rodshell.errors import InputError, needs_package
 from rodshell.progress import Progress, silent
 from rodshell.sweeps.asktell import AskTell
 from rodshell.sweeps.axes import drawn_shares
@@ -132,10 +132,8 @@ def _algorithm(plan: SearchPlan) -> AskTell:
     dimensions, violations = len(plan.variables), 1 + len(plan.constraints)
     first = drawn_shares("latin-hypercube", dimensions, plan.population, plan.seed)
     cube = np.zeros(dimensions), np.ones(dimensions)
-    try:
+    with needs_package("optimise", "pymoo", "optimise"):
         return AskTell(*cube, first, objectives=len(plan.objectives), constraints=violations, seed=plan.seed)
-    except ImportError:
-        raise InputError('optimise needs the package pymoo: pip install "rodshell[optimise]"') from None
 
 
 def _generation(plan: SearchPlan, number: int, algorithm: AskTell, computation: Computation) -> None:
@@ -150,7 +148,7 @@ def _generation(plan: SearchPlan, number: int, algorithm: AskTell, computation: 
         except InputError as error:  # values that no case can have together
             names.append(f"no case {json.dumps(values[1:])}")
             store.record(names[-1], "refused", {"status": str(error), "seconds": 0.0})
-    store.add(zip(designs, names, strict=True))
+    store.plan(zip(designs, names, strict=True), more=True)
     computation.compute(wanted, f"generation {number} of {plan.generations}", len(wanted))
     found = [_judged(plan, store.outcome(name), store.row(name)) for name in names]
     algorithm.tell(np.array([values for values, _ in found]), np.array([violations for _, violations in found]))

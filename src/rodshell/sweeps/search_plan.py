@@ -1,6 +1,6 @@
 """The plan of a search: base, variables, objectives and constraints, read from a TOML file or a mapping."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -97,7 +97,8 @@ def read_search(source: Source) -> SearchPlan:
         )
     keys = (GENERATION, *(key for variable in variables for key in variable.keys))
     objectives = _objectives(table(given, "objectives"))
-    constraints = tuple(_constraint(key, value) for key, value in _flat_constraints(table(given, "constraints")))
+    limits = flat_keys(table(given, "constraints"), {"min", "max"}, STANDARD)
+    constraints = tuple(_constraint(column, value) for column, value in limits)
     columns = read_columns(given.get("columns", ()), keys)
     there = (*STANDARD, *keys, *(column.name for column in columns))
     judged = [*(objective.column for objective in objectives), *(constraint.column for constraint in constraints)]
@@ -141,14 +142,6 @@ def _objectives(given: Mapping[str, Any]) -> tuple[Objective, ...]:
     if len(set(names)) < len(names):
         raise InputError("[objectives]: a column occurs twice: leave one out")
     return tuple(found)
-
-
-def _flat_constraints(given: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in given.items():
-        if isinstance(value, Mapping) and name not in STANDARD and not {"min", "max"} & value.keys():
-            yield from _flat_constraints(value, f"{prefix}{name}.")
-        else:
-            yield prefix + name, value
 
 
 def _constraint(column: str, given: Any) -> Constraint:

@@ -46,6 +46,9 @@ _MOST_OF_SQLITE = 1e9  # bytes of a value that SQLite can be asked for
 REMEDY = "move it to compute all designs again, or choose another folder"
 
 
+Designs = Iterable[tuple[Sequence[Any], str]]  # values of the keys, and the identity of the job
+
+
 @dataclass(frozen=True)
 class Finished:
     """A design whose job is finished.
@@ -184,19 +187,12 @@ class Store:
 
     # Designs
 
-    def plan(self, designs: Iterable[tuple[Sequence[Any], str]], *, notes: Mapping[str, str] | None = None) -> None:
-        """Write the designs of the sweep in place of earlier ones, all or none, with notes by their names.
+    def plan(self, designs: Designs, *, notes: Mapping[str, str] | None = None, more: bool = False) -> None:
+        """Write the designs of the sweep, all or none, with notes by their names.
 
         Args:
-            designs: values of the keys, and the identity of the job.
+            more: behind those that there are, and not in their place.
         """
-        self._write(designs, notes or {}, more=False)
-
-    def add(self, designs: Iterable[tuple[Sequence[Any], str]]) -> None:
-        """Write designs behind those that there are, all or none; `designs` as of `plan`."""
-        self._write(designs, {}, more=True)
-
-    def _write(self, designs: Iterable[tuple[Sequence[Any], str]], notes: Mapping[str, str], *, more: bool) -> None:
         with self.errors():
             self._connection.execute("BEGIN")
             try:
@@ -205,7 +201,7 @@ class Store:
                 first = self.count()
                 rows = ((first + k, job, json.dumps(list(keys))) for k, (keys, job) in enumerate(designs))
                 self._connection.executemany("INSERT INTO designs VALUES (?, ?, ?)", rows)
-                self._connection.executemany("INSERT OR REPLACE INTO notes VALUES (?, ?)", notes.items())
+                self._connection.executemany("INSERT OR REPLACE INTO notes VALUES (?, ?)", (notes or {}).items())
                 self._connection.execute("COMMIT")
             except BaseException:
                 with suppress(sqlite3.Error):

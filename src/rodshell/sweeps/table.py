@@ -9,7 +9,7 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from rodshell.errors import InputError
+from rodshell.errors import needs_package
 from rodshell.figures.records import printable
 from rodshell.output.schedules import safe_cell
 from rodshell.sweeps.columns import JOB, STANDARD, Column, read_column
@@ -144,12 +144,8 @@ def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pya
 
 
 def _arrow_table(sheet: Sheet) -> "pyarrow.Table":
-    try:
+    with needs_package("reading a sweep as a table", "pyarrow", "sweep"):
         import pyarrow
-    except ImportError:
-        raise InputError(
-            'reading a sweep as a table needs the package pyarrow: pip install "rodshell[sweep]"'
-        ) from None
     rows = [cells for _, cells in sheet.rows()]
     return pyarrow.table({name: pyarrow.array(_alike([cells[name] for cells in rows])) for name in sheet.names})
 

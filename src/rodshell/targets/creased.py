@@ -44,7 +44,9 @@ class Creased(Freeform):
 
     def _by_piece(self, x: Floats) -> list[tuple[Freeform, Bools]]:
         """The pieces, and which of the points (n, 3) are on their sides of the seams."""
-        side = np.array([np.where(seam.distance(x) > 0, 1, -1) for seam in self.seams]).reshape(-1, len(x)).T
+        side = (
+            np.array([np.where(seam.distance(x) > 0, 1, -1) for seam in self.seams]).reshape(len(self.seams), len(x)).T
+        )
         kinds, kind = np.unique(side, axis=0, return_inverse=True)
         return [(self.piece(tuple(sides)), kind.reshape(-1) == k) for k, sides in enumerate(kinds.tolist())]
 

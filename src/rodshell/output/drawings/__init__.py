@@ -8,7 +8,15 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.figures.checks import OTHER_SHAPES
 from rodshell.output.drawing import TEXT, Drawing
-from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan, per_sheet, strips_drawing
+from rodshell.output.drawings.flat import (
+    TALL,
+    FlatPlan,
+    flat_drawing,
+    flat_plan,
+    sheets_of_strips,
+    strip_size,
+    strips_drawing,
+)
 from rodshell.output.drawings.sheets import (
     SCALES,
     Compose,
@@ -32,17 +40,19 @@ from rodshell.output.drawings.shell import (
 from rodshell.output.grid import lies_flat, supported
 from rodshell.output.schedules import SCHEDULES
 from rodshell.output.settings import PAPERS
+from rodshell.output.svg import drawing_svg
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.states import DRAPED, POPPED
 from rodshell.rods.supports import clamped_among, finals_first
 
-__all__ = ["drawing_set", "sheet_set"]
+__all__ = ["drawing_set", "drawing_svgs", "sheet_set"]
 
 
 FINER = {"bracing": 0.5}  # smallest texts of a drawing at 1:1 over those of the plan, where more of them find room
 
 
+@made_once
 def drawing_set(archive: Archive) -> dict[str, Drawing]:
     """Every drawing that the archive has content for, at 1:1 with a title block, by name."""
     plan = flat_plan(archive)
@@ -51,6 +61,12 @@ def drawing_set(archive: Archive) -> dict[str, Drawing]:
     first = {"plan": drawings.pop("plan")} if "plan" in drawings else {}
     first["strips"] = strips_drawing(plan, plan.text)
     return {name: with_title(drawing, block) for name, drawing in (first | drawings).items()}
+
+
+@made_once
+def drawing_svgs(archive: Archive) -> dict[str, str]:
+    """The same as SVG files."""
+    return {name: drawing_svg(drawing) for name, drawing in drawing_set(archive).items()}
 
 
 def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
@@ -118,7 +134,7 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, 
         "supports": (partial(supports_drawing, archive, plan), above),
         "elevations": (partial(elevations_drawing, archive), both_sides),
     }
-    if archive.results.fabrication and archive.results.fabrication.bracing:
+    if archive.results.bracing:
         makers["bracing"] = (partial(bracing_drawing, archive), above)
     if "history" in archive.states and archive.results.deployment:
         makers["erection"] = (partial(erection_drawing, archive), above)
@@ -129,10 +145,16 @@ def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
     """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
     low, high = room(paper)
     width, height = high - low
-    longest = max((1e3 * rod.cut_length for rod in plan.rods), default=1.0)
-    scale = next((scale for scale in SCALES if (longest + 12 * scale * TEXT) / scale <= width), SCALES[-1])
-    count = per_sheet(height, TEXT)
-    groups = [plan.rods[k : k + count] for k in range(0, len(plan.rods), count)]
+
+    def fits(scale: float) -> bool:
+        sizes = [strip_size(plan, rod, scale * TEXT) for rod in plan.rods]
+        longest = max((long for long, _ in sizes), default=1.0)
+        broadest = max((across for _, across in sizes), default=0.0)
+        fitting = (longest + 12 * scale * TEXT) / scale <= width and broadest / scale + (TALL + 3) * TEXT <= height
+        return bool(fitting)
+
+    scale = next((scale for scale in SCALES if fits(scale)), SCALES[-1])
+    groups = sheets_of_strips(plan, scale * height, scale * TEXT)
     sheets = []
     for k, rods in enumerate(groups):
         drawing = strips_drawing(plan, scale * TEXT, rods)

@@ -13,10 +13,11 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
-from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
+from rodshell.output.blanks import Blank, blanks_of
+from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil, Text
 from rodshell.output.grid import GridJoint, GridRod, family_numbers, joints_of, opens, outlines_of, rods_of
 from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, segments, spread, take
 from rodshell.output.schedules import Show
@@ -36,6 +37,8 @@ _STRIPS_LEGEND = (
     "S2: of the second lath.",
     "Open triangle: support. Arrow: the section's size there [mm], or from there on the number of laths (L).",
 )
+_CURVED = "Curved laths: distances along the centre line of the blank, seen from above."
+_SLOTS = "Slots: {} deep, their width at each of them; walls square to the strip's faces."
 # On a strip, in text sizes: points, whether the line is closed, its width.
 _SIGNS = {
     "splice": (((0.0, -0.5), (0.0, 0.5)), False, 0.2),
@@ -43,6 +46,8 @@ _SIGNS = {
     "support": (((0.0, 0.0), (-0.4, -0.7), (0.4, -0.7)), True, 0.07),
 }
 TALL = 15.0  # text sizes from strip to strip
+SLOT = 5.0  # further ones where widths of slots are written
+LEADING = 1.4  # text sizes from line to line of the legend
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +60,14 @@ class FlatPlan:
         cuts: (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
         courses: (k, 2) of each rod along it, from cut to cut [mm].
         marks: (c, 2) the joints, in the order of `joints` [mm].
-        footprint: closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
+        outlines: rod ends around the grid and around each opening, see `outlines_of`.
+        footprint: closed curves (f, 2) through them [mm].
         boundary: closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if
             they are not known.
         rounding: how finely lengths are shown.
         laths: how much lies on the rods, in words; "" where nothing does.
+        blanks: outlines by the names of rods that are more than a length, see `blanks_of` [m].
+        slot_depth: of strips that cross by slots [m].
     """
 
     rods: list[GridRod]
@@ -68,10 +76,13 @@ class FlatPlan:
     cuts: Floats
     courses: list[Floats]
     marks: Floats
+    outlines: list[Ints]
     footprint: list[Floats]
     boundary: list[Floats]
     rounding: Rounding
     laths: str
+    blanks: dict[str, Blank]
+    slot_depth: float | None
 
     @cached_property
     def extent(self) -> float:
@@ -151,12 +162,13 @@ def flat_plan(archive: Archive) -> FlatPlan:
     marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
     footprint = np.array(archive.results.footprint or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
     boundary = np.array(archive.results.boundary, dtype=float).reshape(-1, 3)
-    loops = outlines_of(rods)
+    loops = outlines_of(archive)
     return FlatPlan(
-        rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks,
+        rods, joints, 1e3 * lines, cuts, courses, 1e3 * marks, loops,
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
-        rounding_of(archive.results), laths_text(archive.results),
+        rounding_of(archive.results), laths_text(archive.results), blanks_of(archive),
+        archive.results.fabrication.slot_depth if archive.results.fabrication else None,
     )  # fmt: skip
 
 
@@ -201,19 +213,16 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
     radius = min(0.25 * text, 0.04 * plan.spacing, 1.0)
     clear = max(radius, 0.5 * ROD * text) + GAP * text
     room, both, left_out = Room(plan.spacing), np.concatenate([lines, across]), 0
-    for written in pencil.texts:
-        room.take(written.box())
+    for there in pencil.texts:
+        room.take(there.box())
     for joint, mark, note in zip(plan.joints, plan.marks, plan.notes, strict=True):
         pencil.mark(mark, radius, "MARK", note=note)
         size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
-        for clear_of, corner in product((both, lines), CORNERS if size >= SMALL * text else ()):
-            off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
-            label = Label(joint.id, mark + off * corner, 0.0, mark, moved=False)
-            written = label.written(size)
-            box = written.box()
-            if not lines_meet(box, clear_of) and room.claim(box):
-                pencil.texts.append(written)
-                break
+        off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
+        labels = [Label(joint.id, mark + off * corner, 0.0, mark, moved=False).written(size) for corner in CORNERS]
+        tried = product((both, lines), labels if size >= SMALL * text else ())
+        if written := room.first(label for clear_of, label in tried if not lines_meet(label.box(), clear_of)):
+            pencil.texts.append(written)
         else:
             left_out += 1
     pencil.leave_out(left_out, len(plan.joints), "joint ids (named by the rods that cross)")
@@ -222,8 +231,8 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
 
 def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
     """Each rod's label at its ends, on its line; in an opening, around it."""
-    names, outlines = [rod.id for rod in plan.rods], outlines_of(plan.rods)
-    inside = [loop for loop in outlines if opens(plan.lines.reshape(-1, 2)[loop])]
+    names = [rod.id for rod in plan.rods]
+    inside = [loop for loop in plan.outlines if opens(plan.lines.reshape(-1, 2)[loop])]
     outside = np.ones(2 * len(names), dtype=bool)
     outside[[end for loop in inside for end in loop]] = False
     labels, room = place(names, plan.cuts, text, at=outside.reshape(-1, 2)), Room(4 * text)
@@ -278,11 +287,12 @@ def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float
     pencil.line([a, b], "DIM", pen=Pen("#b08a2e", 0.05 * text, (1.5 * text, 0.5 * text, 0.3 * text, 0.5 * text)))
     words, angle = plan.rounding.mm(1e-3 * float(np.linalg.norm(along))), float(np.arctan2(along[1], along[0]))
     shares = sorted(np.linspace(0.1, 0.9, 81).tolist(), key=lambda share: abs(share - 0.33))
-    for size, share in ((size, share) for size in (text, SMALL * text) for share in shares):
-        pencil.write(words, a + share * along, size, "DIM", anchor="middle", angle=angle, colour="#8a6a1c")
-        if room.claim(pencil.texts[-1].box()):
-            return
-        pencil.texts.pop()
+    tried = (
+        Text(words, a + share * along, size, "DIM", "middle", angle, colour="#8a6a1c")
+        for size, share in product((text, SMALL * text), shares)
+    )
+    if written := room.first(tried):
+        pencil.texts.append(written)
 
 
 def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
@@ -312,30 +322,60 @@ def side_ticks(pencil: Pencil, low: Floats, high: Floats, text: float, count: in
 
 def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None = None) -> Drawing:
     """The strips of some rods (default: all) one below the other [mm], all starting at x = 0."""
-    pencil = Pencil()
+    pencil, y = Pencil(), 0.0
     layer = {rod.id: rod.record.layer for rod in plan.rods}
     chosen = plan.rods if rods is None else rods
     for k, rod in enumerate(chosen):
-        _strip(pencil, rod, -k * TALL * text, text, layer, plan.rounding.mm)
-    for row, line in enumerate(_STRIPS_LEGEND):
-        pencil.write(line, (0.0, -len(chosen) * TALL * text + (9.0 - 1.4 * row) * text), text, "DIM")
+        y -= strip_size(plan, rod, text)[1]
+        _strip(pencil, rod, plan.blanks.get(rod.id), y - k * TALL * text, text, layer, plan.rounding.mm)
+    for row, line in enumerate(_legend(plan)):
+        pencil.write(line, (0.0, y - len(chosen) * TALL * text + (9.0 - LEADING * row) * text), text, "DIM")
     return pencil.done("strips", _STRIPS_TITLE, text)
 
 
-def per_sheet(height: float, text: float) -> int:
-    """How many strips find room in a height [mm], with texts of a size [mm]."""
-    return max(int((height / text - 3) // TALL), 1)
+def sheets_of_strips(plan: FlatPlan, height: float, text: float) -> list[list[GridRod]]:
+    """The rods whose strips find room one below the other in a height [mm], with texts of a size [mm]."""
+    sheets, left = list[list[GridRod]](), 0.0
+    for rod in plan.rods:
+        taken = TALL * text + strip_size(plan, rod, text)[1]
+        if not sheets or taken > left + 1e-9 * height:
+            sheets.append([])
+            left = height - 3 * text - LEADING * text * len(_legend(plan)[len(_STRIPS_LEGEND) :])
+        sheets[-1].append(rod)
+        left -= taken
+    return sheets
 
 
-def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str, int | None], mm: Show) -> None:
+def strip_size(plan: FlatPlan, rod: GridRod, text: float) -> tuple[float, float]:
+    """Length of a rod's strip, and what it takes across in addition to that of a line, with texts of a size [mm]."""
+    length, width = plan.blanks[rod.id].board if rod.id in plan.blanks else (0.0, 0.0)
+    return 1e3 * max(rod.cut_length, length), 1e3 * width + SLOT * text * any(on.slot for on in rod.record.joints)
+
+
+def _legend(plan: FlatPlan) -> list[str]:
+    curved = [_CURVED] if any(rod.record.rest_curvature for rod in plan.rods) else []
+    slots = [] if plan.slot_depth is None else [_SLOTS.format(plan.rounding.mm(plan.slot_depth))]
+    return [*_STRIPS_LEGEND, *curved, *slots]
+
+
+def _strip(
+    pencil: Pencil, rod: GridRod, blank: Blank | None, y: float, text: float, layer: dict[str, int | None], mm: Show
+) -> None:
     """One rod: above it the distances and the rods that are met there, below it what it is."""
     cut, start = 1e3 * rod.cut_length, 1e3 * rod.from_cut_end(0.0)
-    pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=f"{rod.id}: {mm(rod.cut_length)} mm")
+    note = f"{rod.id}: {mm(rod.cut_length)} mm"
     words = [rod.id, f"cut {mm(rod.cut_length)}", f"layer {rod.record.layer}" if rod.record.layer is not None else ""]
+    if blank is None:
+        pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=note)
+    else:
+        pencil.line(1e3 * blank.outline + (0.0, y), "CUT", closed=True, name=rod.id, note=note)
+        words.append(f"board {' x '.join(map(mm, blank.board))}")
     if start > 0:
         words.append(f"with {mm(rod.allowance)} at each end for the supports")
     pencil.write("   ".join(filter(None, words)), (0.0, y - 2.2 * text), 1.1 * text, "LABEL", bold=True)
-    joints = ((1e3 * rod.from_cut_end(at), other, "joint") for other, at in rod.joints)
+    joints = ((1e3 * rod.from_cut_end(joint.at), joint.other, "slot" if joint.slot else "joint")
+              for joint in rod.record.joints)  # fmt: skip
+    slots = {joint.other: f"  slot {mm(joint.slot)}" for joint in rod.record.joints if joint.slot}
     along = rod.record.stiffness
     first, last = map(_size, (along.sizes[0], along.sizes[-1])) if along and along.sizes else ("", "")
     stops = [(0.0, first, ""), *joints, (cut, last, "")]
@@ -346,10 +386,20 @@ def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str,
         stops += [(1e3 * rod.from_cut_end(at), size, "section") for at, size in _section_marks(along)]
     if start > 0:
         stops += [(start, "", "support"), (cut - start, "", "support")]
-    stops.sort(key=lambda stop: stop[0])
-    spaced = spread([at for at, _, _ in stops], 1.15 * text)
+
+    def place(at: float) -> Floats:
+        return np.array([at, y]) if blank is None else 1e3 * blank.at(1e-3 * (at - start)) + (0.0, y)
+
+    marks = {at: place(at) for at, _, _ in stops}
+    stops.sort(key=lambda stop: float(marks[stop[0]][0]))
+    top = y if blank is None else y + 1e3 * blank.board[1]
+    spaced = spread([float(marks[at][0]) for at, _, _ in stops], 1.15 * text)
     for (at, name, kind), x in zip(stops, spaced, strict=True):
-        _stop(pencil, rod, at, float(x), y, text, name, kind, layer, mm)
+        here, other = rod.record.layer, layer.get(name)
+        below = here is not None and other is not None and other > here
+        said = f"{mm(1e-3 * at)}  {name}{slots.get(name, '')}".rstrip()
+        ends = None if blank is None else 1e3 * blank.across(1e-3 * (at - start)) + (0.0, y)
+        _stop(pencil, marks[at], ends, (float(x), top), text, said, kind, named=bool(name), full=below)
 
 
 def _section_marks(along: Stiffness) -> list[tuple[float, str]]:
@@ -366,20 +416,21 @@ def _size(metres: float) -> str:
 
 
 def _stop(
-    pencil: Pencil, rod: GridRod, at: float, x: float, y: float, text: float, name: str, kind: str,
-    layer: dict[str, int | None], mm: Show,
+    pencil: Pencil, at: Floats, ends: Floats | None, to: tuple[float, float], text: float, words: str, kind: str, *,
+    named: bool, full: bool,
 ) -> None:  # fmt: skip
-    """A mark at `at`, its text at `x`, and a line from the text through the middle of the mark."""
-    way = [(x, y + 1.87 * text), (at, y + 0.7 * text), (at, y - 0.7 * text if name else y)]
-    pencil.line(way if abs(x - at) > 1e-6 else [way[0], way[-1]], "DIM")
-    words = f"{mm(1e-3 * at)}  {name}".rstrip()
+    """A mark at `at` (2,), its text above `to`, and a line from the text through the middle of the mark; a splice ends
+    at the edges `ends` (2, 2) of a blank."""
+    (u, v), (x, y) = at.tolist(), to
+    way = [(x, y + 1.87 * text), (u, y + 0.7 * text), (u, y if kind == "slot" else v - 0.7 * text if named else v)]
+    pencil.line(way if abs(x - u) > 1e-6 else [way[0], way[-1]], "DIM")
     pencil.write(words, (x + 0.35 * text, y + 2.0 * text), text, "LABEL", angle=np.pi / 2)
     if kind == "joint":
-        here, other = rod.record.layer, layer.get(name)
-        below = here is not None and other is not None and other > here
-        pencil.mark((at, y), 0.35 * text, "MARK", pen=Pen("#b3372c", 0.07 * text, fill="#b3372c" if below else PAPER))
+        pencil.mark((u, v), 0.35 * text, "MARK", pen=Pen("#b3372c", 0.07 * text, fill="#b3372c" if full else PAPER))
+    elif kind == "splice" and ends is not None:
+        pencil.line(ends, "MARK")
     elif kind in _SIGNS:
         points, closed, width = _SIGNS[kind]
         pencil.line(
-            [(at + u * text, y + v * text) for u, v in points], "MARK", closed=closed, pen=Pen(INK, width * text)
+            [(u + a * text, v + b * text) for a, b in points], "MARK", closed=closed, pen=Pen(INK, width * text)
         )

@@ -144,19 +144,6 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     return drawing + pencil.done("", "", size)
 
 
-def _write_entries(
-    pencil: Pencil, block: TitleBlock, left: float, y: float, width: float, size: float, line: float
-) -> float:
-    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line."""
-    step = width / COLUMNS
-    for k, (label, value) in enumerate(block.entries):
-        x, down = left + step * (k % COLUMNS), y - line * (k // COLUMNS)
-        pencil.write(label, (x, down), size, "TITLE", colour=SOFT)
-        start = 9.5 * LETTER * size  # after the longest label
-        pencil.write(shortened(value, step - start - 2.0, size), (x + start, down), size, "TITLE")
-    return y - line * len(range(0, len(block.entries), COLUMNS))
-
-
 def shortened(text: str, width: float, size: float) -> str:
     """A text that takes at most a width [mm] in a size [mm]; what is cut off is shown by dots."""
     letters = int(width / (LETTER * size))
@@ -377,7 +364,12 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: Pape
     title = shortened(f"{block.name}: {sheet.title}", right - left - 80, 5.0)
     pencil.write(title, (left, y), 5.0, "TITLE", bold=True)
     pencil.write(f"Sheet {number} of {count}", (right, y), TEXT, "TITLE", anchor="end")
-    y = _write_entries(pencil, block, left, y - 5.9, right - left, FINE, ROW)
+    y, step, start = y - 5.9, (right - left) / COLUMNS, 9.5 * LETTER * FINE  # after the longest label
+    for k, (label, value) in enumerate(block.entries):
+        x, down = left + step * (k % COLUMNS), y - ROW * (k // COLUMNS)
+        pencil.write(label, (x, down), FINE, "TITLE", colour=SOFT)
+        pencil.write(shortened(value, step - start - 2.0, FINE), (x + start, down), FINE, "TITLE")
+    y -= ROW * ceil(len(block.entries) / COLUMNS)
     room = right - left - (_bar_length(BAR, sheet.scale) + 3 * TEXT if sheet.scale else 0.0)
     for k, line in enumerate(block.notes(sheet.content)):
         written = shortened(line, room, FINE)
@@ -425,19 +417,15 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         shifts = np.concatenate([steps + share * middle - 0.5 * TEXT * up for share in (1, 2)])
         written = Text(words, line[0], TEXT, "TITLE", angle=angle, colour=pen.colour)
         crossed = np.ceil(length_beneath(written.box(), shifts, drawn) / TEXT)
-        for shift in shifts[np.argsort(crossed, kind="stable")]:
-            placed = written._replace(at=line[0] + shift)
-            if free.claim(placed.box()):
-                pencil.texts.append(placed)
-                break
-        else:
-            aside = _led_aside(words, line, part, pencil.texts, low - OVERLAP, high + OVERLAP)
-            if aside is None:
-                missing += 1
-                continue
+        ordered = shifts[np.argsort(crossed, kind="stable")]
+        if placed := free.first(written._replace(at=line[0] + shift) for shift in ordered):
+            pencil.texts.append(placed)
+        elif aside := _led_aside(words, line, part, pencil.texts, low - OVERLAP, high + OVERLAP):
             take(aside, TEXT, free)
             pencil.line(aside.leader(TEXT), "TITLE", pen=Pen(WARNING, 0.18))
             pencil.texts.append(aside.written(TEXT)._replace(layer="TITLE", colour=pen.colour))
+        else:
+            missing += 1
     pencil.leave_out(missing, len(shared), "names of match lines")
     return pencil.done("", "", TEXT)
 

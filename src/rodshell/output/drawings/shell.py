@@ -95,7 +95,7 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     pen = Pen(INK, 0.04 * text)
     drawn = meshed_rods(archive)
     ways, thin = 1e3 * history[:, end_nodes(drawn), :2], Pen(SOFT, 0.05 * text)
-    loops = [loop for loop in outlines_of(drawn) if len(loop) > 1]
+    loops = [loop for loop in outlines_of(archive) if len(loop) > 1]
     for stage, loop in product(ways[:-1], loops):
         pencil.line(stage[loop], "DIM", closed=True, pen=thin)
     for way in ways.transpose(1, 0, 2):
@@ -195,9 +195,9 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
         room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
     lines = segments(_thinned(_thinned(curve)) for curve in curves)  # what names keep clear of
     alone = ~np.isin(names, list(_sewn(archive)))
-    for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
+    for seam in (run for loop in outlines_of(archive) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
-    walks, left_out = list(_walks(outlines_of(drawn), ends, alone)), 0
+    walks, left_out = list(_walks(outlines_of(archive), ends, alone)), 0
     for walk in walks:
         if len(walk) > 1:
             pencil.line(ends[walk], "BOUNDARY-FINAL", closed=True)
@@ -257,12 +257,12 @@ def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None
     size, left_out = SMALL * text, 0
     for number, meeting in seam_meetings(archive.results):
         at = 1e3 * np.array(meeting.point[:2])
-        for corner in ((0.5, 0.4), (-0.5, 0.4), (0.5, -1.1), (-0.5, -1.1)):
-            anchor = "start" if corner[0] > 0 else "end"
-            pencil.write(number, at + text * np.array(corner), size, "LABEL", anchor=anchor)
-            if room.claim(pencil.texts[-1].box()):
-                break
-            pencil.texts.pop()
+        tried = (
+            Text(number, at + text * np.array([side, up]), size, "LABEL", "start" if side > 0 else "end")
+            for up, side in product((0.4, -1.1), (0.5, -0.5))
+        )
+        if written := room.first(tried):
+            pencil.texts.append(written)
         else:
             left_out += 1
     pencil.leave_out(left_out, sum(1 for _ in seam_meetings(archive.results)), "numbers of meetings (table Seams)")
@@ -283,8 +283,7 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     joints = joint_places(archive, archive.states[final])
     supports = [f"{rod.id}.{end}" for rod in archive.results.rods for end in (0, 1)]
     joints |= {name: np.array(place) for name, place in zip(supports, archive.results.boundary, strict=False)}
-    known = archive.results.fabrication.bracing if archive.results.fabrication else ()
-    braces = [brace for brace in known if {brace.start, brace.end} <= joints.keys()]
+    braces = [brace for brace in archive.results.bracing if {brace.start, brace.end} <= joints.keys()]
     ends = 1e3 * np.array([[joints[end][:2] for end in (brace.start, brace.end)] for brace in braces])
     ends = ends.reshape(-1, 2, 2)
     pen = Pen("#b08a2e", 0.07 * text)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
@@ -29,8 +29,8 @@ from rodshell.output.grid import (
     shape_names,
     shape_of,
 )
-from rodshell.output.models import section_outline, section_widths
 from rodshell.output.schedules import SCHEDULES, Table, heading
+from rodshell.output.sections import section_outline, section_widths
 from rodshell.results import Archive, wording
 from rodshell.results.states import DRAPED
 from rodshell.results.wording import nice_ticks, rounding_of
@@ -261,7 +261,7 @@ def _worst(archive: Archive, shape: Shape, kind: Colour, scale: Scale) -> tuple[
     if kind == "gap" and shape.gap is not None:
         largest, place = largest_gap(archive, shape)
         return place, wording.millimetres(abs(largest) * 1e-3, rounding=rounding_of(archive.results))
-    worst = int(np.nanargmax(np.abs(scale.values)))
+    worst = largest_at(np.abs(scale.values))
     unit = scale.caption.split(" in ")[-1].split(",")[0]
     return shape.positions[archive.states["rod_nodes"][worst]], f"{scale.values[worst]:.3g} {unit}"
 

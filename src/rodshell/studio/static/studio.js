@@ -496,7 +496,7 @@ function showPlan() {
   svg.replaceChildren(...rods.flatMap(({ id, family, ends }) => {
     const at = { x1: ends[0], y1: -ends[1], x2: ends[2], y2: -ends[3] };
     const hit = draw("line", { ...at, class: "hit", tabindex: -1, "data-rod": id, "vector-effect": "non-scaling-stroke" });
-    return [draw("line", { ...at, class: family === "v" ? "v" : "u", "data-line": id }), hit];
+    return [draw("line", { ...at, class: family, "data-line": id }), hit];
   }));
   const gone = leftOut();
   byId("left-out").replaceChildren(...(gone.length ? ["Left out: ", ...gone.map(id => make("button", { type: "button", textContent: `${id} \u00d7`, ariaLabel: `Put rod ${id} back`, onclick: () => toggle(id) }))] : []));
