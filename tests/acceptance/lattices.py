@@ -19,8 +19,10 @@ from rodshell.nets.surface_lattice import surface_net
 from rodshell.solve.equilibrium import find_stable
 from rodshell.solve.problem import Problem
 from tests.acceptance.lattices_gallery import gallery_rows
+from tests.acceptance.lattices_studio import studio_rows
 from tests.acceptance.lattices_twin import twin_rows
 from tests.acceptance.rows import Row, print_table
+from tests.refining.test_families import ALONG_CURVES, GEODESIC, errors
 from tests.targets.meshes import lattice
 
 LATH = rs.Material(youngs_modulus=10e9, density=600.0)
@@ -278,6 +280,13 @@ def up_from_flat(form: rs.Form) -> float:
     return float(np.abs(state[: shell.mesh.node_count] - popped.positions).max() / form.target.size)
 
 
+def derivative_rows() -> Iterator[Row]:
+    """Of a shell of laths along geodesics by all variables that it has, against solving again."""
+    for family in ALONG_CURVES:
+        for what, error in errors(family, True, lattice=GEODESIC).items():
+            yield Row(f"geodesic, {family.name}", f"derivative of {what}: relative error", error, 1e-6)
+
+
 ROWS = (
     geodesic_rows,
     straight_rows,
@@ -287,6 +296,8 @@ ROWS = (
     curve_rows,
     flat_rows,
     twin_rows,
+    derivative_rows,
+    studio_rows,
     gallery_rows,
 )
 

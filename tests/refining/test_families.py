@@ -12,7 +12,7 @@ from rodshell.figures.records import Ends
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.length_families import Holes, Offsets, Tails
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
-from rodshell.refining.refine import first_point, structure_of
+from rodshell.refining.refine import LENGTHS, first_point, structure_of
 from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.structure import Point, Structure
 from rodshell.refining.symmetry import symmetries, ties
@@ -21,6 +21,7 @@ from rodshell.refining.variables import Design, Family, Grid, Tied, design_of
 MATERIAL = rs.Material(youngs_modulus=1e6, density=1e3)
 ROD = rs.Rod(rs.Circle(radius=1e-3), MATERIAL)
 LATH = rs.Rod(rs.RectangularSection(width=1e-3, height=2e-3), MATERIAL)
+GEODESIC = rs.Geodesic(spacing=0.06, edge=0.02, rotate=0.3)
 STEP = 3e-4  # of the scale of the variables: central differences, extrapolated, agree to 1e-6
 
 EVERY: list[tuple[str, Family]] = [
@@ -29,6 +30,7 @@ EVERY: list[tuple[str, Family]] = [
     ("tails", Tails()), ("holes", Holes()), ("offsets", Offsets()), ("clamps", Clamps()),
     ("supports", Supports()),
 ]  # fmt: skip
+ALONG_CURVES = [family for _, family in EVERY if family.name not in LENGTHS]
 CASES = [
     pytest.param(
         family, laths, id=f"{name}{', laths with pins' * laths}", marks=[pytest.mark.slow] * (laths and name != "tails")
@@ -39,8 +41,10 @@ CASES = [
 
 
 @cache
-def structure(ends: Ends, laths: bool = False, symmetric: bool = False, weighs: bool = False) -> Structure:
-    layout = rs.GridLayout.orthogonal(
+def structure(
+    ends: Ends, laths: bool = False, symmetric: bool = False, weighs: bool = False, lattice: rs.Geodesic | None = None
+) -> Structure:
+    layout = lattice or rs.GridLayout.orthogonal(
         rods=(5, 5) if symmetric else (6, 5), spacing=0.06, edge=0.02, rotate=0.0 if symmetric else 0.3
     )
     target = rs.Ellipsoid(0.2, 0.18, 0.12)
@@ -57,9 +61,11 @@ def free_design(shell: Structure, family: Family) -> Design:
     return Design([Tied(part, ties(len(part.box.start), []))])
 
 
-def start(family: Family, laths: bool, weighs: bool = False) -> tuple[Design, Point, np.ndarray]:
+def start(
+    family: Family, laths: bool, weighs: bool = False, lattice: rs.Geodesic | None = None
+) -> tuple[Design, Point, np.ndarray]:
     """A design, its equilibrium, and a direction at random in it."""
-    shell = structure("clamped" if family.name == "clamps" else "pinned", laths, weighs=weighs)
+    shell = structure("clamped" if family.name == "clamps" else "pinned", laths, weighs=weighs, lattice=lattice)
     variables = free_design(shell, family)
     here, _ = first_point(shell, variables)
     return variables, here, variables.box.scale * np.random.default_rng(3).uniform(-1.0, 1.0, len(variables.box.scale))
@@ -71,12 +77,12 @@ def solved(variables: Design, here: Point, values: np.ndarray) -> Point:
     return point
 
 
-def errors(family: Family, laths: bool, weighs: bool = False) -> dict[str, float]:
+def errors(family: Family, laths: bool, weighs: bool = False, lattice: rs.Geodesic | None = None) -> dict[str, float]:
     """Of the derivatives of the state, and of the objectives' squares, over the largest of each.
 
     Differences of Hessians leave 1e-7 of a mode's value, see `solve.sensitivity`: its error may be related to that.
     """
-    variables, here, direction = start(family, laths, weighs)
+    variables, here, direction = start(family, laths, weighs, lattice)
     nodes = here.structure.mesh.node_count
     floor = LowestEigenvalue(least=2.0, before=float(here.modes.values[0]))  # counts here
     goals: dict[str, Objective] = {
@@ -106,6 +112,12 @@ def errors(family: Family, laths: bool, weighs: bool = False) -> dict[str, float
 @pytest.mark.parametrize(("family", "laths"), CASES)
 def test_states_and_objectives_change_as_their_derivatives_say(family: Family, laths: bool) -> None:
     assert {name: error for name, error in errors(family, laths).items() if error > 1e-6} == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ALONG_CURVES, ids=lambda family: family.name)
+def test_shells_of_laths_along_geodesics_change_as_their_derivatives_say(family: Family) -> None:
+    assert {name: error for name, error in errors(family, True, lattice=GEODESIC).items() if error > 1e-6} == {}
 
 
 @pytest.mark.slow
