@@ -17,17 +17,19 @@ CODES = {
     "erection_strength": "rods use more than their strength on the way that was computed",
     "erection_too_thick": "rods are too thick for their bends on the way that was computed",
     "falls": "the shell falls under its own weight",
+    "falls_after_years": "after years of creep the shell falls under a permanent combination of loads",
     "falls_under_loads": "the shell falls under a combination of loads",
     "flat": "the target is flat",
     "guided": "lifted and driven by its ends, the shell comes to rest in another shape than the final one",
-    "imperfect": "with imperfections the shell falls under a combination of loads, or nothing is known of it",
+    "imperfect": "with imperfections the shell falls under a combination of loads",
+    "imperfect_unknown": "of the shell with imperfections it is not known how far it carries a combination of loads",
     "in_place": "flat, the rods would bend by more than they withstand: the shell is assembled in place",
     "lies_flat": "the rods can be laid out flat, although they follow curves of the target",
     "linear_buckling": "linear buckling is below the loads, which the shell carries in another shape",
     "lost": "the deployment could not be followed all the way",
     "low_stiffness": "with the modulus that a code asks for, the shell falls under a combination of loads",
     "needs_bracing": "without its bracing the shell does not carry its own weight",
-    "no_imperfections": "imperfections were not looked at",
+    "no_imperfections": "imperfections were left out",
     "no_loads": "loads other than the own weight and even snow were not checked",
     "no_mass": "no mass was given",
     "no_room": "rods pass each other so near that there is hardly any room for joints",
@@ -45,6 +47,7 @@ CODES = {
     "other_shape": "another stable shape is near",
     "relaxed": "strengths count on stress that relaxes",
     "reserve": "the shell carries its own weight, but not with the reserve that is asked for",
+    "reserve_under_loads": "the shell carries a combination of loads, but not with the reserve that is asked for",
     "sinks": "under its own weight the shell takes another shape",
     "slip": "a joint transfers more than the force at which it slips",
     "slots": "little of a strip remains next to one of its slots",
@@ -67,12 +70,12 @@ CODES = {
 Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
 GOOD = frozenset({
-    "assumed_class", "cables_short", "creep_unknown", "in_place", "lies_flat", "no_imperfections", "no_loads",
+    "assumed_class", "cables_short", "in_place", "lies_flat", "no_imperfections", "no_loads",
     "not_nested", "relaxed", "stands", "stands_under_loads",
 })  # fmt: skip
 FAULTS = frozenset({
-    "contact", "falls", "falls_under_loads", "flat", "slip", "strength", "strength_of_bracing", "strength_under_loads",
-    "too_thick", "unstable",
+    "contact", "falls", "falls_after_years", "falls_under_loads", "flat", "imperfect", "slip", "strength",
+    "strength_of_bracing", "strength_under_loads", "too_thick", "unstable",
 })  # fmt: skip
 """Of these a shell cannot be built; another on other supports may be."""
 NOT_KNOWN = frozenset({"none_stands", "not_computed"})

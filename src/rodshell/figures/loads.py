@@ -71,6 +71,19 @@ class DesignStrength(Record):
         return left if self.short is None else min(left, self.short)
 
 
+class AfterYears(Record):
+    """A shell under a permanent combination of loads whose rods have crept: their stiffness is divided by 1 + creep."""
+
+    creep: Number = key("by how much deflections grow")
+    limit_factor: Number = key("of the combination, up to which the shell is stable; null: above 100")
+    limit_kind: Text | None = key("as limit_kind of the shell as erected")
+    imperfect_factor: Number = key("the same with imperfections; null: above 100, not found, or not asked for")
+    imperfect_kind: Text | None = key("what ends the path with imperfections; null: not asked for")
+    max_deflection: Number = key(
+        "largest displacement of a node against the unloaded shell as erected; null: it does not carry the loads", "m"
+    )
+
+
 class LoadedShell(Record):
     """The shell under a combination of loads. Factors multiply the whole combination."""
 
@@ -83,6 +96,8 @@ class LoadedShell(Record):
     limit_kind: Text | None = key("limit point, bifurcation, none, unstable unloaded, or not followed: unknown above")
     imperfect_factor: Number = key("the same with imperfections; null: above 100, not found, or not asked for")
     imperfect_kind: Text | None = key("what ends the path with imperfections, as limit_kind; null: not asked for")
+    after_years: AfterYears | None = key("under permanent loads, with creep; null: others, or creep is not known")
+    reserve: Number = key("how many times the combination a good shell carries, as was asked for")
     duration: Text | None = key("of the load that acts for the shortest time, which decides the strength")
     utilisation: Number = key("the largest of the utilisations; null: none is known")
     utilisations: Utilisations | None = key("what is used of each strength")

@@ -16,12 +16,19 @@ SENTENCES = {
         "to {times} times its force; stress them to their forces (bracing.csv), not to their lengths"
     ),
     "contact": "{shape} {worst}{rods} by {depth}{where}: use thinner rods (rod.section), or set them further apart",
-    "creep_unknown": "creep of these rods is not known, and the factors on permanent loads are those at first",
+    "creep_unknown": (
+        "creep of these rods is not known, and how far the shell carries permanent loads after years is not either: "
+        "give by how much its deflections grow (strength.creep)"
+    ),
     "ends_in_the_air": (
         "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
         "beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has to be designed"
     ),
     "falls": "{alone}the shell does not stand under its own weight{bracing}: it carries only {parts}{others}{advice}",
+    "falls_after_years": (
+        "under {place} with {ends} ends the shell falls after years at {factor} times these loads, as deflections grow "
+        "by {creep} times what they are at first (creep)"
+    ),
     "falls_under_loads": "with {ends} ends the shell falls under {place}: it {how} at {factor} times these loads",
     "flat": "the target is flat, nothing pops up",
     "guided": (
@@ -29,13 +36,13 @@ SENTENCES = {
         "guided into its final shape"
     ),
     "imperfect": "under {place} with {ends} ends and imperfections the shell falls at {factor} times these loads",
-    "imperfect: no equilibrium": (
-        "under {place} with {ends} ends and imperfections no equilibrium was found, and nothing is known of it"
-    ),
-    "imperfect: not followed": (
+    "imperfect: unloaded": "with {ends} ends and imperfections the shell is unstable before the loads of {place} act",
+    "imperfect_unknown": (
         "under {place} with {ends} ends and imperfections nothing is known above {factor} times the loads"
     ),
-    "imperfect: unloaded": "with {ends} ends and imperfections the shell is unstable before the loads of {place} act",
+    "imperfect_unknown: no equilibrium": (
+        "under {place} with {ends} ends and imperfections no equilibrium was found, and nothing is known of it"
+    ),
     "in_place": (
         "the rods cannot be laid out flat: there they would bend within the plane by up to {bent}, and withstand "
         "{withstood} during erection; bring rod by rod to its place over a scaffold, by the joints on its strip"
@@ -59,7 +66,7 @@ SENTENCES = {
     ),
     "needs_bracing": "{alone}the shell {carries} {weight} without its bracing: support it until that is in place",
     "no_imperfections": (
-        "imperfections were not looked at, and the factors on the loads are those of the perfect shell: have them "
+        "imperfections were left out, and the factors on the loads are those of the perfect shell: have them "
         "looked at ({offer})"
     ),
     "no_loads": (
@@ -118,6 +125,10 @@ SENTENCES = {
         "under {place} with {ends} ends the shell could not be followed beyond {factor} times the loads, and nothing "
         "is known above"
     ),
+    "not_followed: years": (
+        "under {place} with {ends} ends the shell after years of creep could not be followed beyond {factor} times "
+        "these loads, and nothing is known above"
+    ),
     "not_followed: weight": (
         "{alone}it is not known whether the shell stands under its own weight{bracing}: it could be followed only up "
         "to {parts}"
@@ -147,6 +158,10 @@ SENTENCES = {
         "(strength.relaxed), which wood and moisture decide"
     ),
     "reserve": "the shell{bracing} carries only {weights}, and {asked}{others}{advice}",
+    "reserve_under_loads": (
+        "under {place} with {ends} ends the shell carries {factor} times these loads {what}, and {asked} times are "
+        "asked for (stability.reserve)"
+    ),
     "sinks": (
         "with {ends} ends the shell moves by {depth} ({share} of its size) under its own weight{further}, so that it "
         "does not keep the shape whose gap to the target is given: use stiffer rods, or brace it"
@@ -167,7 +182,7 @@ SENTENCES = {
         "with {all} ends the shell{bracing} is stable and carries {weight} times its own weight, {asked} being asked "
         "for{near}"
     ),
-    "stands_under_loads": "under {place} it is stable up to {factor} times these loads{stiffness}",
+    "stands_under_loads": "it carries {place} {factor} times {what}{stiffness}",
     "strength": "{shape} the rods use {share} of {whose}{where}",
     "strength: given": "{shape} the rods would break: {share} of their strength{where}",
     "strength: unloaded": UNLOADED,

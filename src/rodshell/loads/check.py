@@ -10,7 +10,6 @@ modes. All multiply the whole combination, with the shell's weight if that is in
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +17,7 @@ from pydantic import Field
 from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.checks.bending import require_known_stress
 from rodshell.checks.self_weight import self_weight, shown_limit
-from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
+from rodshell.errors import InputError, OutOfTimeError
 from rodshell.figures import loads as figures
 from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
@@ -33,15 +32,14 @@ from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
 from rodshell.loads.nodes import LoadedNodes
 from rodshell.loads.settings import Cables, Laths
+from rodshell.loads.stability import after_years, carried
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
 from rodshell.loads.structure import NO_PAIRS, Structure
 from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import Duration
 from rodshell.solve.equilibrium import Equilibrium
-from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
-from rodshell.solve.load_path import Limit, load_path
-from rodshell.solve.modes import LinearBuckling, linear_buckling, softest_motion
+from rodshell.solve.modes import softest_motion
 from rodshell.targets.tributary import Tributary, tributary_areas
 from rodshell.units import shown
 
@@ -50,7 +48,6 @@ BRACED: dict[type, Callable[..., Structure]] = {Cables: stressed, Laths: laid}
 
 PERMANENT: Duration = "permanent"
 ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
-MOST = 100.0  # times a combination: factors above are not looked for
 
 
 class LoadedShell(figures.LoadedShell):
@@ -274,17 +271,20 @@ def loaded_shell(
         loads: for how stability is looked at, and for holes and slip of joints.
     """
     unloaded, following = structure.equilibrium, partial(_following, progress, " the loads")
-    path = load_path(unloaded, load, most=MOST, progress=following)
+    creep = limits.creep if duration == PERMANENT and _creeps_alike(structure, limits) else None
+    stations = (1.0,) if creep is None else (1.0, 1.0 + creep)
+    erected = carried(structure, load, loads.stability, stations=stations, progress=following)
+    path, buckling, work = erected.path, erected.buckling, erected.factorizations
+    years = None
+    if creep is not None:
+        progress("after years")
+        years, more = after_years(structure, load, loads.stability, creep, erected, progress=following)
+        work += more
     factor, found = 0.0, unloaded
     if (at := path.at(1.0)) is not None:
         factor, found = 1.0, at
     elif (last := path.last_stable) is not None:
         factor, found = last.factor, last.equilibrium
-    buckling = None
-    if path.limit != "unstable unloaded":
-        progress("linear buckling")
-        buckling = linear_buckling(unloaded, load, loads.stability.modes, most=MOST)
-    imperfect_factor, imperfect_kind, more = _with_imperfections(structure, load, loads, buckling, following)
     n = structure.shell.node_count
     positions, before = structure.shell.positions(found.state), structure.shell.positions(unloaded.state)
     edges = len(structure.mesh.edges)
@@ -293,9 +293,9 @@ def loaded_shell(
     judged = partial(utilisation, rod=structure.rod, limits=limits, asked=loads.strength)
     moments = structure.locked_moments(found)
     slip = None if loads.locked_joints is None else loads.locked_joints.slip
-    erected = (structure.shell, unloaded.state)
-    standing = bending_under(*erected, structure.rod, unloaded.forces[:edges], limits)
-    alone = judged(*erected, forces=unloaded.forces[:edges], duration=None, bent=standing)
+    before_loads = (structure.shell, unloaded.state)
+    standing = bending_under(*before_loads, structure.rod, unloaded.forces[:edges], limits)
+    alone = judged(*before_loads, forces=unloaded.forces[:edges], duration=None, bent=standing)
     used = judged(
         shell, found.state, forces=forces, duration=duration, bent=bent, before=standing, moments=moments,
         slip_moment=slip,
@@ -311,8 +311,10 @@ def loaded_shell(
         limit_factor=None if path.limit == "none" else path.factor,
         limit_kind=shown_limit(path.limit),
         linear_factor=float(factors[0]) if len(factors) else None,
-        imperfect_factor=imperfect_factor,
-        imperfect_kind=None if imperfect_kind is None else shown_limit(imperfect_kind),
+        imperfect_factor=erected.imperfect_factor,
+        imperfect_kind=None if erected.imperfect_kind is None else shown_limit(erected.imperfect_kind),
+        after_years=years,
+        reserve=loads.stability.reserve,
         load_sum=total,
         reaction_sum=held.force_sum,
         reactions=held.forces,
@@ -340,7 +342,17 @@ def loaded_shell(
         modes=shapes,
         mode_factors=factors,
         mode=None if path.mode is None else path.mode[:n],
-        factorizations=path.factorizations + more,
+        factorizations=work,
+    )
+
+
+def _creeps_alike(structure: Structure, limits: Limits) -> bool:
+    """Whether laths of bracing creep as much as the rods, so that it is known how the shell does."""
+    layer = structure.laths
+    return (
+        layer is None
+        or layer.rod.material == structure.rod.material
+        or preset_limits(layer.rod, None).creep == limits.creep
     )
 
 
@@ -375,34 +387,3 @@ def _of_bracing(
             )  # fmt: skip
             shares += used.largest.values()
     return max(shares, default=None)
-
-
-def _with_imperfections(
-    structure: Structure, load: Load, loads: Loads, buckling: LinearBuckling | None,
-    progress: Callable[[int, float], None],
-) -> tuple[float | None, Limit | None, int]:  # fmt: skip
-    """The smallest limit factor of the shells with an imperfection in one mode, of either sign, what ends its path, and
-    the factorisations that all took.
-
-    Modes are not added: how their signs go together is arbitrary, and each would have a part of the amplitude only.
-    """
-    points = structure.shell.positions(structure.equilibrium.state)
-    amplitude = loads.stability.amplitude(float(np.ptp(points[:, :2], axis=0).min()))
-    if amplitude is None or buckling is None or not len(buckling.shapes):
-        return None, None, 0
-    kind: Limit = "none"
-    least, work, missing = np.inf, 0, False
-    for shape, sign in product(buckling.shapes, (1.0, -1.0)):
-        try:
-            start = imperfect(structure.equilibrium, shape, sign * amplitude)
-        except ConvergenceError:
-            missing = True
-            continue
-        # as far as it could be the smallest
-        path = load_path(start, load, most=min(MOST, least), stations=(), progress=progress)
-        work += path.factorizations
-        if path.limit != "none" and path.factor < least:
-            least, kind = path.factor, path.limit
-    if missing and (least >= 1 or kind == "lost"):  # else the shell falls in one that was found
-        return None, "lost", work
-    return (None if np.isinf(least) else least), kind, work

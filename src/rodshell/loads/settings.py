@@ -10,7 +10,7 @@ from rodshell.rods.joints import Joint
 from rodshell.rods.section import Rod
 from rodshell.schema import Inline, checked
 from rodshell.units import read_quantity, shown
-from rodshell.validation import brief, instance, positive, whole
+from rodshell.validation import brief, instance, not_negative, whole
 
 AcrossOpenings = Literal["refuse", "leave out"]
 
@@ -105,9 +105,11 @@ class LockedJoints:
 
 
 def _imperfection(value: object) -> str | float:
-    """A length, or a part of the span as "span/500"."""
+    """A length, 0 for none, or a part of the span as "span/500"."""
     before, _, part = value.partition("/") if isinstance(value, str) else ("", "", "")
     try:
+        if value == 0:
+            return 0.0
         if before.strip() != "span":
             return read_quantity(value, "length", size=True)
         return f"span/{read_quantity(part, 'number', size=True):g}"
@@ -120,24 +122,29 @@ class Stability:
     """How stability is looked at: of the perfect shell, and with an imperfection in each mode, of either sign.
 
     Args:
-        imperfection: largest displacement [m], or a part of the span such as "span/500"; None: the perfect shell alone.
+        imperfection: largest displacement [m], or a part of the span such as "span/500"; 0: the perfect shell alone.
+        reserve: how many times every combination of loads a good shell carries, with the imperfection; permanent ones
+            again after years.
     """
 
     imperfection: Annotated[
-        float | str | None, Value(_imperfection), 'largest imperfection: a length, or "span/500"; default: none'
-    ] = None  # fmt: skip
+        float | str, Value(_imperfection), 'largest imperfection: a length, "span/500", or 0 for none'
+    ] = "span/500"  # fmt: skip
     modes: Annotated[Whole, "number of buckling modes, each of which is tried as imperfection"] = 3
+    reserve: Annotated[Factor, "times the loads that a good shell carries, with the imperfection"] = 1.5
 
     def __post_init__(self) -> None:
-        if self.imperfection is not None:
-            self.amplitude(1.0)
+        checked(self, {"modes": "the number of {}", "reserve": "the {} asked for"})
+        self.amplitude(1.0)
         whole("the number of modes", self.modes, 1, 1000)
+        if self.reserve < 1:
+            raise InputError(f"the reserve asked for is {self.reserve:g}: give 1 or more, since at 1 the shell falls")
 
-    def amplitude(self, span: float) -> float | None:
-        """Largest displacement of an imperfect shell of a `span` [m], in m; None: the perfect one alone."""
+    def amplitude(self, span: float) -> float:
+        """Largest displacement of an imperfect shell of a `span` [m], in m; 0: the perfect one alone."""
         given = self.imperfection
         if not isinstance(given, str):
-            return None if given is None else positive("the imperfection", given, "m")
+            return not_negative("the imperfection", given, "m")
         before, _, part = given.partition("/")
         if before.strip() != "span" or not part.strip().replace(".", "", 1).isdecimal() or not float(part) > 0:
             raise InputError(f'the imperfection must be a length in m, or "span/500", not {shown(given)}')
@@ -177,12 +184,14 @@ class Strength:
     relaxed: Annotated[
         Share | None, "share of timber's unloaded stress that is gone after months"
     ] = None  # fmt: skip
+    creep: Annotated[Share | None, "growth of deflections under permanent loads; default: a preset's k_def"] = None
     hole: Annotated[Distance, "diameter of the bolts' holes through the rods at joints"] = 0.0
     slip: Annotated[Force | None, "axial force that a joint transfers before it slips"] = None
     effective_length: Annotated[Factor, "effective length of a span between joints, over its length"] = 1.0
 
     def __post_init__(self) -> None:
         others = {"hole": "the diameter of holes", "effective_length": "the effective length",
+                  "creep": "the growth of deflections by {}",
                   "relaxed": "the {} share of stress", "service_class": "the service class"}  # fmt: skip
         checked(self, dict.fromkeys((*DURATIONS, "erection", "slip"), "the strength ({})") | others)
         if self.relaxed is not None and self.relaxed >= 1:

@@ -148,8 +148,8 @@ class Limits(DesignStrength):
             source = f"{material.name}, characteristic {1e-6 * characteristic:.4g} MPa; {factors.source}"
             source += f"; service class {service}" if moist else ""
             rules = factors if factors.code else None
-        creep = None
-        if factors is not None and factors.creep:
+        creep = asked.creep
+        if creep is None and factors is not None and factors.creep:
             creep = factors.creep[service - 1 if moist else 0]
         by_code: dict[str, Any] = dict(bending.items())
         if asked.hole:

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from rodshell.arrays import largest_at
-from rodshell.figures.loads import LoadedShell, Utilisations
+from rodshell.figures.loads import AfterYears, LoadedShell, Utilisations
 from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
 from rodshell.output.svg import inline, picture_document
@@ -37,8 +37,8 @@ STATED = (
     "Loads are fixed forces on the areas of the surface that belong to each node. Wind does not turn with the shell.",
     "Large displacements and the rods' stresses from bending are in every figure; supports do not yield unless a load "
     "moves them.",
-    "Stiffness in all figures is the mean one, not reduced by factors or creep; relaxation of bent rods changes "
-    "neither shape nor stability. Pressure at bolts, cladding, fatigue, fire and accidental loads are not checked.",
+    "Stiffness is the mean one, not reduced by factors. Pressure at bolts, cladding, fatigue, fire and accidents are not "
+    "checked.",
 )
 SEAMS = (
     "The seams between patches are held in place, as supports are: what carries them has to withstand the forces "
@@ -114,11 +114,11 @@ def _strengths(results: Results) -> Iterator[str]:
         yield f"Erection uses at most {percent(used.erection_utilisation)} of {stress(used.erection or 0.0)}."
     if used.creep is not None:
         yield (
-            f"Creep is not in the figures: deflections under permanent loads grow by {rounded(used.creep)} times what "
-            "they are at first (k_def)."
+            f"After years under permanent loads the stiffness of rods, joints and laths counts divided by "
+            f"{rounded(1 + used.creep)} (1 + k_def), that of cables whole. All else is the shell as erected."
         )
     else:
-        yield "Creep is not in the figures; how large it is, is not known of this material."
+        yield "Creep is not in the figures; how large it is, is not known of this material (strength.creep)."
 
 
 def _strength(results: Results, shell: LoadedShell) -> Row:
@@ -143,10 +143,12 @@ def _known(value: float | None, show: Callable[[float], str]) -> str:
 
 def _deflection(results: Results, shell: LoadedShell) -> Row:
     deflection, span = shell.max_deflection, _span(results)
+    later = None if shell.after_years is None else shell.after_years.max_deflection
     return {
         "At factor": rounded_down(shell.at_factor or 0.0),
         "Deflection": millimetres(deflection, rounding=rounding_of(results)),
         "Span over it": "" if not deflection or span is None else f"span/{span / deflection:.0f}",
+        "After years": "" if later is None else millimetres(later, rounding=rounding_of(results)),
         "Largest stress": _known(shell.max_stress, stress),
         "Compression over Euler load": "" if shell.euler is None else percent(shell.euler),
         "in": "" if shell.euler_at is None else shell.euler_at.rod,
@@ -160,20 +162,31 @@ def _span(results: Results) -> float | None:
 
 
 def _stability(shell: LoadedShell) -> Row:
-    """Three figures side by side."""
-    imperfect = shown_factor(shell.imperfect_factor)
-    if shell.imperfect_kind is None:
-        imperfect = "not asked for"
-    elif shell.imperfect_kind == "not followed":
-        imperfect = "not known" + f" above {imperfect}" * (shell.imperfect_factor is not None)
+    """How far the shell carries the combination, what decides first."""
+    imperfect, years = _imperfect(shell), shell.after_years
     above = (shell.imperfect_factor or np.inf) > CLOSE * (shell.limit_factor or np.inf)
     if above and shell.limit_kind == "bifurcation" and shell.imperfect_kind not in (None, "not followed"):
         imperfect += " (the bifurcation is stable)"
+    later = "" if shell.duration != "permanent" else "not known" if years is None else _imperfect(years)
+    if years is not None:
+        later += f", perfect {shown_factor(years.limit_factor)} ({years.limit_kind})"
     return {
-        "Linear buckling": shown_factor(shell.linear_factor),
-        "Path of the perfect shell": f"{shown_factor(shell.limit_factor)} ({shell.limit_kind})",
         "With imperfections": imperfect,
+        "Path of the perfect shell": f"{shown_factor(shell.limit_factor)} ({shell.limit_kind})",
+        "Linear buckling": shown_factor(shell.linear_factor),
+        "After years, with imperfections": later,
+        "Asked for": "" if shell.reserve is None else f"{shell.reserve:g}",
     }
+
+
+def _imperfect(found: LoadedShell | AfterYears) -> str:
+    """The factor of the shell with imperfections, in words."""
+    factor = shown_factor(found.imperfect_factor)
+    if found.imperfect_kind is None:
+        return "not asked for"
+    if found.imperfect_kind == "not followed":
+        return "not known" + f" above {factor}" * (found.imperfect_factor is not None)
+    return factor
 
 
 def _frequencies(shells: Shells) -> Iterator[str]:

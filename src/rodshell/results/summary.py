@@ -288,6 +288,12 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
             line += f", linear {shown_factor(found.linear_factor)}"
         if found.imperfect_factor is not None:
             line += f", with imperfections {shown_factor(found.imperfect_factor)}"
+        if (years := found.after_years) is not None:
+            line += f"; after years {shown_factor(years.limit_factor)}"
+            if years.imperfect_factor is not None:
+                line += f", with imperfections {shown_factor(years.imperfect_factor)}"
+            if years.max_deflection is not None:
+                line += f", deflection {length(years.max_deflection)}"
         at = "" if found.at_factor == 1 else f" at {rounded_down(found.at_factor or 0.0)} times"
         line += f"; deflection{at} {length(found.max_deflection)}"
         if found.utilisation is not None:

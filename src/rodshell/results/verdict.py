@@ -6,7 +6,7 @@ not checked, and then the result is not good.
 """
 
 from collections.abc import Iterable, Iterator
-from math import inf
+from math import inf, isinf
 
 from rodshell.figures.checks import OTHER_SHAPES, Clearance, Deployment, WorstBent
 from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
@@ -14,6 +14,7 @@ from rodshell.figures.form import Agreement, PopUp
 from rodshell.figures.loads import LoadedShell
 from rodshell.figures.records import Ends
 from rodshell.figures.sentences import ANOTHER_WAY, SENTENCES
+from rodshell.results.load_reserve import creep_unknown, fall, least_carried, open_points
 from rodshell.results.own_weight import falling, is_braced, none_stands, reserve, weight_findings
 from rodshell.results.results import Results, Verdict
 from rodshell.results.sizes_sold import thinner_than_sold
@@ -93,7 +94,7 @@ def verdict(results: Results) -> Verdict:
     gravest = [*lead, *far, *grave] if off > FAR_OFF else [*lead, *grave, *far]
     sinks = _sinks(results, usable)
     to_check = [
-        *gravest, *weight, *sinks, *_loads(results, usable or there), *air_findings(results),
+        *gravest, *weight, *sinks, *_loads(results, usable or there), *creep_unknown(results), *air_findings(results),
         *_open_points(results, usable), *(word if isinstance(word, Said) else Said(word) for word in results.warnings),
     ]  # fmt: skip
     standing, in_doubt = set(usable) - falling(results), none_stands(results, usable, lost)
@@ -179,12 +180,8 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
     for name, end, found in results.loaded_shells():
         if end != ends:
             continue
-        limit, used = found.limit_factor, found.utilisation
-        if found.limit_kind == "unstable unloaded":
-            yield said("unstable: unloaded", ends, place=name)
-        elif limit is not None and limit < 1 and found.limit_kind != "not followed":
-            how = "snaps through" if found.limit_kind == "limit point" else "buckles"
-            yield said("falls_under_loads", ends, limit, 1, place=name, how=how, factor=rounded_down(limit))
+        used = found.utilisation
+        yield from fall(found, name, ends)
         place, parts = found.governs, found.utilisations
         governs = (place.by if place else None) or ""
         uses = {governs: used or 0.0}
@@ -361,22 +358,12 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
                 yield said("not_checked: loads", end, place=name)
                 continue
             found = by_ends[end]
-            limit, imperfect = found.limit_factor or 0.0, found.imperfect_factor
-            linear, stands = found.linear_factor, found.limit_factor is None or limit >= 1
+            imperfect, linear = found.imperfect_factor, found.linear_factor
+            stands = found.limit_factor is None or found.limit_factor >= 1
             if linear is not None and linear < 1 and stands:
                 moved = _mm(results, found.max_deflection)
                 yield said("linear_buckling", end, linear, 1, place=name, factor=rounded_down(linear), moved=moved)
-            if found.limit_kind == "not followed":
-                sentence = "not_followed" if limit < 1 else "not_followed: above"
-                yield said(sentence, end, limit, 1, place=name, factor=rounded_down(limit))
-            factor, kind = rounded_down(imperfect or 0.0), found.imperfect_kind
-            if kind == "not followed" and imperfect is None:
-                yield said("imperfect: no equilibrium", end, place=name)
-            elif kind == "unstable unloaded":
-                yield said("imperfect: unloaded", end, place=name)
-            elif kind == "not followed" or (imperfect is not None and imperfect < 1):
-                sentence = "imperfect: not followed" if kind == "not followed" else "imperfect"
-                yield said(sentence, end, imperfect, 1, place=name, factor=factor)
+            yield from open_points(found, name, end)
             lower, share = _lowered(results, found)
             if lower < 1 and stands and (imperfect is None or imperfect >= 1):
                 factor = rounded_down(lower)
@@ -481,16 +468,17 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
             creep="" if known else ", nor creep, which is not known of these rods",
         )
     for name, by_ends in results.loads.items():
-        limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
-        least = min((limit for limit in limits if limit is not None), default=None)
+        factor, what = min((least_carried(by_ends[ends]) for ends in usable if ends in by_ends), default=(inf, ""))
+        least = None if isinf(factor) else factor
         lower, share = min((_lowered(results, by_ends[ends]) for ends in usable if ends in by_ends), default=(inf, ""))
-        words = f", and with {share}, up to {rounded_down(lower)} times" if share else ""
-        yield said("stands_under_loads", None, least, 1, place=name, factor=shown_factor(least), stiffness=words)
+        words = f", and {rounded_down(lower)} times with {share}" if share else ""
+        carries = shown_factor(least)
+        yield said("stands_under_loads", None, least, 1, place=name, factor=carries, what=what, stiffness=words)
 
 
 def _assumed(results: Results) -> Iterator[Said]:
-    """What was taken where nothing was given or is known: the perfect shell, a service class, no creep; what strengths
-    count on; and how cables are to be stressed."""
+    """What was taken where nothing was given: a service class; that imperfections were left out; what strengths count
+    on; and how cables are to be stressed."""
     strength = results.strength
     if any(found.imperfect_kind is None for _, _, found in results.loaded_shells()):
         offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
@@ -499,8 +487,6 @@ def _assumed(results: Results) -> Iterator[Said]:
         yield said("assumed_class")
     if strength is not None and strength.relaxed:
         yield said("relaxed", None, strength.relaxed, share=percent(strength.relaxed))
-    if results.loads and (strength is None or strength.creep is None):
-        yield said("creep_unknown")
     yield from _cables(results)
 
 
