@@ -158,7 +158,7 @@ def test_an_imperfection_that_is_not_found_hides_no_other(monkeypatch: pytest.Mo
                 raise ConvergenceError("no equilibrium")
             return imperfect(*given)
 
-        monkeypatch.setattr(import_module("rodshell.loads.check"), "imperfect", start)
+        monkeypatch.setattr(import_module("rodshell.loads.stability"), "imperfect", start)
         asked = one(rs.Snow(snow), stability=rs.Stability(imperfection=0.1, modes=2))
         return rs.check_loads(shell("oval"), asked).shells["all"]["pinned"]
 

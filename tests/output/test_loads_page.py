@@ -81,7 +81,7 @@ def test_every_figure_of_the_page_is_that_of_the_result() -> None:
     assert loaded.governs is not None
     assert loaded.governs.rod in row[7]
     assert any("service class 3" in sentence and "EN 1995" in sentence for sentence in page["assumptions"])
-    assert any("grow by 2 times" in sentence for sentence in page["assumptions"])
+    assert any("counts divided by 3 (1 + k_def)" in sentence for sentence in page["assumptions"])
     assert len(page["modes"]) >= 3
     (braced,) = page["bracing"]
     assert braced["Utilisation"] != "not known"

@@ -184,7 +184,7 @@ class Strength:
     relaxed: Annotated[
         Share | None, "share of timber's unloaded stress that is gone after months"
     ] = None  # fmt: skip
-    creep: Annotated[Share | None, "growth of deflections under permanent loads; default: a preset's k_def"] = None
+    creep: Annotated[Share | None, "growth of deflections under permanent loads; default: k_def"] = None
     hole: Annotated[Distance, "diameter of the bolts' holes through the rods at joints"] = 0.0
     slip: Annotated[Force | None, "axial force that a joint transfers before it slips"] = None
     effective_length: Annotated[Factor, "effective length of a span between joints, over its length"] = 1.0

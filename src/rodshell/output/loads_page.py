@@ -37,8 +37,8 @@ STATED = (
     "Loads are fixed forces on the areas of the surface that belong to each node. Wind does not turn with the shell.",
     "Large displacements and the rods' stresses from bending are in every figure; supports do not yield unless a load "
     "moves them.",
-    "Stiffness is the mean one, not reduced by factors. Pressure at bolts, cladding, fatigue, fire and accidents are not "
-    "checked.",
+    "Stiffness is the mean one, not reduced by factors. Pressure at bolts, cladding, fatigue, fire and accidental "
+    "loads are not checked.",
 )
 SEAMS = (
     "The seams between patches are held in place, as supports are: what carries them has to withstand the forces "
