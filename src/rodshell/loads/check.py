@@ -32,7 +32,7 @@ from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
 from rodshell.loads.nodes import LoadedNodes
 from rodshell.loads.settings import Cables, Laths
-from rodshell.loads.stability import after_years, carried
+from rodshell.loads.stability import after_years, capacity
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
 from rodshell.loads.structure import NO_PAIRS, Structure
 from rodshell.progress import Progress, silent
@@ -273,7 +273,7 @@ def loaded_shell(
     unloaded, following = structure.equilibrium, partial(_following, progress, " the loads")
     creep = limits.creep if duration == PERMANENT and _creeps_alike(structure, limits) else None
     stations = (1.0,) if creep is None else (1.0, 1.0 + creep)
-    erected = carried(structure, load, loads.stability, stations=stations, progress=following)
+    erected = capacity(structure, load, loads.stability, stations=stations, progress=following)
     path, buckling, work = erected.path, erected.buckling, erected.factorizations
     years = None
     if creep is not None:

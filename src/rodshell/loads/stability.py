@@ -30,7 +30,7 @@ Following = Callable[[int, float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class Capacity:
     """How far a structure carries a load.
 
     Args:
@@ -47,9 +47,9 @@ class Carried:
     factorizations: int
 
 
-def carried(
+def capacity(
     structure: Structure, load: Load, asked: Stability, *, stations: Sequence[float] = (1.0,), progress: Following
-) -> Carried:
+) -> Capacity:
     """How far a structure carries a load, from its equilibrium without it; `stations` and `progress` of its path."""
     unloaded = structure.equilibrium
     path = load_path(unloaded, load, most=MOST, stations=stations, progress=progress)
@@ -57,11 +57,11 @@ def carried(
     if path.limit != "unstable unloaded":
         buckling = linear_buckling(unloaded, load, asked.modes, most=MOST)
     factor, kind, more = _with_imperfections(structure, load, asked, buckling, progress)
-    return Carried(path, buckling, factor, kind, path.factorizations + more)
+    return Capacity(path, buckling, factor, kind, path.factorizations + more)
 
 
 def after_years(
-    structure: Structure, load: Load, asked: Stability, creep: float, erected: Carried, *, progress: Following
+    structure: Structure, load: Load, asked: Stability, creep: float, erected: Capacity, *, progress: Following
 ) -> tuple[AfterYears, int]:
     """The same after years under the load, by the factorisations that it took.
 
@@ -75,7 +75,7 @@ def after_years(
         found, at, over, work = erected, erected.path.at(times), times, 0
     else:
         more = load if load.forces is None else replace(load, forces=times * load.forces)
-        found = carried(later, more, asked, progress=progress)
+        found = capacity(later, more, asked, progress=progress)
         at, over, work = found.path.at(1.0), 1.0, found.factorizations
     moved = None
     if at is not None:
