@@ -105,7 +105,11 @@ def _several(count: int, value: Value, needs: str, words: str, *, one_for_all: b
             raise ValueError(needs)
         return tuple(_named(ordinal, value, item) for ordinal, item in zip(_ORDER, items, strict=False))
 
-    return Value(read, lambda name, given: tuple(check(name, item) for item in numbers(name, given, words, count)))
+    def checked(name: str, given: object) -> tuple[float, ...]:
+        every = [given] * count if one_for_all and isinstance(given, int | float) else given
+        return tuple(check(name, item) for item in numbers(name, every, words, count))
+
+    return Value(read, checked)
 
 
 def _parted(value: object) -> object:
@@ -320,6 +324,14 @@ Size = Annotated[tuple[float, float], pair(_LENGTH, _TWO)]
 Point = Annotated[tuple[float, float], _POINT]
 PointOrAuto = Annotated[tuple[float, float] | Auto, _or_auto(_POINT)]
 Point3 = Annotated[tuple[float, float, float], _triple("length")]
+Direction3 = Annotated[tuple[float, float, float], _triple("number")]
+Stiffness3 = Annotated[
+    tuple[float, float, float],
+    _several(
+        3, quantity("stiffness", not_negative), 'needs one or three values, such as "200 kN/m"',
+        "three stiffnesses along x, y and z in N/m, or one", one_for_all=True,
+    ),
+]  # fmt: skip
 Angles = Annotated[tuple[float, float, float], _triple("angle")]
 
 Factor = Annotated[float, quantity("number", positive)]

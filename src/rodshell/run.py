@@ -182,7 +182,7 @@ class Run:
         earlier = self.earlier.unrefined if self.earlier is not None else None
         options: dict[str, Any] = {
             "joint": case.joint,
-            "ends": case.supports if self.pops_up else (),
+            "ends": case.popped_on if self.pops_up else (),
             "warm_start": earlier if earlier is not None and bool(earlier.seams) == bool(seams) else None,
             "progress": self.progress,
         }

@@ -17,6 +17,7 @@ from rodshell.case.stage_tables import (
     PopUpTable,
     RefineTable,
     SeamsTable,
+    SupportRows,
 )
 from rodshell.case.target_tables import HeldTarget, Hemisphere, TargetKinds
 from rodshell.errors import InputError
@@ -29,7 +30,8 @@ from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.joints import Ball, JointKind
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Rod
-from rodshell.rods.supports import Support, supports_of
+from rodshell.rods.support_groups import SupportGroups
+from rodshell.rods.supports import BOTH, Support, supports_of
 from rodshell.schema import read, undescribed, written
 from rodshell.units import length_text, shown
 
@@ -69,6 +71,7 @@ class Case:
     joint: JointKind = field(default_factory=Ball)
     drape: DrapeTable = field(default_factory=DrapeTable)
     pop_up: PopUpTable = field(default_factory=PopUpTable)
+    supports: SupportRows = ()
     refine: RefineTable = field(default_factory=RefineTable)
     seams: SeamsTable = field(default_factory=SeamsTable)
     checks: CheckOptions = field(default_factory=CheckOptions)
@@ -80,6 +83,13 @@ class Case:
     locked_joints: LockedJoints | None = None
     stability: Stability = field(default_factory=Stability)
     strength: Strength = field(default_factory=Strength)
+
+    def __post_init__(self) -> None:
+        if self.supports and (self.pop_up.ends != BOTH or self.pop_up.held is not None):
+            raise InputError(
+                f"pop_up.ends = {shown(self.pop_up.ends)} is for all rod ends, and there are supports by groups: leave "
+                "one of them out"
+            )
 
     @property
     def held_objects(self) -> dict[str, Held]:
@@ -197,14 +207,16 @@ class Case:
         return replace(self, layout=replace(self.layout, rotate=rotate, held=turned))
 
     @property
-    def supports(self) -> tuple[Support, ...]:
-        """On which the grid is popped up."""
+    def popped_on(self) -> tuple[Support, ...]:
+        """The supports on which the grid is popped up."""
+        if self.supports:
+            return (SupportGroups(groups=self.supports),)
         return supports_of(self.pop_up.ends) if self.pop_up.held is None else self.pop_up.held.value
 
     @property
     def ends(self) -> tuple[str, ...]:
         """The names of the supports."""
-        return tuple(support.name for support in self.supports)
+        return tuple(support.name for support in self.popped_on)
 
     def build(self, target: "Target | None" = None, progress: Progress = silent) -> Built:
         """The objects.

@@ -23,6 +23,7 @@ from rodshell.layout import GridLayout, Layout
 from rodshell.output.options import OutputOptions
 from rodshell.rods.joints import JointKind
 from rodshell.rods.section import Rod
+from rodshell.rods.support_groups import SupportGroups
 from rodshell.rods.supports import BOTH, PINNED, SUPPORTS, Support
 from rodshell.schema import kind_of, read, written
 from rodshell.targets import Target
@@ -51,11 +52,13 @@ def case_of(
     options: OutputOptions,
 ) -> Case:
     """The case of a target, a layout and a rod; arguments as of `rodshell.Job`, each of its kind."""
+    groups = ends[0].groups if len(ends) == 1 and isinstance(ends[0], SupportGroups) else ()
     heading, shape = layout.rotate if rotate is None else rotate, target.parameters()
     given: dict[str, Any] = {
         "layout": _layout_keys(layout, heading) if isinstance(layout, GridLayout) else written(layout),
         "rod": rod.parameters(),
         "drape": _drape_keys(method, anchor, objective),
+        "supports": [written(group) for group in groups],
         "pop_up": {"ends": ends[0].name if len(ends) == 1 and ends[0].name in SUPPORTS else BOTH},
         "seams": {
             "lines": [Seam.of(line).points.tolist() for line in seams],
@@ -70,7 +73,7 @@ def case_of(
         **({"layout": _held_layout(layout, heading)} if isinstance(layout, GridLayout) else {}),
         "rod": None if case.rod.build() == rod else Held(rod, f"the rod {rod}"),
         "drape": _held_method(case.drape.build(), method),
-        "pop_up": _held_supports(ends),
+        "pop_up": None if groups else _held_supports(ends),
     }
     tables = {name: replace(getattr(case, name), held=found) for name, found in held.items()}
     if unknown:

@@ -31,6 +31,7 @@ from rodshell.quantities import (
     Unit,
     words,
 )
+from rodshell.rods.support_groups import Group
 from rodshell.rods.supports import BOTH, AskedName, SupportName
 from rodshell.schema import Inline, Rows, written
 from rodshell.targets.patch_layout import PatchLayout
@@ -155,6 +156,13 @@ class DrapeTable(Holding):
 @dataclass(frozen=True, kw_only=True)
 class PopUpTable(Holding):
     ends: Annotated[AskedName, "supports: free to turn, with fixed direction, or one form with each"] = BOTH
+
+
+SupportRows = Annotated[
+    tuple[Group, ...],
+    Rows("support", '[{ at = "y > 3.9 m", kind = "free" }]'),
+    "groups of rod ends that are supported alike; in a case file only",
+]
 
 
 FAMILIES = ("taper", "double", "sections", "tails", "clamps", "supports", "holes", "offsets")

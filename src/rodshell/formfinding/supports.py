@@ -30,6 +30,7 @@ def let_go(
         held: the equilibrium with the rods' ends held at `points` (2m, 3).
         counting: makes a progress of what is done, and of how many iterations it takes at most.
     """
+    support = support.named(shell.mesh.grid.support_names)
     slides = slides_of(support, support.free(points), len(points))
     springs = energies_of(support.energies(shell.ends, points), shell.node_count)
     if not slides and not springs:

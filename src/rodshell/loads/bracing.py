@@ -12,6 +12,7 @@ from rodshell.layout.cells import Pattern, diagonals, rim_diagonals
 from rodshell.loads.settings import Bracing, Cables
 from rodshell.loads.structure import Structure
 from rodshell.rods.cable import CableStretch
+from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.targets import Target
 from rodshell.units import percent_text
@@ -31,7 +32,13 @@ def stressed(cables: Cables, structure: Structure, target: Target) -> Structure:
     blocks = np.append(outer_nodes(mesh), structure.shell.ends)[pairs]
     lengths = np.linalg.norm(before.state[blocks[:, 1]] - before.state[blocks[:, 0]], axis=1)
     stiffness = np.full(len(blocks), cables.rod.stretch_stiffness)
-    found = in_steps(before, lambda share: CableStretch(blocks, lengths / (1.0 + cables.prestrain * share), stiffness))
+    rods = len(structure.shell.elements)
+    found = in_steps(
+        before,
+        lambda elements, share: (
+            *elements[:rods], CableStretch(blocks, lengths / (1.0 + cables.prestrain * share), stiffness)
+        ),
+    )  # fmt: skip
     if found is None:
         raise InputError(
             f"the bracing pulls the shell out of its shape: with a prestrain of {percent_text(cables.prestrain)} no "
@@ -41,27 +48,25 @@ def stressed(cables: Cables, structure: Structure, target: Target) -> Structure:
     for side in range(2):
         np.add.at(mass, blocks[:, side], 0.5 * lengths * cables.rod.mass_per_length)
     shell = structure.shell_at(found)
-    return replace(structure, shell=shell, equilibrium=found, braced=pairs, bracing_mass=mass, cables=cables_of(found))
+    ropes = found.elements[-1]
+    assert isinstance(ropes, CableStretch)
+    return replace(structure, shell=shell, equilibrium=found, braced=pairs, bracing_mass=mass, cables=ropes)
 
 
-def cables_of(found: Equilibrium) -> CableStretch | None:
-    """The cables of a structure that stands in an equilibrium, the last of its energies; None: it has none."""
-    last = found.elements[-1]
-    return last if isinstance(last, CableStretch) else None
-
-
-def in_steps(before: Equilibrium, cables: Callable[[float], CableStretch]) -> Equilibrium | None:
-    """The equilibrium of a structure with cables, at once or in steps; None: none that is stable was found.
+def in_steps(
+    before: Equilibrium, change: Callable[[tuple[Elements, ...], float], tuple[Elements, ...]]
+) -> Equilibrium | None:
+    """The equilibrium of a structure whose energies change, at once or in steps; None: none that is stable was found.
 
     Args:
-        before: of the structure without cables, or with others.
-        cables: at a share, up to 1, of what moves the structure.
+        before: with the energies as they were.
+        change: of the energies, at their frames, to those at a share, up to 1, of the change.
     """
     for count in (1, STEPS):
         found = before
         for step in range(1, count + 1):
-            others = found.elements[:-1] if cables_of(found) else found.elements
-            problem = replace(before.problem, elements=(*others, cables(step / count)), pattern=found.problem.pattern)
+            elements = change(found.elements, step / count)
+            problem = replace(before.problem, elements=elements, pattern=found.problem.pattern)
             found = find_equilibrium(problem, found.state, found.forces)
             if not found.report.stable:
                 break

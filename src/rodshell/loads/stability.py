@@ -2,14 +2,14 @@
 
 Timber and fibre composites creep: under a permanent load the modulus counts divided by 1 + k, k being what deflections
 grow by [k_def of EN 1995-1-1, 2.3.2.2]. The bends of erected rods creep too, so that all their stiffnesses and stresses
-fall alike, and the unloaded shell keeps its shape. Only what does not creep moves it: cables. An equilibrium of crept
-rods under t times a load is one of the rods as erected, with cables 1 + k times as stiff, under t (1 + k) times the
-forces: so the path after years is followed on these. Without cables it is the path as erected, its factors divided by
-1 + k. Laths of bracing, and joints, creep as the rods do.
+fall alike, and the unloaded shell keeps its shape. What does not creep moves it: cables, and supports that yield. An
+equilibrium of crept rods under t times a load is one of the rods as erected, with cables and supports 1 + k times as
+stiff, under t (1 + k) times the forces: so the path after years is followed on these. Without them it is the path as
+erected, its factors divided by 1 + k. Laths of bracing, and joints, creep as the rods do.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -17,9 +17,11 @@ import numpy as np
 from rodshell.checks.self_weight import shown_limit
 from rodshell.errors import ConvergenceError
 from rodshell.figures.loads import AfterYears
-from rodshell.loads.bracing import cables_of, in_steps
+from rodshell.loads.bracing import in_steps
 from rodshell.loads.settings import Stability
 from rodshell.loads.structure import Structure
+from rodshell.rods.elements import Elements
+from rodshell.rods.local_energy import LocalEnergy
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, LoadPath, load_path
@@ -93,18 +95,29 @@ def after_years(
 
 
 def crept(structure: Structure, creep: float) -> Structure | None:
-    """The structure whose cables are 1 + `creep` times as stiff, in its equilibrium without loads; None where none that
-    is stable was found."""
-    cables = structure.cables
-    if cables is None:
+    """The structure whose cables and springs of supports are 1 + `creep` times as stiff, in its equilibrium without
+    loads; None where none that is stable was found."""
+    shell, cables = structure.shell, structure.cables
+    if cables is None and not shell.springs:
         return structure
-    found = in_steps(
-        structure.equilibrium,
-        lambda share: replace(cables, stiffness=(1.0 + share * creep) * cables.stiffness),
-    )
-    if found is None:
-        return None
-    return replace(structure, shell=structure.shell_at(found), equilibrium=found, cables=cables_of(found))
+    first, last = len(shell.elements) - len(shell.springs), len(shell.elements)
+
+    def stiffer(elements: tuple[Elements, ...], share: float) -> tuple[Elements, ...]:
+        times = 1.0 + share * creep
+        others = elements[last:] if cables is None else (_times(cables, times),)
+        return (*elements[:first], *(_times(spring, times) for spring in shell.springs), *others)
+
+    found = in_steps(structure.equilibrium, stiffer)
+    return None if found is None else replace(structure, shell=structure.shell_at(found), equilibrium=found)
+
+
+def _times(energy: Elements, factor: float) -> Elements:
+    """An energy of springs or cables that are so many times as stiff."""
+    if isinstance(energy, LocalEnergy):
+        formula = energy.formula
+        return replace(energy, formula=lambda at: factor * formula(at))
+    assert is_dataclass(energy)
+    return replace(energy, stiffness=factor * energy.stiffness)
 
 
 def _with_imperfections(

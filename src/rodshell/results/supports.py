@@ -9,6 +9,7 @@ from rodshell.figures.checks import EndsInTheAir
 from rodshell.figures.findings import Said, said
 from rodshell.results.results import Results
 from rodshell.results.wording import newtons, shown_length
+from rodshell.rods.support_groups import unheld
 
 ABOVE = 0.02  # of the size: higher ends are not on the level of the lowest
 
@@ -23,6 +24,8 @@ def in_the_air(results: Results) -> EndsInTheAir | None:
     seams = {end for seam in results.seams for meeting in seam.meetings for end in meeting.ends}
     names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
     held = {k for k, name in enumerate(names) if name in seams}
+    for of_supports in [*_forces(results)][:1]:
+        held |= {*np.flatnonzero(unheld(of_supports)).tolist()}
     ground = min(known)
     above = [k for k, z in enumerate(heights) if z is not None and z - ground > ABOVE * size and k not in held]
     forces = [float(np.linalg.norm(np.nan_to_num(row[k]))) for row in _forces(results) for k in above]

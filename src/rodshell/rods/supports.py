@@ -7,7 +7,7 @@ else goes by its name.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from re import fullmatch
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,6 +54,10 @@ class Support:
     def note(self) -> str:
         """What it holds, in words."""
         return "directions held" if self.holds_directions else "free to turn"
+
+    def named(self, names: Sequence[str]) -> Self:
+        """The same, which may tell its rod ends by their names (2m,), such as "U03.0"."""
+        return self
 
     def free(self, points: Floats) -> Mapping[int, Sequence[ArrayLike]]:
         """Directions (up to three, at right angles) along which rod ends may move, by the number of the end.
