@@ -84,13 +84,6 @@ class Case:
     stability: Stability = field(default_factory=Stability)
     strength: Strength = field(default_factory=Strength)
 
-    def __post_init__(self) -> None:
-        if self.supports and (self.pop_up.ends != BOTH or self.pop_up.held is not None):
-            raise InputError(
-                f"pop_up.ends = {shown(self.pop_up.ends)} is for all rod ends, and there are supports by groups: leave "
-                "one of them out"
-            )
-
     @property
     def held_objects(self) -> dict[str, Held]:
         """Objects that tables were made of and that their keys do not describe, by the name of the table."""
@@ -208,10 +201,11 @@ class Case:
 
     @property
     def popped_on(self) -> tuple[Support, ...]:
-        """The supports on which the grid is popped up."""
-        if self.supports:
-            return (SupportGroups(groups=self.supports),)
-        return supports_of(self.pop_up.ends) if self.pop_up.held is None else self.pop_up.held.value
+        """The supports on which the grid is popped up: those by groups, and what is asked for beside them."""
+        if self.pop_up.held is not None:
+            return tuple(self.pop_up.held.value)
+        beside = supports_of(self.pop_up.ends) if not self.supports or self.pop_up.ends != BOTH else ()
+        return (*beside, *([SupportGroups(groups=self.supports)] if self.supports else ()))
 
     @property
     def ends(self) -> tuple[str, ...]:

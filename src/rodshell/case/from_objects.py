@@ -23,7 +23,7 @@ from rodshell.layout import GridLayout, Layout
 from rodshell.output.options import OutputOptions
 from rodshell.rods.joints import JointKind
 from rodshell.rods.section import Rod
-from rodshell.rods.support_groups import SupportGroups
+from rodshell.rods.support_groups import Group, SupportGroups
 from rodshell.rods.supports import BOTH, PINNED, SUPPORTS, Support
 from rodshell.schema import kind_of, read, written
 from rodshell.targets import Target
@@ -52,14 +52,14 @@ def case_of(
     options: OutputOptions,
 ) -> Case:
     """The case of a target, a layout and a rod; arguments as of `rodshell.Job`, each of its kind."""
-    groups = ends[0].groups if len(ends) == 1 and isinstance(ends[0], SupportGroups) else ()
+    groups, beside = _by_groups(ends)
     heading, shape = layout.rotate if rotate is None else rotate, target.parameters()
     given: dict[str, Any] = {
         "layout": _layout_keys(layout, heading) if isinstance(layout, GridLayout) else written(layout),
         "rod": rod.parameters(),
         "drape": _drape_keys(method, anchor, objective),
         "supports": [written(group) for group in groups],
-        "pop_up": {"ends": ends[0].name if len(ends) == 1 and ends[0].name in SUPPORTS else BOTH},
+        "pop_up": {"ends": beside},
         "seams": {
             "lines": [Seam.of(line).points.tolist() for line in seams],
             "patches": [{"name": name, **written(patch)} for name, patch in patches.items()],
@@ -117,6 +117,15 @@ def _held_layout(layout: GridLayout, rotate: float | Auto) -> Held | None:
         return None
     turned = layout if rotate == "auto" else replace(layout, rotate=rotate)
     return Held(turned, "a layout with lines at unequal spacing")
+
+
+def _by_groups(supports: Sequence[Support]) -> tuple[tuple[Group, ...], str]:
+    """The groups of rod ends that keys describe, if that is what is asked for, and [pop_up] ends."""
+    by_groups = [each for each in supports if isinstance(each, SupportGroups) and each.name == SupportGroups.name]
+    beside = [support.name for support in supports if support not in by_groups]
+    if len(by_groups) > 1 or len(beside) > 1 or not SUPPORTS.keys() >= {*beside}:
+        return (), BOTH
+    return (by_groups[0].groups if by_groups else ()), (beside[0] if beside else BOTH)
 
 
 def _held_supports(supports: Sequence[Support]) -> Held | None:
