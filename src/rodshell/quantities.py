@@ -105,11 +105,7 @@ def _several(count: int, value: Value, needs: str, words: str, *, one_for_all: b
             raise ValueError(needs)
         return tuple(_named(ordinal, value, item) for ordinal, item in zip(_ORDER, items, strict=False))
 
-    def checked(name: str, given: object) -> tuple[float, ...]:
-        every = [given] * count if one_for_all and isinstance(given, int | float) else given
-        return tuple(check(name, item) for item in numbers(name, every, words, count))
-
-    return Value(read, checked)
+    return Value(read, lambda name, given: tuple(check(name, item) for item in numbers(name, given, words, count)))
 
 
 def _parted(value: object) -> object:
@@ -325,13 +321,18 @@ Point = Annotated[tuple[float, float], _POINT]
 PointOrAuto = Annotated[tuple[float, float] | Auto, _or_auto(_POINT)]
 Point3 = Annotated[tuple[float, float, float], _triple("length")]
 Direction3 = Annotated[tuple[float, float, float], _triple("number")]
-Stiffness3 = Annotated[
-    tuple[float, float, float],
-    _several(
-        3, quantity("stiffness", not_negative), 'needs one or three values, such as "200 kN/m"',
-        "three stiffnesses along x, y and z in N/m, or one", one_for_all=True,
-    ),
-]  # fmt: skip
+_STIFF = _several(
+    3, quantity("stiffness", not_negative), 'needs one or three values, such as "200 kN/m"',
+    "three stiffnesses along x, y and z in N/m, or one", one_for_all=True,
+)  # fmt: skip
+
+
+def _stiffnesses(name: str, given: object) -> Any:
+    assert _STIFF.check is not None
+    return _STIFF.check(name, [given] * 3 if isinstance(given, int | float) else given)
+
+
+Stiffness3 = Annotated[float | tuple[float, float, float], Value(_STIFF.read, _stiffnesses)]
 Angles = Annotated[tuple[float, float, float], _triple("angle")]
 
 Factor = Annotated[float, quantity("number", positive)]

@@ -401,13 +401,13 @@ def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
     )
     assert rod == Rod(Circle(0.001), Material(1e6, 1000.0, 0.5))
     assert options == [Gravity(), (0.1, 0.0)]
-    assert (case.joint, case.supports) == (Ball(), tuple(SUPPORTS.values()))
+    assert (case.joint, case.popped_on) == (Ball(), tuple(SUPPORTS.values()))
     tube = {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm", "pop_up.ends": "pinned"}
     tube |= {"joint.kind": "pin", "joint.eccentricity": "2 mm"}
     case = load_case("hemisphere", tube)
     built = case.build()
     assert built.rod.section == Tube(0.001, 0.0001)
-    assert case.supports == (SUPPORTS["pinned"],)
+    assert case.popped_on == (SUPPORTS["pinned"],)
     assert case.joint == Pin(eccentricity=0.002)
     assert built.anchor is None
 

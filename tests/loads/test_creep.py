@@ -1,6 +1,6 @@
 """Shells after years of creep, against shells whose rods are that soft, which no code of creep has seen."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -33,6 +33,33 @@ def with_settlement() -> rs.Loads:
         loads={"it": CLADDING, "down": down}, combinations={"all": {"it": 1.0, "down": 1.0}}, stability=STABILITY,
         strength=KNOWN,
     )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_supports_that_yield_do_not_creep() -> None:
+    """Springs, and an energy of one's own: the shell of softer rods on them is the crept one."""
+    soft_springs = rs.SupportGroups(groups=(rs.SprungEnds(stiffness=20e3),))
+    for support in (soft_springs, Posts("posts")):
+        form, other = (
+            rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), rod, ends=support) for rod in (TUBE, soft())
+        )  # fmt: skip
+        loads = one(CLADDING, stability=rs.Stability(imperfection=0, modes=1), strength=KNOWN)
+        found = rs.check_loads(form, loads).shells["all"][support.name]
+        twin = rs.check_loads(other, loads).shells["all"][support.name]
+        assert found.after_years is not None
+        assert found.after_years.limit_factor == pytest.approx(twin.limit_factor, rel=CLOSE)
+        before = rs.check_loads(form, replace(loads, combinations={"all": {"it": 1e-9}})).shells["all"][support.name]
+        moved = np.linalg.norm(twin.positions - before.positions, axis=1).max()
+        assert found.after_years.max_deflection == pytest.approx(moved, rel=1e-4)
+
+
+@dataclass(frozen=True)
+class Posts(rs.Support):
+    def free(self, points: np.ndarray) -> dict[int, np.ndarray]:
+        return dict.fromkeys(range(len(points)), np.eye(3))
+
+    def energies(self, ends: np.ndarray, points: np.ndarray) -> list[rs.LocalEnergy]:
+        return [rs.LocalEnergy(ends[:, None], lambda x: 1e4 * ((x[:, 0] - points) ** 2).sum(axis=1))]
 
 
 @pytest.mark.parametrize(

@@ -201,11 +201,11 @@ class Case:
 
     @property
     def popped_on(self) -> tuple[Support, ...]:
-        """The supports on which the grid is popped up: those by groups, and what is asked for beside them."""
+        """The supports on which the grid is popped up: those by groups, and what is asked for in addition to them."""
         if self.pop_up.held is not None:
             return tuple(self.pop_up.held.value)
-        beside = supports_of(self.pop_up.ends) if not self.supports or self.pop_up.ends != BOTH else ()
-        return (*beside, *([SupportGroups(groups=self.supports)] if self.supports else ()))
+        others = supports_of(self.pop_up.ends) if not self.supports or self.pop_up.ends != BOTH else ()
+        return (*others, *([SupportGroups(groups=self.supports)] if self.supports else ()))
 
     @property
     def ends(self) -> tuple[str, ...]:

@@ -37,8 +37,6 @@ from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_un
 from rodshell.loads.structure import NO_PAIRS, Structure
 from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import Duration
-from rodshell.rods.local_energy import LocalEnergy
-from rodshell.rods.support_groups import PointSprings
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load
 from rodshell.solve.modes import softest_motion
@@ -349,11 +347,11 @@ def loaded_shell(
 
 
 def _creeps_alike(structure: Structure, limits: Limits) -> bool:
-    """Whether it is known how laths of bracing and springs of supports creep beside the rods: as much, and not."""
+    """Whether laths of bracing creep as much as the rods, and the stiffness of supports that do not creep is known."""
     layer, springs = structure.laths, structure.shell.springs
     if layer is not None and layer.rod.material != structure.rod.material:
         return preset_limits(layer.rod, limits.service_class).creep == limits.creep
-    return all(isinstance(spring, LocalEnergy | PointSprings) for spring in springs)
+    return all(hasattr(spring, "times") for spring in springs)
 
 
 def _slipping(mesh: GridMesh, used: Utilisation) -> Ints:

@@ -9,7 +9,7 @@ erected, its factors divided by 1 + k. Laths of bracing, and joints, creep as th
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -21,7 +21,6 @@ from rodshell.loads.bracing import in_steps
 from rodshell.loads.settings import Stability
 from rodshell.loads.structure import Structure
 from rodshell.rods.elements import Elements
-from rodshell.rods.local_energy import LocalEnergy
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, LoadPath, load_path
@@ -104,20 +103,11 @@ def crept(structure: Structure, creep: float) -> Structure | None:
 
     def stiffer(elements: tuple[Elements, ...], share: float) -> tuple[Elements, ...]:
         times = 1.0 + share * creep
-        others = elements[last:] if cables is None else (_times(cables, times),)
-        return (*elements[:first], *(_times(spring, times) for spring in shell.springs), *others)
+        others = elements[last:] if cables is None else (cables.times(times),)
+        return (*elements[:first], *(spring.times(times) for spring in shell.springs), *others)  # type: ignore[attr-defined]
 
     found = in_steps(structure.equilibrium, stiffer)
     return None if found is None else replace(structure, shell=structure.shell_at(found), equilibrium=found)
-
-
-def _times(energy: Elements, factor: float) -> Elements:
-    """An energy of springs or cables that are so many times as stiff."""
-    if isinstance(energy, LocalEnergy):
-        formula = energy.formula
-        return replace(energy, formula=lambda at: factor * formula(at))
-    assert is_dataclass(energy)
-    return replace(energy, stiffness=factor * energy.stiffness)
 
 
 def _with_imperfections(

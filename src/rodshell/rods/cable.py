@@ -6,7 +6,7 @@ A slack cable has exactly no energy, no force and no stiffness; its weight does 
 becomes taut, the force does not.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,10 @@ class CableStretch(WithoutFrames):
     stiffness: Floats
 
     __repr__ = brief
+
+    def times(self, factor: float) -> "CableStretch":
+        """Cables so many times as stiff."""
+        return replace(self, stiffness=factor * self.stiffness)
 
     def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""

@@ -45,6 +45,11 @@ class LocalEnergy(WithoutFrames):
         wanted = "a function of the positions (m, k, 3) of nodes"
         function_of("the formula of an energy", self.formula, wanted, np.zeros((*blocks.shape, 3)))
 
+    def times(self, factor: float) -> "LocalEnergy":
+        """The energy times a factor."""
+        formula = self.formula
+        return LocalEnergy(self.blocks, lambda at: factor * formula(at))
+
     def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         at = state[self.blocks]
         np.add.at(gradient, self.blocks, self._gradient(at))

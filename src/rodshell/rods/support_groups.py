@@ -16,11 +16,11 @@ from rodshell.rods.elements import NO_HESSIANS, Elements, WithoutFrames
 from rodshell.rods.supports import Support
 from rodshell.schema import checked
 from rodshell.units import read_quantity, shown
-from rodshell.validation import brief, direction, instance, listed
+from rodshell.validation import brief, described, direction, instance, listed, texts
 
 ALL = "all"
 AXES = "xyz"
-NO_FORCE = 1e-6  # of the largest: a rod end with less is free, but for round-off
+NO_FORCE = 1e-6  # of the largest: a rod end with less is free: that is round-off
 _WANTED = 'give "all", names such as "U03.0, U04.1", or where they are, such as "y > 3.9 m" or "x < 0 m and z < 1 m"'
 
 
@@ -36,7 +36,7 @@ class _Side(NamedTuple):
 
 
 def _sides(text: str) -> tuple[_Side, ...] | None:
-    """Of a condition on places; None: it is none."""
+    """Of a condition on places; None: it is not one."""
     found = []
     for part in text.split(" and "):
         sign = 1.0 if ">" in part else -1.0
@@ -63,7 +63,7 @@ def _checked_at(name: str, value: object) -> str:
     try:
         return _at(value)
     except ValueError as reason:
-        raise InputError(f"{name}: {reason}, not {shown(str(value))}") from None
+        raise InputError(f"{name}: {reason}, not {described(value)}") from None
 
 
 At = Annotated[str, Value(_at, _checked_at), "rod ends: all, names, or where they are"]
@@ -169,6 +169,7 @@ class SupportGroups(Support):
 
     Args:
         groups: in this order.
+        ends_named: (2m,) names of the rod ends, by which groups find them; set where a shell is popped up.
     """
 
     name: str = "given"
@@ -183,6 +184,7 @@ class SupportGroups(Support):
         for group in groups:
             instance("a group of supports", group, Group, "rodshell.HeldEnds, FreeEnds, SlidingEnds or SprungEnds")
         object.__setattr__(self, "groups", groups)
+        object.__setattr__(self, "ends_named", texts("the names of rod ends", self.ends_named, "names such as U01.0"))
 
     @property
     def note(self) -> str:
@@ -240,6 +242,10 @@ class PointSprings(WithoutFrames):
     stiffness: Floats
 
     __repr__ = brief
+
+    def times(self, factor: float) -> "PointSprings":
+        """Springs so many times as stiff."""
+        return replace(self, stiffness=factor * self.stiffness)
 
     def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""

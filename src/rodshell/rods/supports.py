@@ -56,7 +56,7 @@ class Support:
         return "directions held" if self.holds_directions else "free to turn"
 
     def named(self, names: Sequence[str]) -> Self:
-        """The same, which may tell its rod ends by their names (2m,), such as "U03.0"."""
+        """The same, which may find its rod ends by their names (2m,), such as "U03.0"."""
         return self
 
     def free(self, points: Floats) -> Mapping[int, Sequence[ArrayLike]]:
