@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.linalg import eigh
 
 import rodshell as rs
@@ -33,6 +34,7 @@ def nodes_of(form: rs.Form, ends: str = "pinned") -> LoadedNodes:
     return LoadedNodes(popped.positions, mass, tributary_of(form.patches[0]), min(form.layout.spacing))
 
 
+PERFECT = rs.Stability(imperfection=0, modes=1)
 LOADS = {
     "own": rs.SelfWeight(cladding=2.0),
     "snow": rs.Snow(150.0),
@@ -71,6 +73,10 @@ def test_snow_and_wind_have_the_sums_of_their_surface() -> None:
     assert rs.Snow(1.0).forces(nodes).sum(axis=0) == pytest.approx([0, 0, -plan], rel=1e-3)
     assert rs.Snow(1.0, "half", 0.7).forces(nodes).sum(axis=0)[2] == pytest.approx(-plan / 2, rel=0.01)
     assert rs.Wind(2.0, -0.5).forces(nodes).sum(axis=0) == pytest.approx([0, 0, plan], abs=1e-3 * plan)
+    ground = -rs.Snow(1.0, of="ground").forces(nodes).sum(axis=0)[2]
+    a, b = pi / 6, pi / 3  # angles of the surface's slope, of which a sphere of radius R has R^2 sin cos of plan
+    falling = quad(lambda t: (b - t) / (b - a) * np.sin(t) * np.cos(t), a, b)[0]
+    assert ground == pytest.approx(2 * pi * 100.0 * 0.8 * (np.sin(a) ** 2 / 2 + falling), rel=0.02)
     roof = rs.HeightField(formula="1 - 0.05*x^2 - 0.04*y^2", domain=rs.Rectangle((6.0, 4.0)))
     flat = rs.find_form(roof, grid(0.5, 0.25), TUBE, ends="pinned")
     drift = rs.Snow(1.0, "drifted", 0.0).forces(nodes_of(flat))
@@ -450,6 +456,47 @@ def test_a_table_of_rods_has_no_areas() -> None:
     assert form is not table
     with pytest.raises(InputError, match="comes from a table of rods"):
         rs.check_loads(table, one(rs.Snow(1.0)))
+
+
+def test_cladding_swings_with_the_shell() -> None:
+    """So heavy that the rods' mass counts little, the frequency falls with the root of its mass."""
+    form, masses = shell("tubes"), (400.0, 1600.0)
+    first, second = (
+        rs.check_loads(form, one(rs.SelfWeight(cladding=mass), stability=PERFECT))
+        .shells["all"]["pinned"]
+        .frequencies[0]
+        for mass in masses
+    )
+    assert first / second == pytest.approx(2.0, rel=0.01)
+    alone = rs.check_loads(form, one(rs.Snow(1.0), stability=PERFECT)).shells["all"]["pinned"].frequencies[0]
+    assert alone > 5 * first
+
+
+def test_wind_from_several_directions_is_a_combination_for_each() -> None:
+    """Each is that of a wind that blows so; a shell of four mirror planes and more withstands two of them alike."""
+    wind = rs.Wind(20.0, "0.5 - 0.1*x", direction=0.1, directions=4)
+    storm, own = {"own": 1.0, "it": 1.5}, rs.SelfWeight()
+    every = rs.Loads(
+        loads={"own": own, "it": wind}, combinations={"storm": storm, "rest": {"own": 1.0}},
+        durations={"it": "instantaneous"}, deflections={"storm": "span/100"}, stability=PERFECT,
+    )  # fmt: skip
+    *turned, rest = every.combinations
+    assert (turned[0], len(turned), rest) == ("storm, wind at 5.73 deg", 4, "rest")
+    assert {every.duration(name) for name in turned} == {"instantaneous"}
+    found = rs.check_loads(shell("tubes"), every).shells
+    for k, name in enumerate(turned):
+        single = replace(wind, direction=0.1 + k * pi / 2, directions=1)
+        alone = rs.Loads(
+            loads={"own": rs.SelfWeight(), "it": single},
+            combinations={"storm": {"own": 1.0, "it": 1.5}},
+            stability=PERFECT,
+        )
+        other = rs.check_loads(shell("tubes"), alone).shells["storm"]["pinned"]
+        assert found[name]["pinned"].limit_factor == other.limit_factor
+        assert found[name]["pinned"].deflection_limit == pytest.approx(np.ptp(other.positions[:, 0]) / 100, rel=0.05)
+    assert found["rest"]["pinned"].deflection_limit is None
+    with pytest.raises(InputError, match="two winds from several directions"):
+        rs.Loads(loads={"a": wind, "b": wind}, combinations={"storm": {"a": 1.0, "b": 1.0}})
 
 
 def test_frequencies_are_those_of_the_rods_mass_wherever_nodes_are() -> None:

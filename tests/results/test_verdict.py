@@ -626,6 +626,23 @@ def test_one_rule_of_reserve_holds_as_erected_and_after_years(
     assert ("reserve_under_loads" in told) <= (less.level == "good")
 
 
+@pytest.mark.parametrize(
+    ("now", "later", "said"), [(0.01, None, ""), (0.03, None, "30.0 mm"), (0.01, 0.04, "40.0 mm after")]
+)
+def test_a_shell_that_moves_by_more_than_was_allowed_has_to_be_checked(
+    now: float, later: float | None, said: str
+) -> None:
+    shell = {
+        "limit_factor": 3.0, "imperfect_kind": "none", "max_deflection": now, "deflection_limit": 0.02,
+        "after_years": later and {"limit_factor": 3.0, "imperfect_kind": "none", "max_deflection": later},
+    }  # fmt: skip
+    found = verdict(changed(("loads", {"winter": dict.fromkeys(("pinned", "clamped"), shell)}), CREEP))
+    assert found.level == ("check" if said else "good")
+    told = [sentence for sentence in found.reasons if "moves by up to" in sentence]
+    assert bool(told) == bool(said)
+    assert not said or f"moves by up to {said}" in told[0]
+
+
 def test_creep_has_to_be_known_of_every_shell_under_permanent_loads() -> None:
     """Laths of bracing that creep otherwise than the rods: nothing is known after years."""
     shell = {"limit_factor": 3.0, "imperfect_kind": "none", "duration": "permanent", "reserve": 1.5}

@@ -321,8 +321,9 @@ class Case:
 
     @property
     def combination_names(self) -> tuple[str, ...]:
-        """Names of the combinations of loads."""
-        return tuple(row.name for row in self.combinations)
+        """Names of the combinations of loads, one for each direction of a wind."""
+        loads = self.built_loads()
+        return () if loads is None else tuple(loads.combinations)
 
     def built_loads(self) -> Loads | None:
         """What the shell is to be checked under; None where the case has no loads.
@@ -344,6 +345,7 @@ class Case:
             locked_joints=self.locked_joints,
             stability=self.stability,
             strength=self.strength,
+            deflections={row.name: row.deflection for row in self.combinations if row.deflection is not None},
             durations={row.name: row.duration for row in self.loads if row.duration is not None},
         )
 

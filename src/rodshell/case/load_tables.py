@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from rodshell.loads.kinds import Load
-from rodshell.loads.settings import Bracing
+from rodshell.loads.settings import Bracing, PartOfSpan
 from rodshell.quantities import Name, Share, Value
 from rodshell.rods.design_strength import Duration
 from rodshell.schema import Inline, Rows, value_of
@@ -31,6 +31,7 @@ class Combination:
     factors: Annotated[
         dict[str, float], Value(_factors), "factor of each load in it, such as { snow = 1.5 }"
     ] = field(hash=False)  # fmt: skip
+    deflection: Annotated[PartOfSpan | None, 'how far a node may move: a length, or "span/200"'] = None
 
 
 @dataclass(frozen=True)

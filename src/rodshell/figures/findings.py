@@ -12,6 +12,7 @@ CODES = {
     "cables_short": "cables are shortened by so little that they have to be stressed to their forces",
     "contact": "rods touch or cross",
     "creep_unknown": "creep is not known of these rods",
+    "deflection": "the shell moves by more than was allowed under a combination of loads",
     "ends_in_the_air": "rod ends lie above the lowest: what holds them has to be designed",
     "erection_contact": "rods touch or cross on the way that was computed",
     "erection_strength": "rods use more than their strength on the way that was computed",

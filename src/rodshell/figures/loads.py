@@ -91,6 +91,7 @@ class LoadedShell(Record):
     load_sum: Vector | None = key("sum of the loads, those on supports included", "N")
     reaction_sum: Vector | None = key("sum of the support forces, without those of the unloaded shell", "N")
     max_deflection: Number = key("largest displacement of a node", "m")
+    deflection_limit: Number = key("how far a node may move, as was given; null: no limit was", "m")
     linear_factor: Number = key("lowest linear buckling factor about the unloaded shell; null: above 100, or not known")
     limit_factor: Number = key("up to which the shell is stable; null: above 100")
     limit_kind: Text | None = key("limit point, bifurcation, none, unstable unloaded, or not followed: unknown above")
@@ -121,7 +122,7 @@ class LoadedShell(Record):
     slipping: Rows[Text] = rows("ids of the joints that slip")
     mode_factors: Numbers = numbers("linear buckling factors of the lowest modes")
     frequencies: Numbers = numbers(
-        "lowest natural frequencies without loads, of rods, joints and bracing; empty: not known", "Hz"
+        "lowest natural frequencies without loads, of rods, joints, bracing and cladding; empty: not known", "Hz"
     )
     factorizations: Whole | None = key("factorisations of the tangent, on all paths")
 

@@ -20,6 +20,10 @@ SENTENCES = {
         "creep of these rods is not known, and how far the shell carries permanent loads after years is not either: "
         "give by how much its deflections grow (strength.creep)"
     ),
+    "deflection": (
+        "under {place} with {ends} ends the shell moves by up to {moved}{years}, and {allowed} are allowed "
+        "(combinations.deflection)"
+    ),
     "ends_in_the_air": (
         "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
         "beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has to be designed"

@@ -31,7 +31,7 @@ from rodshell.loads.kinds import Forces, Settlement, Temperature
 from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
 from rodshell.loads.nodes import LoadedNodes
-from rodshell.loads.settings import Cables, Laths
+from rodshell.loads.settings import Cables, Laths, part_of_span
 from rodshell.loads.stability import after_years, capacity
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
 from rodshell.loads.structure import NO_PAIRS, Structure
@@ -145,8 +145,9 @@ def check_shells(
             if limits.bending:
                 require_known_stress(stages.rod, twisted=popped.shell.frames is not None)
             structure = _locked(popped, ends, loads, stages)
-            braced, frequencies = structure.braced, structure.frequencies(loads.stability.modes)
             nodes = LoadedNodes(popped.positions, structure.mass, areas, stages.layout.least_spacing)
+            braced, span = structure.braced, structure.span
+            frequencies = structure.frequencies(loads.stability.modes, loads.cladding * areas.area)
             acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
             for name, load in acting.items():
                 said = partial(_said, progress, f"{name}, {ends} ends")
@@ -154,7 +155,9 @@ def check_shells(
                     shell = loaded_shell(
                         structure, load, loads, limits=limits, duration=loads.duration(name), progress=said
                     )
-                    found[name][ends] = shell.changed(frequencies=frequencies)
+                    allowed = loads.deflections.get(name)
+                    limit = None if allowed is None else part_of_span("the deflection", allowed, span)
+                    found[name][ends] = shell.changed(frequencies=frequencies, deflection_limit=limit)
                 except InputError as reason:
                     raise InputError(f"combination {shown(name)}: {reason}") from None
                 missing.pop(0)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 from rodshell.errors import InputError
-from rodshell.loads.kinds import Forces, Load
-from rodshell.loads.settings import Bracing, LockedJoints, Stability, Strength
+from rodshell.loads.kinds import Forces, Load, SelfWeight, Wind
+from rodshell.loads.settings import Bracing, LockedJoints, Stability, Strength, part_of_span
 from rodshell.rods.design_strength import DURATIONS, Duration
 from rodshell.units import shown
 from rodshell.validation import brief, choice, described, instance, mapping, not_negative
@@ -21,6 +21,9 @@ class Loads:
         stability: how stability is looked at.
         strength: what rods and joints withstand.
         durations: by a load's name, how long it acts; default: by its kind, see `loads.kinds`.
+        deflections: by a combination's name, how far a node may move under it [m], or a part of the span: "span/200".
+
+    A combination with wind from several directions becomes one for each.
 
     Raises:
         InputError: a combination names a load that is not there; there is no combination; a factor is not a number.
@@ -33,8 +36,14 @@ class Loads:
     stability: Stability = field(default_factory=Stability)
     strength: Strength = field(default_factory=Strength)
     durations: dict[str, Duration] = field(default_factory=dict)
+    deflections: dict[str, float | str] = field(default_factory=dict)
 
     __repr__ = brief
+
+    @property
+    def cladding(self) -> float:
+        """The most of it that is in one load [kg/m2]."""
+        return max((load.cladding for load in self.loads.values() if isinstance(load, SelfWeight)), default=0.0)
 
     def duration(self, combination: str) -> Duration:
         """How long a combination acts: as long as the load in it that acts for the shortest time."""
@@ -74,6 +83,37 @@ class Loads:
         for name, duration in self.durations.items():
             self._require(name, "durations has")
             choice(f"the duration of {shown(name)}", duration, DURATIONS)
+        for name, limit in mapping("deflections", self.deflections, '{"winter": "span/200"}').items():
+            if name not in combinations:
+                raise InputError(f"deflections has {shown(name)}, which is not a combination: give one of them")
+            part_of_span(f"the deflection allowed under {shown(name)}", limit, 1.0)
+        self._turn_winds()
+
+    def _turn_winds(self) -> None:
+        """Put a combination for each direction in the place of one with wind from several."""
+        winds = {key: load for key, load in self.loads.items() if isinstance(load, Wind) and load.directions > 1}
+        loads: dict[str, Load | Forces] = {key: load for key, load in self.loads.items() if key not in winds}
+        combinations, deflections, durations = (
+            dict[str, dict[str, float]](),
+            dict(self.deflections),
+            dict(self.durations),
+        )
+        for name, factors in self.combinations.items():
+            turning = [key for key in factors if key in winds]
+            if len(turning) > 1:
+                raise InputError(f"the combination {shown(name)} has two winds from several directions: give it one")
+            for words, wind in winds[turning[0]].each.items() if turning else ():
+                turned = {key + words * (key in winds): factor for key, factor in factors.items()}
+                loads[turning[0] + words], combinations[name + words] = wind, turned
+                if name in self.deflections:
+                    deflections[name + words] = self.deflections[name]
+                if turning[0] in self.durations:
+                    durations[turning[0] + words] = self.durations[turning[0]]
+            if not turning:
+                combinations[name] = factors
+        found = {"loads": loads, "combinations": combinations, "deflections": deflections, "durations": durations}
+        for field_name, value in found.items():
+            object.__setattr__(self, field_name, value)
 
     def _require(self, name: str, what: str) -> None:
         if name not in self.loads:

@@ -8,8 +8,9 @@ A new kind is a class here and a member of `Load`. How long each acts where that
 [EN 1995-1-1, table 2.2; imposed loads: medium]; codes of some countries count snow as medium.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from math import degrees, pi
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -28,11 +29,12 @@ from rodshell.quantities import (
     Point3,
     Pressure,
     Value,
+    Whole,
 )
 from rodshell.rods.design_strength import Duration
 from rodshell.schema import checked
 from rodshell.units import read_quantity, shown
-from rodshell.validation import listed, number, point, texts
+from rodshell.validation import listed, number, point, texts, whole
 
 if TYPE_CHECKING:
     from rodshell.loads.nodes import LoadedNodes
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
 
 GRAVITY = 9.81  # [m/s2]
 SAMPLES = 400  # parts of a line load
+_ROOF_SNOW = np.radians([30.0, 60.0]), [0.8, 0.0]  # on what lies on the ground, by slope
 _LARGEST_COEFFICIENT = 20.0  # of wind on a surface; codes have up to about 3
 
 
@@ -74,6 +77,8 @@ class Snow:
             "drifted": on both halves a triangle, from 0 at the edge and the middle to the value at the quarter towards
             `direction`, to half of it at the other quarter, as the drifted load of cylindrical roofs [EN 1991-1-3,
             5.3.5].
+        of: "roof": the value is what lies there; "ground": 0.8 of it where the surface rises by up to 30 degrees, none
+            from 60 degrees on, and linear in between [EN 1991-1-3, table 5.2].
     """
 
     kind: ClassVar = "snow"
@@ -83,14 +88,18 @@ class Snow:
         Literal["uniform", "half", "drifted"], "everywhere, on one half, or as a drift"
     ] = "uniform"  # fmt: skip
     direction: Annotated[Angle, "towards which a half or drifted load lies, seen from above"] = 0.0
+    of: Annotated[Literal["roof", "ground"], "where the value is measured; the ground's lies by slope"] = "roof"
 
     def __post_init__(self) -> None:
         checked(self, "the snow's {}")
 
     def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N]."""
+        plan = nodes.tributary.plan
+        if self.of == "ground":
+            plan = plan * np.interp(nodes.slopes, *_ROOF_SNOW)
         if self.distribution == "uniform":
-            return nodes.downwards(self.value * nodes.tributary.plan)
+            return nodes.downwards(self.value * plan)
         along = nodes.along(self.direction)[:, 0]
         half = float(np.abs(along).max())
         if self.distribution == "half":
@@ -98,7 +107,7 @@ class Snow:
         else:
             peak = np.where(along > 0, 1.0, 0.5)
             share = peak * (1.0 - np.abs(np.abs(along) / (0.5 * half) - 1.0))
-        return nodes.downwards(self.value * share * nodes.tributary.plan)
+        return nodes.downwards(self.value * share * plan)
 
 
 def _coefficient(value: object) -> float | str:
@@ -129,9 +138,11 @@ class Wind:
         "pressure coefficient, positive onto the shell: a number, or a formula in x along the wind and y",
     ]
     direction: Annotated[Angle, "in which the wind blows, seen from above"] = 0.0
+    directions: Annotated[Whole, "number of directions, all around from that one: a combination for each"] = 1
 
     def __post_init__(self) -> None:
         checked(self, "the wind's {}")
+        whole("the number of the wind's directions", self.directions, 1, 360)
         if self._formula is None:
             object.__setattr__(self, "coefficient", number("the wind's coefficient", self.coefficient))
             self._require_usual(abs(float(self.coefficient)), "")
@@ -143,6 +154,16 @@ class Wind:
                 f"the wind's coefficient {shown(self.coefficient)} reaches {largest:.4g}{where}: pressure coefficients "
                 f"lie between -3 and 3, and none above {_LARGEST_COEFFICIENT:g} is taken"
             )
+
+    @property
+    def each(self) -> "dict[str, Wind]":
+        """The wind from each of its directions, by what is said of it; of one that is nothing."""
+        if self.directions == 1:
+            return {"": self}
+        turns = [2.0 * pi * k / self.directions for k in range(self.directions)]
+        names = [f", wind at {degrees(self.direction + turn) % 360:.4g} deg" for turn in turns]
+        winds = [replace(self, direction=self.direction + turn, directions=1) for turn in turns]
+        return dict(zip(names, winds, strict=True))
 
     @cached_property
     def _formula(self) -> "Formula | None":

@@ -33,6 +33,12 @@ class LoadedNodes:
 
     __repr__ = brief
 
+    @property
+    def slopes(self) -> Floats:
+        """(n,) angle of the surface with the plan at each node [rad]."""
+        sizes = np.maximum(np.linalg.norm(self.tributary.vectors, axis=1), 1e-300)
+        return np.asarray(np.arccos(np.clip(self.tributary.vectors[:, 2] / sizes, -1.0, 1.0)))
+
     def along(self, direction: float) -> Floats:
         """(n, 2) middles of the nodes' plan areas in axes along a `direction` [rad] and across it, from the middle of
         the plan's extent in each of them [m]."""

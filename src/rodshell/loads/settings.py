@@ -104,7 +104,7 @@ class LockedJoints:
             )
 
 
-def _imperfection(value: object) -> str | float:
+def _of_span(value: object) -> str | float:
     """A length, 0 for none, or a part of the span as "span/500"."""
     before, _, part = value.partition("/") if isinstance(value, str) else ("", "", "")
     try:
@@ -115,6 +115,21 @@ def _imperfection(value: object) -> str | float:
         return f"span/{read_quantity(part, 'number', size=True):g}"
     except ValueError as reason:
         raise ValueError(f'{reason}, or a part of the span such as "span/500"') from None
+
+
+def part_of_span(name: str, given: float | str, span: float) -> float:
+    """A length [m] that is given as one, or as a part of a `span` [m]."""
+    if not isinstance(given, str):
+        return not_negative(name, given, "m")
+    before, _, part = given.partition("/")
+    if before.strip() != "span" or not part.strip().replace(".", "", 1).isdecimal() or not float(part) > 0:
+        raise InputError(f'{name} must be a length in m, or "span/500", not {shown(given)}')
+    return span / float(part)
+
+
+PartOfSpan = Annotated[
+    float | str, Value(_of_span, lambda name, value: part_of_span(name, value, 1.0) and value)
+]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +143,7 @@ class Stability:
     """
 
     imperfection: Annotated[
-        float | str, Value(_imperfection), 'largest imperfection: a length, "span/500", or 0 for none'
+        float | str, Value(_of_span), 'largest imperfection: a length, "span/500", or 0 for none'
     ] = "span/500"  # fmt: skip
     modes: Annotated[Whole, "number of buckling modes, each of which is tried as imperfection"] = 3
     reserve: Annotated[Factor, "times the loads that a good shell carries, with the imperfection"] = 1.5
@@ -142,13 +157,7 @@ class Stability:
 
     def amplitude(self, span: float) -> float:
         """Largest displacement of an imperfect shell of a `span` [m], in m; 0: the perfect one alone."""
-        given = self.imperfection
-        if not isinstance(given, str):
-            return not_negative("the imperfection", given, "m")
-        before, _, part = given.partition("/")
-        if before.strip() != "span" or not part.strip().replace(".", "", 1).isdecimal() or not float(part) > 0:
-            raise InputError(f'the imperfection must be a length in m, or "span/500", not {shown(given)}')
-        return span / float(part)
+        return part_of_span("the imperfection", self.imperfection, span)
 
 
 def _service_class(value: object) -> int:

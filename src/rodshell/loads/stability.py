@@ -117,8 +117,7 @@ def _with_imperfections(
 
     Modes are not added: how their signs go together is arbitrary, and each would have a part of the amplitude only.
     """
-    points = structure.shell.positions(structure.equilibrium.state)
-    amplitude = asked.amplitude(float(np.ptp(points[:, :2], axis=0).min()))
+    amplitude = asked.amplitude(structure.span)
     if not amplitude or buckling is None or not len(buckling.shapes):
         return None, None, 0
     kind: Limit = "none"

@@ -133,15 +133,24 @@ class Structure:
             result[crossings] = element.moments(found.state)[:, 0]
         return result
 
-    def frequencies(self, count: int) -> Floats:
+    @property
+    def span(self) -> float:
+        """The smaller width of its plan [m]."""
+        return float(np.ptp(self.positions(self.equilibrium)[:, :2], axis=0).min())
+
+    def frequencies(self, count: int, cladding: Floats | None = None) -> Floats:
         """(k,) the lowest `count` natural frequencies without loads, at most, ascending [Hz]; none where they are not
         known.
+
+        Args:
+            cladding: (n,) its mass at the mesh's nodes [kg]; None: there is none.
 
         The mass of rods and laths is spread along their edges, so that the frequencies of bending are of fourth order
         in their length (see `solve.modes.frequencies`); joints and cables are at the nodes.
         """
         shell, mass = self.shell, np.zeros((self.size, 3))
         mass[: len(shell.mass)] = shell.mass
+        mass[: shell.node_count] += 0.0 if cladding is None else cladding[:, None]
         layer = self.laths
         if layer is not None:
             np.add.at(mass, layer.blocks, layer.shell.mass)

@@ -15,6 +15,7 @@ from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
 from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
+from rodshell.results.supports import share_of_span
 from rodshell.results.wording import millimetres, percent, rounded, rounded_down, rounding_of, shown_factor, stress
 from rodshell.units import percent_text
 
@@ -142,23 +143,18 @@ def _known(value: float | None, show: Callable[[float], str]) -> str:
 
 
 def _deflection(results: Results, shell: LoadedShell) -> Row:
-    deflection, span = shell.max_deflection, _span(results)
+    deflection, allowed = shell.max_deflection, shell.deflection_limit
     later = None if shell.after_years is None else shell.after_years.max_deflection
     return {
         "At factor": rounded_down(shell.at_factor or 0.0),
         "Deflection": millimetres(deflection, rounding=rounding_of(results)),
-        "Span over it": "" if not deflection or span is None else f"span/{span / deflection:.0f}",
+        "Span over it": share_of_span(results, deflection),
+        "Allowed": "" if allowed is None else millimetres(allowed, rounding=rounding_of(results)),
         "After years": "" if later is None else millimetres(later, rounding=rounding_of(results)),
         "Largest stress": _known(shell.max_stress, stress),
         "Compression over Euler load": "" if shell.euler is None else percent(shell.euler),
         "in": "" if shell.euler_at is None else shell.euler_at.rod,
     }
-
-
-def _span(results: Results) -> float | None:
-    """The smaller width of the plan [m]."""
-    points = np.array(results.boundary, dtype=float).reshape(-1, 3)
-    return float(np.ptp(points[:, :2], axis=0).min()) if len(points) else None
 
 
 def _stability(shell: LoadedShell) -> Row:

@@ -4,7 +4,7 @@ One rule: with imperfections, every combination is carried `reserve` times by th
 again by the shell after years of creep. Below the reserve a shell has to be checked, below 1 it cannot be built.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import inf
 
 from rodshell.figures.findings import Said, said
@@ -13,6 +13,7 @@ from rodshell.figures.records import Ends
 from rodshell.results.results import Results
 from rodshell.results.wording import rounded, rounded_down
 
+Length = Callable[[float | None], str]
 NOT_FOLLOWED, UNSTABLE = "not followed", "unstable unloaded"
 
 
@@ -33,8 +34,9 @@ def fall(found: LoadedShell, name: str, ends: Ends) -> Iterator[Said]:
         yield said("falls_after_years", ends, least, 1, place=name, factor=factor, creep=creep)
 
 
-def open_points(found: LoadedShell, name: str, ends: Ends) -> Iterator[Said]:
-    """What is not known of a shell that is not known to fall, and that its reserve is less than was asked for."""
+def open_points(found: LoadedShell, name: str, ends: Ends, shown: Length) -> Iterator[Said]:
+    """What is not known of a shell that is not known to fall, that it moves too far, and that its reserve is less than
+    was asked for."""
     limit, imperfect, years = found.limit_factor or 0.0, found.imperfect_factor, found.after_years
     if found.limit_kind == NOT_FOLLOWED:
         sentence = "not_followed" if limit < 1 else "not_followed: above"
@@ -44,10 +46,20 @@ def open_points(found: LoadedShell, name: str, ends: Ends) -> Iterator[Said]:
         yield said(sentence, ends, imperfect, 1, place=name, factor=rounded_down(imperfect or 0.0))
     if years is not None and _lost(years):
         yield said("not_followed: years", ends, _least(years), 1, place=name, factor=rounded_down(_least(years)))
+    yield from _deflection(found, name, ends, shown)
     asked, least, what = found.reserve or 0.0, *least_carried(found)
     if 1 <= least < asked:
         carries, wanted = rounded_down(least), rounded(asked)
         yield said("reserve_under_loads", ends, least, asked, place=name, what=what, factor=carries, asked=wanted)
+
+
+def _deflection(found: LoadedShell, name: str, ends: Ends, shown: Length) -> Iterator[Said]:
+    later = found.after_years.max_deflection if found.after_years else None
+    limit, moved = found.deflection_limit, max(found.max_deflection or 0.0, later or 0.0)
+    if limit is not None and moved > limit:
+        years = " after years" * (moved == later)
+        allowed, far = shown(limit), shown(moved)
+        yield said("deflection", ends, moved, limit, "m", place=name, moved=far, allowed=allowed, years=years)
 
 
 def creep_unknown(results: Results) -> Iterator[Said]:

@@ -12,6 +12,7 @@ from rodshell.results.own_weight import is_braced
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.strength_used import strength_name
+from rodshell.results.supports import share_of_span
 from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict_of
 from rodshell.results.wording import (
     NAMES,
@@ -296,6 +297,8 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
                 line += f", deflection {length(years.max_deflection)}"
         at = "" if found.at_factor == 1 else f" at {rounded_down(found.at_factor or 0.0)} times"
         line += f"; deflection{at} {length(found.max_deflection)}"
+        if share := share_of_span(results, found.max_deflection):
+            line += f" ({share})"
         if found.utilisation is not None:
             worst = found.governs
             of = f"the design strength{f' ({worst.by}, {worst.rod})' if worst and worst.by else ''}"

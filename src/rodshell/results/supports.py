@@ -40,6 +40,14 @@ def width(results: Results) -> float:
     return max((max(column) - min(column) for column in known if column), default=0.0)
 
 
+def share_of_span(results: Results, deflection: float | None) -> str:
+    """A deflection [m] as a part of the smaller width of the plan, such as "span/250"; "" where one is not known."""
+    points = np.array(results.boundary, dtype=float).reshape(-1, 3)
+    if not deflection or not len(points):
+        return ""
+    return f"span/{float(np.ptp(points[:, :2], axis=0).min()) / deflection:.0f}"
+
+
 def _forces(results: Results) -> Iterator[Floats]:
     """(2m, 3) forces of the supports, without loads and under each combination, with every end condition."""
     loaded = (shell.support_forces for _, _, shell in results.loaded_shells())

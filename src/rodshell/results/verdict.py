@@ -6,6 +6,7 @@ not checked, and then the result is not good.
 """
 
 from collections.abc import Iterable, Iterator
+from functools import partial
 from math import inf, isinf
 
 from rodshell.figures.checks import OTHER_SHAPES, Clearance, Deployment, WorstBent
@@ -363,7 +364,7 @@ def _loads(results: Results, ends: list[Ends]) -> Iterator[Said]:
             if linear is not None and linear < 1 and stands:
                 moved = _mm(results, found.max_deflection)
                 yield said("linear_buckling", end, linear, 1, place=name, factor=rounded_down(linear), moved=moved)
-            yield from open_points(found, name, end)
+            yield from open_points(found, name, end, partial(_mm, results))
             lower, share = _lowered(results, found)
             if lower < 1 and stands and (imperfect is None or imperfect >= 1):
                 factor = rounded_down(lower)
