@@ -17,6 +17,8 @@ from rodshell.loads.strength import Limits
 from rodshell.rods.design_strength import DESIGN
 from rodshell.rods.materials import PRESETS
 from tests.acceptance.rows import Row, print_table
+from tests.acceptance.signed_areas import curved_rows, developable_rows, sum_rows
+from tests.acceptance.signed_shells import chance_rows, creep_rows, support_rows
 
 EXACT = 1e-3
 
@@ -159,7 +161,7 @@ def preset_rows() -> Iterator[Row]:
         yield Row(name, "figures off a second source", float(np.nanmax(np.abs(ours / second - 1))), EXACT)
 
 
-ROWS = (section_rows, preset_rows)
+ROWS = (section_rows, preset_rows, support_rows, creep_rows, chance_rows, developable_rows, sum_rows, curved_rows)
 
 
 def main() -> int:
