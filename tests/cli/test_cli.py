@@ -143,7 +143,7 @@ def test_form_asks_for_the_case_and_saves_its_full_input(
     case = load_case("hemisphere", {**overrides, "rod.material.youngs_modulus": 25e9})
     built = case.build()._asdict()
     target, layout, rod = (built.pop(name) for name in ("target", "layout", "rod"))
-    built |= {"joint": case.joint, "ends": case.supports, "warm_start": None, "same_drape": False}
+    built |= {"joint": case.joint, "ends": case.popped_on, "warm_start": None, "same_drape": False}
     assert finder.calls == [((target, layout, rod), built)]
     assert load_case("dome/case.toml") == case
     assert "agreement 0.01 mm" in capsys.readouterr().out

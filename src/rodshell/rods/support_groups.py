@@ -5,18 +5,20 @@ Rod ends are moved to their places and held there while the shell pops up; then 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints, State
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.quantities import Direction3, Stiffness3, Value
-from rodshell.rods.elements import NO_HESSIANS, Elements, WithoutFrames
 from rodshell.rods.supports import Support
 from rodshell.schema import checked
 from rodshell.units import read_quantity, shown
 from rodshell.validation import brief, described, direction, instance, listed, texts
+
+if TYPE_CHECKING:
+    from rodshell.rods.elements import Elements
 
 ALL = "all"
 AXES = "xyz"
@@ -208,7 +210,9 @@ class SupportGroups(Support):
     def free(self, points: Floats) -> Mapping[int, Sequence[Sequence[float]]]:
         return {end: ways for end, group in enumerate(self.group_of(points)) if (ways := group.ways())}
 
-    def energies(self, ends: Ints, points: Floats) -> Sequence[Elements]:
+    def energies(self, ends: Ints, points: Floats) -> "Sequence[Elements]":
+        from rodshell.rods.point_springs import PointSprings  # here, as it needs Numba
+
         groups = self.group_of(points)
         sprung = [end for end, group in enumerate(groups) if isinstance(group, SprungEnds)]
         stiffness = [group.stiffness for group in groups if isinstance(group, SprungEnds)]
@@ -225,32 +229,3 @@ def unheld(forces: Floats) -> Bools:
     """(2m,) which rod ends nothing holds, by the forces (2m, 3) of the supports [N]."""
     size = np.sqrt((np.nan_to_num(forces) ** 2).sum(axis=1))
     return np.asarray(size <= NO_FORCE * size.max(initial=0.0))
-
-
-@dataclass(frozen=True, eq=False)
-class PointSprings(WithoutFrames):
-    """Springs along x, y and z between nodes and points.
-
-    Args:
-        blocks: (m, 1) the nodes.
-        points: (m, 3) where the springs are free of force [m].
-        stiffness: (m, 3) [N/m].
-    """
-
-    blocks: Ints
-    points: Floats
-    stiffness: Floats
-
-    __repr__ = brief
-
-    def times(self, factor: float) -> "PointSprings":
-        """Springs so many times as stiff."""
-        return replace(self, stiffness=factor * self.stiffness)
-
-    def evaluate(self, state: State, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
-        moved = state[self.blocks[:, 0]] - self.points
-        np.add.at(gradient, self.blocks[:, 0], self.stiffness * moved)
-        if hessians.size:
-            hessians[:] = self.stiffness[:, :, None] * np.eye(3)
-        return 0.5 * float(np.sum(self.stiffness * moved * moved))
