@@ -104,17 +104,24 @@ def _case_differences(before: Path, after: Path) -> Iterator[Difference]:
         for path, value in _leaves(old):
             found: Any = new
             for key in path:
-                found = found.get(key, {}) if isinstance(found, dict) else {}
+                found = _rows(found).get(key, {})
             if found != value:
                 yield Difference(".".join(("", "case", *path)), value, found)
 
 
 def _leaves(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], object]]:
     for key, value in table.items():
-        if isinstance(value, dict) and value:
-            yield from _leaves(value, (*path, key))
+        if inner := _rows(value):
+            yield from _leaves(inner, (*path, key))
         else:
             yield (*path, key), value
+
+
+def _rows(value: object) -> dict[str, Any]:
+    """A table, or tables in a row by their number; of anything else none."""
+    if isinstance(value, list) and all(isinstance(row, dict) for row in value):
+        return {str(k): row for k, row in enumerate(value)}
+    return value if isinstance(value, dict) else {}
 
 
 Scales = Mapping[str, float]  # the largest number that a list of records holds under each key
