@@ -253,6 +253,8 @@ def structure_of(stages: Stages, ends: Ends) -> Structure:
     if not popped.report.stable:
         how = "is not stable" if popped.report.converged else popped.report.sentence
         raise InputError(f"the pop-up with {ends} ends {how}: there is no equilibrium to refine")
+    if popped.shell.yields:
+        raise InputError(f"the {ends} supports yield, which no refinement knows: refine with pinned or clamped ends")
     if any(rod.profile is not None for rod in stages.footprint.rods):
         raise InputError("this form was refined before: refine the form that it came from, with all families at once")
     return Structure(popped, stages.rod, stages.joint, stages.target)

@@ -116,6 +116,10 @@ class _Group:
         """Directions at right angles along which its rod ends move."""
         return tuple(np.eye(3))
 
+    def against(self) -> Floats:
+        """(k, 3) directions along which something acts against it."""
+        return np.zeros((0, 3))
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class HeldEnds(_Group):
@@ -125,6 +129,9 @@ class HeldEnds(_Group):
 
     def ways(self) -> tuple[Sequence[float], ...]:
         return ()
+
+    def against(self) -> Floats:
+        return np.eye(3)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -149,6 +156,9 @@ class SlidingEnds(_Group):
     def ways(self) -> tuple[Sequence[float], ...]:
         return (self.along,)
 
+    def against(self) -> Floats:
+        return np.asarray(np.eye(3) - np.outer(self.along, self.along))
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SprungEnds(_Group):
@@ -160,6 +170,9 @@ class SprungEnds(_Group):
 
     kind: ClassVar = "sprung"
     stiffness: Annotated[Stiffness3, "of springs along x, y and z; one value is for all"]
+
+    def against(self) -> Floats:
+        return np.eye(3)[np.flatnonzero(self.stiffness)]
 
 
 Group = HeldEnds | FreeEnds | SlidingEnds | SprungEnds
@@ -208,7 +221,22 @@ class SupportGroups(Support):
         return found
 
     def free(self, points: Floats) -> Mapping[int, Sequence[Sequence[float]]]:
-        return {end: ways for end, group in enumerate(self.group_of(points)) if (ways := group.ways())}
+        """See `Support.free`.
+
+        Raises:
+            InputError: the shell can move as a whole; a group has no rod end.
+        """
+        groups = self.group_of(points)
+        away = (points - points.mean(axis=0)) / max(float(np.ptp(points, axis=0).max()), 1e-300)
+        held = [
+            (way, np.cross(place, way)) for group, place in zip(groups, away, strict=True) for way in group.against()
+        ]
+        if not held or np.linalg.matrix_rank(np.reshape(held, (-1, 6)), tol=1e-6) < 6:
+            raise InputError(
+                "the supports let the shell move as a whole: hold, or put on springs, three rod ends that do not lie in "
+                "a line"
+            )
+        return {end: ways for end, group in enumerate(groups) if (ways := group.ways())}
 
     def energies(self, ends: Ints, points: Floats) -> "Sequence[Elements]":
         from rodshell.rods.point_springs import PointSprings  # here, as it needs Numba
