@@ -233,8 +233,8 @@ class SupportGroups(Support):
         ]
         if not held or np.linalg.matrix_rank(np.reshape(held, (-1, 6)), tol=1e-6) < 6:
             raise InputError(
-                "the supports let the shell move as a whole: hold, or put on springs, three rod ends that do not lie in "
-                "a line"
+                "the supports let the shell move as a whole: hold, or put on springs, three rod ends that do not lie "
+                "in a line"
             )
         return {end: ways for end, group in enumerate(groups) if (ways := group.ways())}
 
