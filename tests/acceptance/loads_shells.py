@@ -13,6 +13,7 @@ import numpy as np
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.loads.check import _load, _locked, tributary_of
+from rodshell.loads.locked_joints import locked as with_locked_joints
 from rodshell.loads.nodes import LoadedNodes
 from rodshell.loads.structure import Structure
 from rodshell.rods.cable import CableStretch
@@ -76,7 +77,7 @@ def locked_rows() -> Iterator[Row]:
     """Pins tightened after erection: nothing changes until loads come, and then the shell resists shear."""
     form = shell("paraboloid")
     structure = Structure.erected(form.popped["pinned"], form.rod)
-    locked = rs.LockedJoints(shear=5e3).lock(structure)
+    locked = with_locked_joints(rs.LockedJoints(shear=5e3), structure)
     again = find_equilibrium(locked.equilibrium.problem, locked.equilibrium.state, locked.equilibrium.forces)
     moved = 1e3 * float(np.abs(again.state - structure.equilibrium.state).max())
     yield Row(NAMES["paraboloid"], "joints locked at 5 kN m/rad: the shell moves", moved, 1e-6, "mm")
