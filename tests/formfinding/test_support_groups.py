@@ -13,6 +13,7 @@ import rodshell as rs
 from rodshell.checks.reactions import reactions
 from rodshell.errors import InputError
 from rodshell.layout import straight_rods
+from rodshell.refining.refine import structure_of
 from tests.checks.loaded_twin import LoadedTwin, _coordinates
 from tests.loads.shells import TUBE, grid, shell
 
@@ -191,6 +192,10 @@ def test_a_case_may_compare_them_with_pinned_ends() -> None:
         (lambda: rs.SlidingEnds(along=(0.0, 0.0, 0.0)), "must not be zero"),
         (lambda: rs.SupportGroups(groups=("free",)), "a group of supports must be"),
         (lambda: rs.SupportGroups(holds_directions=True), "hold no directions"),
+        (
+            lambda: structure_of(on(groups(rs.SprungEnds(stiffness=STIFF))).stages, "given"),
+            "supports yield, which no refinement knows",
+        ),
         (lambda: on(groups(rs.FreeEnds())), "let the shell move as a whole"),
         (lambda: on(groups(rs.SprungEnds(stiffness=0.0))), "let the shell move as a whole"),
         (lambda: on(groups(rs.SprungEnds(stiffness=(1e5, 1e5, 0.0)))), "let the shell move as a whole"),

@@ -53,6 +53,22 @@ def test_supports_that_yield_do_not_creep() -> None:
         assert found.after_years.max_deflection == pytest.approx(moved, rel=1e-4)
 
 
+def test_nothing_is_known_after_years_on_a_support_whose_energy_cannot_be_scaled() -> None:
+    form = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), TUBE, ends=Unscaled("unscaled"))
+    loads = one(CLADDING, stability=rs.Stability(imperfection=0, modes=1), strength=KNOWN)
+    assert rs.check_loads(form, loads).shells["all"]["unscaled"].after_years is None
+
+
+class Plain:
+    """An energy of one's own that says no more than it has to."""
+
+    def __init__(self, energy: rs.LocalEnergy) -> None:
+        self.blocks, self.evaluate = energy.blocks, energy.evaluate
+
+    def refreshed(self, state: np.ndarray) -> "Plain":
+        return self
+
+
 @dataclass(frozen=True)
 class Posts(rs.Support):
     def free(self, points: np.ndarray) -> dict[int, np.ndarray]:
@@ -60,6 +76,11 @@ class Posts(rs.Support):
 
     def energies(self, ends: np.ndarray, points: np.ndarray) -> list[rs.LocalEnergy]:
         return [rs.LocalEnergy(ends[:, None], lambda x: 1e4 * ((x[:, 0] - points) ** 2).sum(axis=1))]
+
+
+class Unscaled(Posts):
+    def energies(self, ends: np.ndarray, points: np.ndarray) -> list[Plain]:
+        return [Plain(energy) for energy in super().energies(ends, points)]
 
 
 @pytest.mark.parametrize(

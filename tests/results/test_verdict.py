@@ -643,6 +643,14 @@ def test_a_shell_that_moves_by_more_than_was_allowed_has_to_be_checked(
     assert not said or f"moves by up to {said}" in told[0]
 
 
+def test_years_that_could_not_be_followed_are_not_known_to_end_in_a_fall() -> None:
+    years = {"limit_factor": 0.7, "limit_kind": "not followed", "creep": 0.8}
+    shell = {"limit_factor": 3.0, "imperfect_kind": "none", "reserve": 1.5, "after_years": years}
+    found = verdict(changed(("loads", {"weight": dict.fromkeys(("pinned", "clamped"), shell)}), CREEP))
+    assert found.level == "check"
+    assert "after years of creep could not be followed beyond 0.7 times" in found.headline
+
+
 def test_creep_has_to_be_known_of_every_shell_under_permanent_loads() -> None:
     """Laths of bracing that creep otherwise than the rods: nothing is known after years."""
     shell = {"limit_factor": 3.0, "imperfect_kind": "none", "duration": "permanent", "reserve": 1.5}
@@ -669,6 +677,11 @@ def test_ends_in_the_air_are_counted_with_what_must_hold_them() -> None:
     )
     loads = {"winter": {"clamped": WINTER["winter"]["clamped"] | {"support_forces": forces[::-1]}}}
     assert in_the_air(changed(*shell, ("loads", loads))) == EndsInTheAir(count=2, highest=0.5, largest_force=900.0)
+    open_side = (
+        "reactions",
+        {"pinned": {"forces": [*forces[:2], [0.0, 0.0, 1e-9], [0.0, 0.0, 0.0]]}},
+    )  # nothing holds them
+    assert in_the_air(changed(*shell, open_side)) == EndsInTheAir(count=0, highest=0.0, largest_force=None)
     seam = ("seams", [{"meetings": [{"point": places[2], "ends": ["U2.0", "U2.1"]}]}])  # the other patch holds it
     assert in_the_air(changed(*shell, seam)) == EndsInTheAir(count=0, highest=0.0, largest_force=None)
     assert verdict(changed(*shell, seam)).level == "good"
