@@ -20,6 +20,7 @@ from tests.acceptance import (
     paper,
     refine_derivatives,
     signed,
+    signed_shells,
     verdict_drawings,
     verdict_layers,
     verdict_levels,
@@ -54,7 +55,10 @@ CHEAP: dict[str, tuple[Rows, ...]] = {
     ),
     "paper": (paper.tail_rows, paper.pop_up_rows),
     "refine": tuple(partial(refine_derivatives.adjoint_rows, *case, laths=False) for case in EVERY[:2]),
-    "signed": (signed.section_rows, signed.preset_rows),
+    "signed": (
+        signed.section_rows, signed.preset_rows, signed_shells.support_rows, signed_shells.creep_rows,
+        partial(signed_shells.chance_rows, 3),
+    ),
     "verdict": (
         verdict_drawings.hostile_rows, verdict_layers.lath_rows, verdict_layers.thick_rows,
         partial(verdict_levels.rows, ("strength exceeded", "the paper's hemisphere")), verdict_paths.work_rows,
