@@ -5,15 +5,11 @@ from typing import Any
 import click
 
 from rodshell.case import BUILT_IN, load_case
-from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
+from rodshell.cli.options import UNITS, CaseCommand, case_options, output_options, overrides_of, read_output_options
 from rodshell.cli.reporting import run_and_deliver
 
 
-@click.command(
-    cls=CaseCommand,
-    params=case_options(),
-    epilog='Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.',
-)
+@click.command(cls=CaseCommand, params=case_options(), epilog=UNITS)
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE")
 @output_options("Folder for the results; default out/NAME.")
 def command(name: str, **values: Any) -> int:

@@ -15,23 +15,11 @@ from rodshell.errors import InputError
 from rodshell.quantities import Duration
 from rodshell.schema import value_of, written
 
-ALIASES = {
-    "target.radius": "--radius",
-    "target.formula": "--formula",
-    "target.unit": "--unit",
-    "target.up": "--up",
-    "target.base": "--base",
-    "target.boundary": "--boundary",
-    "layout.rods": "--rods",
-    "layout.spacing": "--spacing",
-    "layout.length": "--length",
-    "layout.edge": "--edge",
-    "layout.rotate": "--rotate",
-    "drape.anchor": "--anchor",
-    "drape.method": "--method",
-    "drape.objective": "--objective",
-    "refine.vary": "--vary",
-}
+ALIASES = {path: f"--{path.partition('.')[2]}" for path in (
+    "target.radius", "target.formula", "target.unit", "target.up", "target.base", "target.boundary",
+    "layout.rods", "layout.spacing", "layout.length", "layout.edge", "layout.rotate",
+    "drape.anchor", "drape.method", "drape.objective", "refine.vary",
+)}  # fmt: skip
 
 
 def _parameter(path: str) -> str:
@@ -136,6 +124,7 @@ ADDRESS = click.option(
     help="Compute on a dask cluster: tcp://HOST:PORT or tls://HOST:PORT of its scheduler, or its scheduler file. What "
     "answers there can run any program here.",
 )
+UNITS = 'Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.'
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 _ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
 _LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kinds of files that are not are named.'

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from rodshell.cli.options import FORCE, QUIET
-from rodshell.cli.reporting import Progress, compile_before_first, deliver, output_folder
+from rodshell.cli.reporting import Outcome, Progress, compile_before_first, deliver, output_folder
 from rodshell.errors import InputError
 from rodshell.paper import FIGURES, figure_maker, reserved
 
@@ -44,5 +44,6 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
         for name, place in zip(names, result_folders, strict=True):  # each is written as soon as it is made
             with Progress(quiet=quiet) as progress:
                 made = figure_maker(name)(progress, **given)
-            codes.append(deliver(made, place, progress=progress, as_json=as_json, quiet=quiet))
+            outcome = Outcome(made.status, made.summary(), made.result(), made.save)
+            codes.append(deliver(outcome, place, progress=progress, as_json=as_json, quiet=quiet))
     return max(codes)

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from rodshell.case import Case, load_case
-from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
+from rodshell.cli.options import UNITS, CaseCommand, case_options, output_options, overrides_of, read_output_options
 from rodshell.cli.reporting import run_and_deliver
 from rodshell.errors import InputError
 from rodshell.rods.supports import SUPPORTS
@@ -17,11 +17,7 @@ LATER = ("pop_up", "refine", "checks", "fabrication", "drawings")  # tables that
 VARY = "taper"  # where neither the command nor the case says
 
 
-@click.command(
-    cls=CaseCommand,
-    params=case_options(),
-    epilog='Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.',
-)
+@click.command(cls=CaseCommand, params=case_options(), epilog=UNITS)
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE|DIR")
 @click.option(
     "--ends", metavar="pinned|clamped", help="Supports of the refined shell; default: as the case says, or pinned."
