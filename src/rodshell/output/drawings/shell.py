@@ -13,20 +13,7 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.figures.fabrication import Brace
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.boxes import each_meets
-from rodshell.output.drawing import (
-    BACK,
-    INK,
-    LAYERS,
-    LETTER,
-    PALE,
-    SMALL,
-    SOFT,
-    Drawing,
-    Pen,
-    Pencil,
-    Text,
-    corners,
-)
+from rodshell.output.drawing import BACK, INK, LAYERS, LETTER, PALE, SMALL, SOFT, Drawing, Pen, Pencil, Text, corners
 from rodshell.output.drawings.flat import FlatPlan, side_ticks
 from rodshell.output.grid import end_nodes, joint_places, meshed_rods, outlines_of
 from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
