@@ -166,7 +166,7 @@ def open_folder(
     stage, lock = None, None
     try:
         try:
-            made = _make(path)
+            _make(path, made)
             with _locked(path):
                 _recover(path)
                 stage = Path(tempfile.mkdtemp(prefix=STAGE, dir=path))
@@ -246,25 +246,20 @@ def _standing(path: Path, patterns: Iterable[str]) -> list[str]:
     return list(found)
 
 
-def _make(path: Path) -> list[Path]:
-    """Make `path` and the folders above it that are missing; returns those made, the outermost first."""
+def _make(path: Path, made: list[Path]) -> None:
+    """Make `path` and the folders above it that are missing, and list those that were `made`, the outermost first."""
     if path.exists() and not path.is_dir():
         raise OutputError(f"cannot write {path}: it is a file; choose a folder")
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     there = missing[-1].parent if missing else path
     if not there.is_dir():
         raise OutputError(f"cannot write {path}: {there} is a file; choose another folder")
-    made = list[Path]()
     try:
         for folder in reversed(missing):
             folder.mkdir()
             made.append(folder)
     except OSError as error:
-        for folder in reversed(made):
-            with suppress(OSError):
-                folder.rmdir()
         raise OutputError(f"cannot write {path}: {error.strerror} in {there}; choose another folder") from error
-    return made
 
 
 def _stages(path: Path) -> list[Path]:

@@ -24,8 +24,6 @@ CONVERGED = "converged"
 ANY = "NAME"  # in a table whose keys are the user's, such as load combinations
 SHORT = 3  # a list with so many numbers is kept: a point, a pair
 
-Short = dict[str, Any]
-
 
 @dataclass(frozen=True)
 class Column:

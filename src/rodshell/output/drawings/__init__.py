@@ -88,7 +88,7 @@ def _layouts(archive: Archive) -> dict[str, Layout]:
     layouts = dict[str, Layout]()
     if lies_flat(archive):
         layouts["plan"] = sheets.laid_out(partial(flat.flat_drawing, plan), extent, paper, plan.text, true_size=True)
-    for name, (compose, extent) in _of_the_shell(archive, plan).items():
+    for name, (compose, extent) in _of_the_shell(archive).items():
         layouts[name] = sheets.laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
     return layouts
 
@@ -98,14 +98,14 @@ def _paper(archive: Archive) -> Paper:
     return PAPERS[style.paper if style else "A3"]
 
 
-def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, Floats]]:
+def _of_the_shell(archive: Archive) -> dict[str, tuple[Compose, Floats]]:
     """Drawings that need a shape in space, and what each takes at least without its texts (2,) [mm]."""
     if archive.final is None or "rod_nodes" not in archive.states:
         return {}
     width, depth, height = np.ptp(np.concatenate(shell.final_curves(archive)), axis=0)
     above, both_sides = np.array([width, depth]), np.array([max(width, depth), 2 * height])
     makers: dict[str, tuple[Compose, Floats]] = {
-        "supports": (partial(shell.supports_drawing, archive, plan), above),
+        "supports": (partial(shell.supports_drawing, archive), above),
         "elevations": (partial(shell.elevations_drawing, archive), both_sides),
     }
     if archive.results.bracing:

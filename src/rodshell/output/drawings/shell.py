@@ -14,7 +14,7 @@ from rodshell.figures.fabrication import Brace
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.boxes import each_meets
 from rodshell.output.drawing import BACK, INK, LAYERS, LETTER, PALE, SMALL, SOFT, Drawing, Pen, Pencil, Text, corners
-from rodshell.output.drawings.flat import FlatPlan, side_ticks
+from rodshell.output.drawings.flat import side_ticks
 from rodshell.output.grid import end_nodes, joint_places, meshed_rods, outlines_of
 from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
 from rodshell.output.schedules import seam_meetings
@@ -166,7 +166,7 @@ def axes(pencil: Pencil, text: float) -> None:
 # Supports
 
 
-def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
+def supports_drawing(archive: Archive, text: float) -> Drawing:
     """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
     pencil, drawn = Pencil(), meshed_rods(archive)
     _seen_from_above(pencil, archive, text)
