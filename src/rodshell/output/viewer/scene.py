@@ -17,18 +17,10 @@ from numpy.typing import NDArray
 from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
+from rodshell.output import grid
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
 from rodshell.output.drawing import FAMILIES
-from rodshell.output.grid import (
-    GridRod,
-    Shape,
-    family_numbers,
-    joint_entries,
-    laid_out,
-    meshed_rods,
-    shape_names,
-    shape_of,
-)
+from rodshell.output.grid import GridRod, Shape
 from rodshell.output.schedules import SCHEDULES, Table, heading
 from rodshell.output.sections import section_outline, section_widths
 from rodshell.results import Archive, wording
@@ -114,7 +106,7 @@ class Drawn:
         laths = _laths(outline)
         known = {kind: coloured.scale for _, colours in self.shapes for kind, coloured in colours.items()}
         shown = {kind: known[kind] for kind in COLOURS if kind in known}
-        families = family_numbers(family for _, family in self.rods)
+        families = grid.family_numbers(family for _, family in self.rods)
         header: dict[str, Any] = {
             "version": VERSION,
             "name": self.name,
@@ -158,7 +150,7 @@ class Drawn:
         final = next((shape.positions for shape, _ in reversed(self.shapes) if not shape.flat), flat)
         if not len(flat):
             return flat
-        return laid_out(flat, final, ends)
+        return grid.laid_out(flat, final, ends)
 
 
 def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
@@ -167,11 +159,11 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     Args:
         schedules: whether rods and joints have the rows of the schedules with them, which takes most of the time.
     """
-    rods = meshed_rods(archive)
-    names = sorted(shape_names(archive), key=lambda name: name != DRAPED) if rods else []
+    rods = grid.meshed_rods(archive)
+    names = sorted(grid.shape_names(archive), key=lambda name: name != DRAPED) if rods else []
     if len(names) < 2:
         return None
-    joints, shapes = joint_entries(archive), [shape_of(archive, name) for name in names]
+    joints, shapes = grid.joint_entries(archive), [grid.shape_of(archive, name) for name in names]
     tables = {kind: SCHEDULES[f"{kind}s"].brief(archive) for kind in ("rod", "joint") if schedules}
     target = archive.states.get("target_points")
     return Drawn(
