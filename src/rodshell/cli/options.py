@@ -113,11 +113,8 @@ class RunOptions:
     quiet: bool
 
 
-FORCE = click.option(
-    "--force",
-    is_flag=True,
-    help="Also replace files that rodshell did not write, or that were changed since.",
-)
+_REPLACE = "Also replace files that rodshell did not write, or that were changed since."
+FORCE = click.option("--force", is_flag=True, help=_REPLACE)
 ADDRESS = click.option(
     "--address",
     metavar="ADDRESS",

@@ -144,7 +144,6 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
 
     Args:
         name: of the case, by which its folder is called.
-        output: where and what to write.
         formed_before: the form is on disk already; where its loads cannot be checked it is not written again.
     """
     from rodshell.output.files import reserved, save
@@ -211,11 +210,8 @@ def _offer(form: "Form", progress: Progress, in_time: ProgressFunction) -> str:
 def output_folder(
     out: str | None, name: str, names: Iterable[str], *, force: bool
 ) -> "AbstractContextManager[ResultFolder]":
-    """The folder for a result, by default out/NAME; opened before the job starts, see `open_folder`.
-
-    Args:
-        names: patterns of what will be written there.
-    """
+    """The folder for a result, by default out/NAME, opened before the job starts; `names` are reserved in it, see
+    `open_folder`."""
     from rodshell.results.folder import open_folder
 
     return open_folder(out or Path("out") / Path(name).stem, reserved=names, force=force)

@@ -28,7 +28,6 @@ class GridRod:
     """One rod of a result, with its geometry.
 
     Args:
-        record: what the result knows of it.
         course: (k, 2) x, y of points along it in the flat state [m]: its two ends, or more where it bends there.
         nodes: (k,) its nodes in the states, from start to end; empty if the states do not hold them.
     """

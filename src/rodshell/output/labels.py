@@ -11,7 +11,7 @@ from scipy.optimize import isotonic_regression
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.boxes import boxes_meet, lines_meet, lines_near
-from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
+from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Pencil, Text
 
 _Extent = tuple[float, float, float, float]
 
@@ -98,9 +98,11 @@ class Room:
             self.take(box)
         return free
 
-    def first(self, texts: Iterable[Text]) -> Text | None:
-        """The first of some texts that finds room, which it takes."""
-        return next((text for text in texts if self.claim(text.box())), None)
+    def write(self, pencil: Pencil, texts: Iterable[Text]) -> bool:
+        """Write the first of some texts that finds room, which it takes; whether one did."""
+        found = next((text for text in texts if self.claim(text.box())), None)
+        pencil.texts += [found] if found else []
+        return found is not None
 
     def join(self, other: "Room") -> None:
         """Take all that the other has taken."""

@@ -66,10 +66,8 @@ def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
     stages = [name for name in grid.shape_names(archive) if name.startswith(STAGE)]
     if not stages:
         return
-    shares = archive.states["history_share"]
-    last = archive.deployed
-    entries = []
-    for share, name in zip(shares.tolist(), ["flat", *stages, last], strict=True):
+    shares, entries = archive.states["history_share"].tolist(), []
+    for share, name in zip(shares, ["flat", *stages, archive.deployed], strict=True):
         yield f"pop_up/{name}.vtp", vtp_text(archive, name)
         entries.append(tag("DataSet", timestep=f"{share:.6f}", group="", part="0", file=f"pop_up/{name}.vtp"))
     yield "pop_up.pvd", _vtk_file("Collection", tag("Collection", *entries))
@@ -103,11 +101,7 @@ def compas_json(archive: Archive, state: str) -> str:
     positions, rods = archive.states[state], grid.meshed_rods(archive)
     joint_positions = grid.joint_places(archive, positions)
     lines = [
-        {
-            "dtype": "compas.geometry/Polyline",
-            "data": {"points": positions[rod.nodes].tolist()},
-            "name": rod.id,
-        }
+        {"dtype": "compas.geometry/Polyline", "data": {"points": positions[rod.nodes].tolist()}, "name": rod.id}
         for rod in rods
     ]
     node = {repr(name): dict(zip("xyz", at.tolist(), strict=True)) for name, at in joint_positions.items()}

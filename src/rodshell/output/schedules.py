@@ -386,7 +386,6 @@ class Schedule:
     """A schedule: all of it in its file, and the columns for which sheets and pages have room.
 
     Args:
-        title: on sheets.
         wide: patterns of the columns that only the file has.
         optional: patterns of those that only the file has where they say nothing.
         known: whether a result has it.

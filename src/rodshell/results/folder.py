@@ -278,11 +278,7 @@ def _recover(path: Path, but: Path | None = None) -> None:
     for stage in _stages(path):
         if stage == but:
             continue
-        try:
-            lock = _lock(stage, wait=False)
-        except BlockingIOError:
-            continue
-        try:
+        with suppress(BlockingIOError), _locked(stage, wait=False) as lock:  # which another process may hold
             if os.path.lexists(stage / RECORD):
                 if not _is_mine(stage):
                     raise OutputError(
@@ -293,9 +289,6 @@ def _recover(path: Path, but: Path | None = None) -> None:
             elif not _is_mine(stage) or (lock is None and time.time() - stage.stat().st_mtime < FORGOTTEN):
                 continue
             shutil.rmtree(stage, ignore_errors=True)
-        finally:
-            if lock is not None:
-                os.close(lock)
 
 
 @dataclass(frozen=True)
@@ -351,11 +344,11 @@ def _apply(path: Path, stage: Path) -> None:
 
 
 @contextmanager
-def _locked(path: Path, *, shared: bool = False) -> Iterator[None]:
-    """Wait until no other process writes into `path`."""
-    lock = _lock(path, shared=shared)
+def _locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[int | None]:
+    """Wait until no other process writes into `path`; see `_lock`."""
+    lock = _lock(path, shared=shared, wait=wait)
     try:
-        yield
+        yield lock
     finally:
         if lock is not None:
             os.close(lock)

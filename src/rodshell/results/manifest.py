@@ -67,10 +67,7 @@ def own_table(folder: Path, name: str) -> dict[str, Any]:
 
 
 def read_table(path: Path, most: float) -> dict[str, Any]:
-    """The keys of a JSON file.
-
-    Args:
-        most: bytes that it may have, see `read_bytes`.
+    """The keys of a JSON file of `most` bytes at most, see `read_bytes`.
 
     Raises:
         OutputError: it cannot be read, is too large, or holds no table of keys.

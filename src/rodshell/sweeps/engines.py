@@ -98,11 +98,11 @@ def opened_engine(settings: Settings, address: str | None = None) -> Iterator[En
     Raises:
         InputError: dask is not installed, or not reached. EngineError : no process can be started.
     """
+    if address is not None:
+        instance("address", address, str, 'text such as "tls://10.0.0.1:8786" or "scheduler.json"')
     with ExitStack() as stack:
-        if address is not None:
-            instance("address", address, str, 'text such as "tls://10.0.0.1:8786" or "scheduler.json"')
         if settings.engine == "dask" or address is not None:
-            yield stack.enter_context(_dask(settings, address))
+            yield DaskEngine(_dask_client(settings, address, stack), settings)
             return
         workers = Workers()
         executor = ThreadPoolExecutor(settings.workers, "rodshell-worker")
@@ -111,30 +111,29 @@ def opened_engine(settings: Settings, address: str | None = None) -> Iterator[En
         yield Engine(executor, workers, settings)
 
 
-@contextmanager
-def _dask(settings: Settings, address: str | None) -> Iterator[Engine]:
+def _dask_client(settings: Settings, address: str | None, stack: ExitStack) -> Any:
+    """A client of the scheduler of `opened_engine`, which is closed with the stack."""
     with needs_package("the engine dask", "distributed", "cluster"):
         import dask
         from distributed import Client, LocalCluster
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    with ExitStack() as stack:
-        given = dask.config.get("scheduler-address", None) if address is None else address
-        if given is None:
-            HERE.open()
-            cluster = LocalCluster(
-                n_workers=1, threads_per_worker=settings.workers, processes=False, memory_limit=0,
-                dashboard_address=_HERE, worker_dashboard_address=_HERE, scheduler_kwargs={"dashboard": False},
-            )  # fmt: skip
-            place = stack.enter_context(cluster)
-        else:
-            place = _address_in(given) if given.endswith(".json") else given
-        try:
-            client = stack.enter_context(Client(place, timeout=10))  # with TLS as dask's own settings say
-        except (OSError, ValueError, TypeError) as error:
-            raise InputError(f"no dask scheduler answers at {given}: {error}") from None
-        if given is None:
-            stack.callback(HERE.stop)
-        yield DaskEngine(client, settings)
+    given = dask.config.get("scheduler-address", None) if address is None else address
+    if given is None:
+        HERE.open()
+        cluster = LocalCluster(
+            n_workers=1, threads_per_worker=settings.workers, processes=False, memory_limit=0,
+            dashboard_address=_HERE, worker_dashboard_address=_HERE, scheduler_kwargs={"dashboard": False},
+        )  # fmt: skip
+        place = stack.enter_context(cluster)
+    else:
+        place = _address_in(given) if given.endswith(".json") else given
+    try:
+        client = stack.enter_context(Client(place, timeout=10))  # with TLS as dask's own settings say
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"no dask scheduler answers at {given}: {error}") from None
+    if given is None:
+        stack.callback(HERE.stop)
+    return client
 
 
 def _address_in(file: str) -> str:

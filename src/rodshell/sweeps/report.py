@@ -28,7 +28,6 @@ class Page:
     """What a report says.
 
     Args:
-        kind, summary: in its heading.
         first: the two columns that are shown first, across and up.
         measures: columns that say how good a design is; of two the front is shown.
         larger: those of them that are to be large, and not small.

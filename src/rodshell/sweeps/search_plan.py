@@ -66,7 +66,6 @@ class SearchPlan(Plan):
 
     Args:
         variables: intervals, or lists of values.
-        objectives, constraints: on columns of the table.
     """
 
     variables: tuple[Span | Axis, ...]

@@ -26,20 +26,12 @@ HEADER = "header"  # note of the store: {"keys", "columns"}
 
 
 def header_notes(keys: Sequence[str], columns: Sequence[Column]) -> dict[str, str]:
-    """What the table's columns are, to be noted with the designs.
-
-    Args:
-        columns: in addition to those of every sweep.
-    """
+    """What the table's columns are, in addition to those of every sweep, to be noted with the designs."""
     return {HEADER: json.dumps({"keys": list(keys), "columns": [column.name for column in columns]})}
 
 
 class Sheet:
-    """The table of a store as it is now: the axes' keys, the standard columns, and those that the sweep names.
-
-    Args:
-        more: further columns.
-    """
+    """The table of a store as it is now: the axes' keys, the standard columns, those that the sweep names, and more."""
 
     def __init__(self, store: Store, more: Sequence[str] = ()) -> None:
         self._store = store

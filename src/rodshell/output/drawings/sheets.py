@@ -418,9 +418,9 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         written = Text(words, line[0], TEXT, "TITLE", angle=angle, colour=pen.colour)
         crossed = np.ceil(length_beneath(written.box(), shifts, drawn) / TEXT)
         ordered = shifts[np.argsort(crossed, kind="stable")]
-        if placed := free.first(written._replace(at=line[0] + shift) for shift in ordered):
-            pencil.texts.append(placed)
-        elif aside := _led_aside(words, line, part, pencil.texts, low - OVERLAP, high + OVERLAP):
+        if free.write(pencil, (written._replace(at=line[0] + shift) for shift in ordered)):
+            continue
+        if aside := _led_aside(words, line, part, pencil.texts, low - OVERLAP, high + OVERLAP):
             take(aside, TEXT, free)
             pencil.line(aside.leader(TEXT), "TITLE", pen=Pen(WARNING, 0.18))
             pencil.texts.append(aside.written(TEXT)._replace(layer="TITLE", colour=pen.colour))

@@ -248,10 +248,7 @@ def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None
             Text(number, at + text * np.array([side, up]), size, "LABEL", "start" if side > 0 else "end")
             for up, side in product((0.4, -1.1), (0.5, -0.5))
         )
-        if written := room.first(tried):
-            pencil.texts.append(written)
-        else:
-            left_out += 1
+        left_out += not room.write(pencil, tried)
     pencil.leave_out(left_out, sum(1 for _ in seam_meetings(archive.results)), "numbers of meetings (table Seams)")
 
 
