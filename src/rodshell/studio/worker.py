@@ -26,8 +26,7 @@ from rodshell.errors import InputError, RodshellError
 from rodshell.form import Form
 from rodshell.job import Job
 from rodshell.progress import Progress
-from rodshell.studio.preview import Preview
-from rodshell.studio.showing import checked
+from rodshell.studio.preview import Preview, checked
 from rodshell.threads import work_for_parent
 
 _TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"

@@ -52,13 +52,10 @@ class Sheet:
                     raise ValueError(
                         f"its design {design.position} has {len(design.keys)} values for {len(self.keys)} keys"
                     )
-            standard = [design.row.get(name) for name in STANDARD]
-            cells = [*design.keys, *standard, *(_cell(design, column) for column in self._columns)]
+            kept = design.row.get("results", {})
+            more = (design.job if column.name == JOB else column.of(kept) for column in self._columns)
+            cells = [*design.keys, *(design.row.get(name) for name in STANDARD), *more]
             yield design, dict(zip(self.names, cells, strict=True))
-
-
-def _cell(design: Finished, column: Column) -> Any:
-    return design.job if column.name == JOB else column.of(design.row.get("results", {}))
 
 
 class Table:

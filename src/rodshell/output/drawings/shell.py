@@ -181,7 +181,8 @@ def supports_drawing(archive: Archive, text: float) -> Drawing:
         pencil.line([end, end + TICK * text * way], "MARK", pen=tick)
         room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
     lines = segments(_thinned(_thinned(curve)) for curve in curves)  # what names keep clear of
-    alone = ~np.isin(names, list(_sewn(archive)))
+    on_seams = [end for _, meeting in seam_meetings(archive.results) for end in meeting.ends]  # these have numbers
+    alone = ~np.isin(names, on_seams)
     for seam in (run for loop in outlines_of(archive) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
     walks, left_out = list(_walks(outlines_of(archive), ends, alone)), 0
@@ -232,11 +233,6 @@ def _runs(loop: Ints, alone: Bools) -> list[Ints]:
     turned = np.roll(loop, -int(np.argmin(alone[loop])))
     parts = [run[alone[run]] for run in np.split(turned, np.flatnonzero(~alone[turned]))]
     return [run for run in parts if len(run)]
-
-
-def _sewn(archive: Archive) -> set[str]:
-    """The rod ends on seams; these have the number of their meeting instead of a name."""
-    return {end for seam in archive.results.seams for meeting in seam.meetings for end in meeting.ends}
 
 
 def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None:

@@ -153,18 +153,13 @@ class Drawn:
         return grid.laid_out(flat, final, ends)
 
 
-def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
-    """All shapes of an archive, the draped one among them; None where it has no shape in space.
-
-    Args:
-        schedules: whether rods and joints have the rows of the schedules with them, which takes most of the time.
-    """
+def scene_of(archive: Archive) -> Scene | None:
+    """All shapes of an archive, the draped one among them; None where it has no shape in space."""
     rods = grid.meshed_rods(archive)
     names = sorted(grid.shape_names(archive), key=lambda name: name != DRAPED) if rods else []
     if len(names) < 2:
         return None
     joints, shapes = grid.joint_entries(archive), [grid.shape_of(archive, name) for name in names]
-    tables = {kind: SCHEDULES[f"{kind}s"].brief(archive) for kind in ("rod", "joint") if schedules}
     target = archive.states.get("target_points")
     return Drawn(
         archive.name,
@@ -177,7 +172,7 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
         partial(section_outline, archive.results.rod.section if archive.results.rod else None),
         None if target is None else (target, archive.states["target_faces"]),
         _reactions(archive, rods),
-        {kind: _rows(table) for kind, table in tables.items()},
+        {kind: _rows(SCHEDULES[f"{kind}s"].brief(archive)) for kind in ("rod", "joint")},
         _widths(archive, rods),
     ).scene()
 
