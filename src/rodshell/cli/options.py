@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, wraps
 from itertools import pairwise
 from typing import Any
 
@@ -128,9 +128,17 @@ _LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kin
 
 
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The options of `RunOptions`, with the help of --out; read them with `read_output_options`."""
+    """The options of `RunOptions`, with the help of --out; a command gets them as `output`.
+
+    It raises an InputError where there is no such kind of file, or the time limit is not a time, or not a positive one.
+    """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        def with_output(*, out, only, time_limit, force, as_json, quiet, **values):  # type: ignore[no-untyped-def]
+            output = RunOptions(out, wanted_kinds(only), seconds_of(time_limit), force, as_json, quiet)
+            return command(output=output, **values)
+
+        found: Callable[..., Any] = wraps(command)(with_output)
         options = (
             click.option("--out", "-o", metavar="DIR", help=out),
             click.option("--only", metavar="KINDS", help=_ONLY),
@@ -140,23 +148,10 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
             QUIET,
         )
         for option in reversed(options):
-            command = option(command)
-        return command
+            found = option(found)
+        return found
 
     return decorate
-
-
-def read_output_options(values: dict[str, Any]) -> RunOptions:
-    """Take these options out of the `values` of a command.
-
-    Raises:
-        InputError: there is no such kind of file; the time limit is not a time, or not a positive one.
-    """
-    kinds = wanted_kinds(values.pop("only"))
-    limit = seconds_of(values.pop("time_limit"))
-    return RunOptions(
-        kinds=kinds, limit=limit, **{name: values.pop(name) for name in ("out", "force", "as_json", "quiet")}
-    )
 
 
 def wanted_kinds(only: str | None) -> list[str] | None:

@@ -31,15 +31,8 @@ from rodshell.results.wording import FINEST, Rounding, rounding_of
 from rodshell.rods.supports import finals_first
 
 Table = dict[str, list[str]]  # the cells of each column, from row to row
-UNITS = {
-    "Nm2": "N m\N{SUPERSCRIPT TWO}",
-    "mm": "mm",
-    "kg": "kg",
-    "MPa": "MPa",
-    "deg": "\N{DEGREE SIGN}",
-    "N": "N",
-    "Nm": "N m",
-}
+UNITS = {"Nm2": "N m\N{SUPERSCRIPT TWO}", "deg": "\N{DEGREE SIGN}", "Nm": "N m"}
+UNITS |= {unit: unit for unit in ("mm", "kg", "MPa", "N")}
 UNKNOWN = (np.nan, np.nan, np.nan)  # force
 FINE, OF_SHORTENING = 0.1, 20.0  # mm, of cables whose shortening is under so many steps of the other lengths
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI

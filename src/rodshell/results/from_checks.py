@@ -236,13 +236,9 @@ def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
     states: dict[str, NDArray[Any]] = {}
     for name, by_ends in checks.shells.items():
         for ends, shell in by_ends.items():
-            states[f"loaded_{ends}_{name}"] = shell.positions
-            if shell.stress is not None:
-                states[f"loaded_stress_{ends}_{name}"] = shell.stress
-            if shell.mode is not None:
-                states[f"loaded_mode_{ends}_{name}"] = shell.mode
-            for k, mode in enumerate(shell.modes):
-                states[f"loaded_buckling_{ends}_{name}_{k + 1}"] = mode
+            found = {"": shell.positions, "stress_": shell.stress, "mode_": shell.mode}
+            states |= {f"loaded_{what}{ends}_{name}": each for what, each in found.items() if each is not None}
+            states |= {f"loaded_buckling_{ends}_{name}_{k}": mode for k, mode in enumerate(shell.modes, start=1)}
     return states
 
 

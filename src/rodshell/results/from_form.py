@@ -214,16 +214,15 @@ def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, s
         for (k, other), distance in zip((pair, pair[::-1]), at, strict=True):
             name, start = footprint.rods[other].name, footprint.rods[k].start
             joints[k].append(figures.RodJoint(other=name, at=distance - start))
-    rods = [
-        figures.Rod.taken_from(rod, id=rod.name, joints=tuple(sorted(on_rod, key=lambda joint: joint.at)))
-        for rod, on_rod in zip(footprint.rods, joints, strict=True)
-    ]
-    for k, rod in enumerate(footprint.rods):
+    rods = list[figures.Rod]()
+    for rod, on_rod in zip(footprint.rods, joints, strict=True):
+        more: dict[str, Any] = {"joints": tuple(sorted(on_rod, key=lambda joint: joint.at))}
         if rod.profile is not None:
-            rods[k] = rods[k].changed(stiffness=_stiffness(rod.profile, rod.length, kind))
+            more["stiffness"] = _stiffness(rod.profile, rod.length, kind)
         if rod.curve is not None:
             at, curvatures = rod.curve.between(rod.start, rod.end)
-            rods[k] = rods[k].changed(rest_curvature=figures.RestCurvature(at=at, curvatures=curvatures))
+            more["rest_curvature"] = figures.RestCurvature(at=at, curvatures=curvatures)
+        rods.append(figures.Rod.taken_from(rod, id=rod.name, **more))
     return {
         "rods": tuple(rods),
         "dropped": tuple(figures.Dropped(id=name, reason=reason) for name, reason in dropped),
