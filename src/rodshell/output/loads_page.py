@@ -219,7 +219,7 @@ def _foundation(results: Results, shell: LoadedShell) -> Row:
     load, held = (np.zeros(3) if total is None else np.nan_to_num(total) for total in sums)
     across = np.linalg.norm(forces[:, :2], axis=1)
     down = largest_at(forces[:, 2])
-    names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
+    names = results.rod_ends
     lifted = f"{_kilo(shell.uplift)} at {names[largest_at(-forces[:, 2])]}" if shell.uplift else "none"
     return {
         "Loads x, y, z": ", ".join(map(_kilo, load)),

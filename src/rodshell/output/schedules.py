@@ -267,7 +267,7 @@ def foundations_table(archive: Archive) -> Table:
     it exerts on the unloaded shell; the foundation carries the opposite.
     """
     results = archive.results
-    table = {"id": [f"{rod.id}.{end}" for rod in rods_of(archive) for end in (0, 1)]}
+    table = {"id": results.rod_ends}
     table |= _by_axis("", "_mm", results.boundary, rounding_of(results).mm)
     for name, ends, shell in results.loaded_shells():
         table |= _by_axis("force_", f"_N_{ends}_{name}", shell.support_forces, _six)

@@ -168,13 +168,12 @@ def axes(pencil: Pencil, text: float) -> None:
 
 def supports_drawing(archive: Archive, text: float) -> Drawing:
     """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
-    pencil, drawn = Pencil(), meshed_rods(archive)
+    pencil, names = Pencil(), archive.results.rod_ends
     _seen_from_above(pencil, archive, text)
     curves = [curve[:, :2] for curve in final_curves(archive)]
     ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
     arrives = np.array([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).reshape(-1, 2)
     arrives /= np.maximum(np.linalg.norm(arrives, axis=1), 1e-9)[:, None]
-    names = [f"{rod.id}.{end}" for rod in drawn for end in (0, 1)]
     room, tick = Room(4 * text), Pen(LAYERS["MARK"].colour, 0.12 * text)
     for name, end, way in zip(names, ends, arrives, strict=True):
         pencil.mark(end, RADIUS * text, "MARK", note=name)
@@ -261,8 +260,8 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     assert final is not None
     _seen_from_above(pencil, archive, text)
     joints = joint_places(archive, archive.states[final])
-    supports = [f"{rod.id}.{end}" for rod in archive.results.rods for end in (0, 1)]
-    joints |= {name: np.array(place) for name, place in zip(supports, archive.results.boundary, strict=False)}
+    supports = zip(archive.results.rod_ends, archive.results.boundary, strict=False)
+    joints |= {name: np.array(place) for name, place in supports}
     braces = [brace for brace in archive.results.bracing if {brace.start, brace.end} <= joints.keys()]
     ends = 1e3 * np.array([[joints[end][:2] for end in (brace.start, brace.end)] for brace in braces])
     ends = ends.reshape(-1, 2, 2)
