@@ -234,8 +234,7 @@ def seams_table(archive: Archive) -> Table:
 def bracing_table(archive: Archive) -> Table:
     """One row a diagonal: its length flat and in the final shape, of cables also free of stress; where loads were
     checked the force that a cable is to be stressed to, its axial force under each combination, tension positive, and
-    which leave it slack.
-    """
+    which leave it slack."""
     results, rounding = archive.results, rounding_of(archive.results)
     mm, braces = rounding.mm, results.bracing
     table = {
@@ -264,8 +263,7 @@ def bracing_table(archive: Archive) -> Table:
 
 def foundations_table(archive: Archive) -> Table:
     """One row a rod end: its place, and what its support exerts on the shell under each combination of loads, with what
-    it exerts on the unloaded shell; the foundation carries the opposite.
-    """
+    it exerts on the unloaded shell; the foundation carries the opposite."""
     results = archive.results
     table = {"id": results.rod_ends}
     table |= _by_axis("", "_mm", results.boundary, rounding_of(results).mm)

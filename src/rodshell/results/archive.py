@@ -38,11 +38,8 @@ PARTS = ".gltf"
 
 
 def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> dict[str, bytes]:
-    """The contents of the files that a case names and that are to be kept with its result, by the path in the case.
-
-    Args:
-        where: the place of a file by its path in the case; None for one that is not read.
-    """
+    """The contents of the files that a case names and that are to be kept with its result, by the path in the case;
+    `where` gives the place of a file by that path, or None for one that is not read."""
     found, left = dict[str, bytes](), ALL_COPIES
     for name in _names(case_toml):
         path = where(name)

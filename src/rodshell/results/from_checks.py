@@ -231,8 +231,7 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
 
 def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
     """What states.npz holds of them: node positions (n, 3) [m] and stress (k,) [Pa], the mode at the limit and the
-    lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter".
-    """
+    lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter"."""
     states: dict[str, NDArray[Any]] = {}
     for name, by_ends in checks.shells.items():
         for ends, shell in by_ends.items():

@@ -108,8 +108,7 @@ def foreign(folder: Path, marks: Mapping[str, Mark | None]) -> list[str]:
 
 def _behind(folder: Path, name: str) -> str | None:
     """The first of the folders above a name that is in fact something else; another mount too, into which files cannot
-    be moved in one step.
-    """
+    be moved in one step."""
     return next((part for part in above(name) if is_no_folder(folder / part)), None)
 
 

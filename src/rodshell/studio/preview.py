@@ -36,11 +36,7 @@ class Preview:
         self._kept: tuple[Target, Floats, Surface] | None = None  # with the box, in plan, of the shell of the triangles
 
     def of(self, form: Form) -> tuple[dict[str, Any], bytes]:
-        """Facts and scene of a form.
-
-        Args:
-            form: of a target; with or without popped-up shells.
-        """
+        """Facts and scene of a form on a target, with or without popped-up shells."""
         return facts(form), self._scene(form)
 
     def _scene(self, form: Form) -> bytes:
