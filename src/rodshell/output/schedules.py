@@ -18,7 +18,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.figures.checks import JointLoad
 from rodshell.figures.fabrication import Stock
-from rodshell.figures.form import Meeting, Stiffness
+from rodshell.figures.form import Bent, Meeting, Stiffness
 from rodshell.figures.records import printable
 from rodshell.geometry.frames import unit
 from rodshell.output.blanks import boards_of
@@ -78,10 +78,10 @@ def rods_table(archive: Archive) -> Table:
         "max_geodesic_curvature_per_m": lambda rod: _significant(rod.record.geodesic_curvature),
         "max_twist_deg_per_m": lambda rod: _significant(rod.record.twist_rate, 180 / pi),
         "max_strain": lambda rod: _number(rod.record.max_strain, 6),
-        "max_stress_MPa": lambda rod: _mpa(rod.record.max_stress),
-        "max_torsion_stress_MPa": lambda rod: _mpa(rod.record.torsion_stress),
-        "max_stress_pop_up_MPa": lambda rod: _mpa(rod.record.pop_up.max_stress if rod.record.pop_up else None),
-        "utilisation_pop_up": lambda rod: _number(rod.record.pop_up.utilisation if rod.record.pop_up else None, 3),
+        "max_stress_MPa": lambda rod: _significant(rod.record.max_stress, 1e-6),
+        "max_torsion_stress_MPa": lambda rod: _significant(rod.record.torsion_stress, 1e-6),
+        "max_stress_pop_up_MPa": lambda rod: _significant((rod.record.pop_up or Bent()).max_stress, 1e-6),
+        "utilisation_pop_up": lambda rod: _number((rod.record.pop_up or Bent()).utilisation, 3),
         "splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.record.splices),
         "second_laths_mm": lambda rod: "; ".join(mm(stop - start) for start, stop in laths_on(rod.record)),
         "second_laths_splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
@@ -348,10 +348,6 @@ def _degrees(a: Floats, b: Floats) -> Floats:
     a, b = unit(a), unit(b)
     apart, together = np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)
     return np.asarray(np.degrees(2.0 * np.arctan2(apart, together)))
-
-
-def _mpa(value: float | None) -> str:
-    return _significant(value, 1e-6)
 
 
 def _significant(value: float | None, unit: float = 1.0) -> str:
