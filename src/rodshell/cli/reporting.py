@@ -4,8 +4,7 @@ import json
 import os
 import shutil
 import threading
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Callable
 from dataclasses import dataclass
 from glob import escape
 from itertools import count
@@ -147,9 +146,10 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
         formed_before: the form is on disk already; where its loads cannot be checked it is not written again.
     """
     from rodshell.output.files import reserved, save
+    from rodshell.results.folder import open_folder
 
     names = ["result.json", "states.npz", *_names_of(case), *reserved(output.kinds)]
-    with output_folder(output.out, name, names, force=output.force) as place:
+    with open_folder(output.out or default_folder(name), reserved=names, force=output.force) as place:
         compile_before_first(quiet=output.quiet)
         from rodshell.job import Job
 
@@ -172,6 +172,11 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
             refused,
         )
         return deliver(outcome, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+
+
+def default_folder(name: str) -> Path:
+    """Where the result of a case, or a figure of the paper, is written unless a folder is given."""
+    return Path("out") / Path(name).stem
 
 
 def _names_of(case: Case) -> list[str]:
@@ -205,16 +210,6 @@ def _offer(form: "Form", progress: Progress, in_time: ProgressFunction) -> str:
     with progress:
         found = offer(form.stages, progress=in_time)
     return "" if found is None else found.words
-
-
-def output_folder(
-    out: str | None, name: str, names: Iterable[str], *, force: bool
-) -> "AbstractContextManager[ResultFolder]":
-    """The folder for a result, by default out/NAME, opened before the job starts; `names` are reserved in it, see
-    `open_folder`."""
-    from rodshell.results.folder import open_folder
-
-    return open_folder(out or Path("out") / Path(name).stem, reserved=names, force=force)
 
 
 def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_json: bool, quiet: bool) -> int:

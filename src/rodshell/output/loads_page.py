@@ -203,11 +203,8 @@ def _modes(archive: Archive, shells: Shells) -> Iterator[tuple[str, Ends, str]]:
     for k, factor in enumerate(shell.mode_factors[:_MOST_MODES].tolist(), start=1):
         state = f"loaded_buckling_{ends}_{name}_{k}"
         if state in archive.states and not isnan(factor):
-            yield (
-                f"Linear buckling mode {k} under {name}, {ends} ends: at {shown_factor(factor)} times the loads",
-                ends,
-                state,
-            )
+            at = f"at {shown_factor(factor)} times the loads"
+            yield f"Linear buckling mode {k} under {name}, {ends} ends: {at}", ends, state
     if (state := f"loaded_mode_{ends}_{name}") in archive.states:
         yield f"How the shell gives way under {name}, {ends} ends: {shell.limit_kind}", ends, state
 

@@ -60,11 +60,7 @@ class Constraint:
 
 @dataclass(frozen=True)
 class SearchPlan(Plan):
-    """A whole search; its keys are "generation" and those of its variables.
-
-    Args:
-        variables: intervals, or lists of values.
-    """
+    """A whole search; its keys are "generation" and those of its variables, which are intervals or lists of values."""
 
     variables: tuple[Span | Axis, ...]
     objectives: tuple[Objective, ...]

@@ -49,7 +49,6 @@ class Finished:
     """A design whose job is finished.
 
     Args:
-        job: its identity.
         keys: values of the axes' keys, in JSON's types.
         outcome: "found", "refused" (bad input), "failed" (an error of the program), "stopped" (by a limit) or
             "crashed".
