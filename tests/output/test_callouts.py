@@ -65,7 +65,7 @@ def test_every_support_is_read_by_its_own_name(name: str, share: float) -> None:
     """Supports within a millimetre of each other may be read for one another: no drawing tells them apart."""
     made = formed(name)
     plan, supports = flat_plan(made), supports_of(made)
-    drawing = supports_drawing(made, plan, share * plan.text)
+    drawing = supports_drawing(made, share * plan.text)
     ends = np.array([made.states[made.final or ""][rod.nodes[[0, -1]], :2] for rod in plan.rods]).reshape(-1, 2)
     labels = [text for text in drawing.texts if text.text in supports]
     assert sorted(text.text for text in labels) == sorted(supports)
@@ -83,7 +83,7 @@ def test_every_support_is_read_by_its_own_name(name: str, share: float) -> None:
 def test_no_line_to_a_name_crosses_another_or_runs_through_a_name(name: str) -> None:
     made = formed(name)
     plan = flat_plan(made)
-    drawing = supports_drawing(made, plan, plan.text)
+    drawing = supports_drawing(made, plan.text)
     ends = np.array([made.states[made.final or ""][rod.nodes[[0, -1]], :2] for rod in plan.rods]).reshape(-1, 2)
     lines = [path.points for path in drawing.paths if path.layer == "DIM" and path.flat]
     lines = [line for line in lines if np.linalg.norm(1e3 * ends - line[0], axis=1).min() < 1e-6]
@@ -101,7 +101,7 @@ def test_no_line_to_a_name_crosses_another_or_runs_through_a_name(name: str) -> 
 def test_names_stand_outside_the_shell(name: str) -> None:
     """Beyond the sides of the roof, or in the opening: on no rod."""
     made = formed(name)
-    drawing = supports_drawing(made, flat_plan(made), flat_plan(made).text)
+    drawing = supports_drawing(made, flat_plan(made).text)
     rods = np.concatenate([1e3 * made.states[made.final or ""][rod.nodes, :2] for rod in flat_plan(made).rods])
     for text in drawing.texts:
         if text.text in supports_of(made):

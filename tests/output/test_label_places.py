@@ -90,7 +90,7 @@ def turns(outline: Floats) -> Floats:
 def test_the_edge_of_a_sewn_shell_has_no_notches_at_its_seam() -> None:
     """Around a dome of two patches it is convex, passes every rod end that is not sewn once, and no seam."""
     made, plan = named("sewn")
-    drawing = supports_drawing(made, plan, plan.text)
+    drawing = supports_drawing(made, plan.text)
     (edge,) = (path.points for path in drawing.paths if path.layer == "BOUNDARY-FINAL" and path.closed)
     meetings = 1e3 * np.array([one["point"][:2] for seam in made.results.plain()["seams"] for one in seam["meetings"]])
     assert len(edge) + 2 * len(meetings) == 2 * len(plan.rods)

@@ -68,8 +68,8 @@ def test_the_result_has_the_figures_before_and_after_and_the_refined_rods() -> N
 def test_the_viewer_has_the_widths_of_tapered_rods() -> None:
     """EI of round rods is as the fourth power of their diameter; nodes are as far along as the flat grid says."""
     kept = form().unchecked()
-    scene = scene_of(kept, schedules=False)
-    plain = scene_of(job("").run(until="pop-up").unchecked(), schedules=False)
+    scene = scene_of(kept)
+    plain = scene_of(job("").run(until="pop-up").unchecked())
     assert scene is not None
     assert plain is not None
     assert "widths" not in plain.header

@@ -10,8 +10,7 @@ import pytest
 import rodshell as rs
 from rodshell.output.grid import rods_of
 from rodshell.output.viewer import scene_of
-from rodshell.studio.preview import Preview
-from rodshell.studio.showing import checked
+from rodshell.studio.preview import Preview, checked
 from tests.acceptance.targets_broken import as_obj, dome
 
 DOME: dict[str, Any] = {
@@ -49,7 +48,7 @@ def read(content: bytes) -> tuple[dict[str, Any], Any]:
 def test_a_preview_shows_what_the_archive_shows(case: dict[str, Any], until: Any) -> None:
     form = rs.Job.load(case).run(until=until)
     _, content = Preview().of(form)
-    kept = scene_of(form.unchecked(), schedules=False)
+    kept = scene_of(form.unchecked())
     assert kept is not None
     (ours, our_array), (theirs, their_array) = read(content), read(kept.content())
     for name in ("name", "rods", "kinds", "palettes", "outline", "size", "low", "box"):
@@ -79,7 +78,7 @@ def test_a_target_far_from_the_origin_is_shown_as_large_as_one_at_it(tmp_path: P
     sizes = []
     for move in ([0.0, 0.0, 0.0], [50.0, 20.0, 3.0]):
         form = rs.Job.load({"target": {**target, "move": move}, "layout": {"spacing": 2.0}}).run(until="drape")
-        kept = scene_of(form.unchecked(), schedules=False)
+        kept = scene_of(form.unchecked())
         assert kept is not None
         for content in (Preview().of(form)[1], kept.content()):
             header, array = read(content)

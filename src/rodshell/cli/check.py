@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import click
 
 from rodshell.case import load_case
-from rodshell.cli.options import CaseCommand, output_options, read_output_options
+from rodshell.cli.options import CaseCommand, RunOptions, output_options
 from rodshell.cli.reporting import run_and_deliver
 from rodshell.errors import InputError
 from rodshell.units import shown
@@ -17,14 +16,13 @@ from rodshell.units import shown
 @click.argument("source", metavar="DIR|CASE")
 @click.option("--loads", metavar="FILE", help="File with [[loads]] and [[combinations]], in place of the case's own.")
 @output_options("Folder for the results; default DIR, or out/CASE.")
-def command(source: str, loads: str | None, **values: Any) -> int:
+def command(source: str, loads: str | None, output: RunOptions) -> int:
     """Check a shell under loads: deflections, reactions, stability and utilisation under each combination.
 
     DIR is an earlier result, whose case is run again. CASE is a case file or the name of a built-in case. The loads are
     those of the case, or of FILE, which has tables [[loads]], [[combinations]], [bracing], [locked_joints],
     [stability] and [strength].
     """
-    output = read_output_options(values)
     path = Path(source)
     if path.is_dir() and not (path / "case.toml").is_file():
         raise InputError(

@@ -5,24 +5,19 @@ from typing import Any
 import click
 
 from rodshell.case import BUILT_IN, load_case
-from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
+from rodshell.cli.options import UNITS, CaseCommand, RunOptions, case_options, output_options, overrides_of
 from rodshell.cli.reporting import run_and_deliver
 
 
-@click.command(
-    cls=CaseCommand,
-    params=case_options(),
-    epilog='Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.',
-)
+@click.command(cls=CaseCommand, params=case_options(), epilog=UNITS)
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE")
 @output_options("Folder for the results; default out/NAME.")
-def command(name: str, **values: Any) -> int:
+def command(name: str, output: RunOptions, **values: Any) -> int:
     """Find the flat grid that pops up into a target: drape, trim, map back, pop up, compare.
 
     NAME is a built-in case: {names}. CASE.toml is a case file. SURFACE is a mesh (OBJ, STL, PLY, OFF,
     glTF), a surface from Rhino (3dm) or from STEP, or heights (CSV, PNG). Each key of a case file is also an option.
     """
-    output = read_output_options(values)
     return run_and_deliver(load_case(name, overrides_of(values)), name, output)
 
 

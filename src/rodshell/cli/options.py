@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, wraps
 from itertools import pairwise
 from typing import Any
 
@@ -15,23 +15,11 @@ from rodshell.errors import InputError
 from rodshell.quantities import Duration
 from rodshell.schema import value_of, written
 
-ALIASES = {
-    "target.radius": "--radius",
-    "target.formula": "--formula",
-    "target.unit": "--unit",
-    "target.up": "--up",
-    "target.base": "--base",
-    "target.boundary": "--boundary",
-    "layout.rods": "--rods",
-    "layout.spacing": "--spacing",
-    "layout.length": "--length",
-    "layout.edge": "--edge",
-    "layout.rotate": "--rotate",
-    "drape.anchor": "--anchor",
-    "drape.method": "--method",
-    "drape.objective": "--objective",
-    "refine.vary": "--vary",
-}
+ALIASES = {path: f"--{path.partition('.')[2]}" for path in (
+    "target.radius", "target.formula", "target.unit", "target.up", "target.base", "target.boundary",
+    "layout.rods", "layout.spacing", "layout.length", "layout.edge", "layout.rotate",
+    "drape.anchor", "drape.method", "drape.objective", "refine.vary",
+)}  # fmt: skip
 
 
 def _parameter(path: str) -> str:
@@ -125,26 +113,32 @@ class RunOptions:
     quiet: bool
 
 
-FORCE = click.option(
-    "--force",
-    is_flag=True,
-    help="Also replace files that rodshell did not write, or that were changed since.",
-)
+_REPLACE = "Also replace files that rodshell did not write, or that were changed since."
+FORCE = click.option("--force", is_flag=True, help=_REPLACE)
 ADDRESS = click.option(
     "--address",
     metavar="ADDRESS",
     help="Compute on a dask cluster: tcp://HOST:PORT or tls://HOST:PORT of its scheduler, or its scheduler file. What "
     "answers there can run any program here.",
 )
+UNITS = 'Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.'
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 _ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
 _LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kinds of files that are not are named.'
 
 
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The options of `RunOptions`, with the help of --out; read them with `read_output_options`."""
+    """The options of `RunOptions`, with the help of --out; a command gets them as `output`.
+
+    It raises an InputError where there is no such kind of file, or the time limit is not a time, or not a positive one.
+    """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        def with_output(*, out, only, time_limit, force, as_json, quiet, **values):  # type: ignore[no-untyped-def]
+            output = RunOptions(out, wanted_kinds(only), seconds_of(time_limit), force, as_json, quiet)
+            return command(output=output, **values)
+
+        found: Callable[..., Any] = wraps(command)(with_output)
         options = (
             click.option("--out", "-o", metavar="DIR", help=out),
             click.option("--only", metavar="KINDS", help=_ONLY),
@@ -154,23 +148,10 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
             QUIET,
         )
         for option in reversed(options):
-            command = option(command)
-        return command
+            found = option(found)
+        return found
 
     return decorate
-
-
-def read_output_options(values: dict[str, Any]) -> RunOptions:
-    """Take these options out of the `values` of a command.
-
-    Raises:
-        InputError: there is no such kind of file; the time limit is not a time, or not a positive one.
-    """
-    kinds = wanted_kinds(values.pop("only"))
-    limit = seconds_of(values.pop("time_limit"))
-    return RunOptions(
-        kinds=kinds, limit=limit, **{name: values.pop(name) for name in ("out", "force", "as_json", "quiet")}
-    )
 
 
 def wanted_kinds(only: str | None) -> list[str] | None:

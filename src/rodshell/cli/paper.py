@@ -6,9 +6,10 @@ from pathlib import Path
 import click
 
 from rodshell.cli.options import FORCE, QUIET
-from rodshell.cli.reporting import Progress, compile_before_first, deliver, output_folder
+from rodshell.cli.reporting import Outcome, Progress, compile_before_first, default_folder, deliver
 from rodshell.errors import InputError
 from rodshell.paper import FIGURES, figure_maker, reserved
+from rodshell.results.folder import open_folder
 
 
 @click.command(epilog="Figures: " + "; ".join(f"{name}: {what}" for name, what in FIGURES.items()))
@@ -33,10 +34,10 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
     if given and figure != "genetic":
         raise InputError(f"--{next(iter(given))} is for the figure genetic, not for {figure}: leave it out")
     names = list(FIGURES) if figure == "all" else [figure]
-    folders = [str(Path(out) / name) if out and figure == "all" else out for name in names]
+    folders = [Path(out or "out") / name if figure == "all" else out or default_folder(name) for name in names]
     with ExitStack() as stack:
         result_folders = [
-            stack.enter_context(output_folder(folder, name, reserved(name), force=force))
+            stack.enter_context(open_folder(folder, reserved=reserved(name), force=force))
             for name, folder in zip(names, folders, strict=True)
         ]
         compile_before_first(quiet=quiet)
@@ -44,5 +45,6 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
         for name, place in zip(names, result_folders, strict=True):  # each is written as soon as it is made
             with Progress(quiet=quiet) as progress:
                 made = figure_maker(name)(progress, **given)
-            codes.append(deliver(made, place, progress=progress, as_json=as_json, quiet=quiet))
+            outcome = Outcome(made.status, made.summary(), made.result(), made.save)
+            codes.append(deliver(outcome, place, progress=progress, as_json=as_json, quiet=quiet))
     return max(codes)

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from rodshell.case.load import TABLES_OF_RODS
-from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
+from rodshell.cli.options import CaseCommand, RunOptions, case_options, output_options, overrides_of
 from rodshell.cli.reporting import run_and_deliver
 from rodshell.errors import InputError
 
@@ -17,7 +17,7 @@ from rodshell.errors import InputError
     "--unit", metavar="UNIT", help="Unit of the table's coordinates: m, mm, in, ...; columns that end in _mm need none."
 )
 @output_options("Folder for the results; default out/NAME-popup.")
-def command(source: str, unit: str | None, **values: Any) -> int:
+def command(source: str, unit: str | None, output: RunOptions, **values: Any) -> int:
     """Find the shape of given rods, popped up from flat with pinned ends.
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
@@ -25,7 +25,6 @@ def command(source: str, unit: str | None, **values: Any) -> int:
     as in schedule/rods.csv. A table has ball joints and a rod that is chosen to fit; DIR, an earlier result, keeps its
     own. Each key of [rod], [joint], [checks], [fabrication] and [drawings] is an option that replaces what is kept.
     """
-    output = read_output_options(values)
     from rodshell.job import Job
 
     job = Job.of_table(source, overrides_of(values), unit=unit)

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from rodshell.case import Case, load_case
-from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
+from rodshell.cli.options import UNITS, CaseCommand, RunOptions, case_options, output_options, overrides_of
 from rodshell.cli.reporting import run_and_deliver
 from rodshell.errors import InputError
 from rodshell.rods.supports import SUPPORTS
@@ -17,17 +17,13 @@ LATER = ("pop_up", "refine", "checks", "fabrication", "drawings")  # tables that
 VARY = "taper"  # where neither the command nor the case says
 
 
-@click.command(
-    cls=CaseCommand,
-    params=case_options(),
-    epilog='Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.',
-)
+@click.command(cls=CaseCommand, params=case_options(), epilog=UNITS)
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE|DIR")
 @click.option(
     "--ends", metavar="pinned|clamped", help="Supports of the refined shell; default: as the case says, or pinned."
 )
 @output_options("Folder for the results; default out/NAME-refined.")
-def command(name: str, ends: str | None, **values: Any) -> int:
+def command(name: str, ends: str | None, output: RunOptions, **values: Any) -> int:
     """Bring a form nearer to its target: vary its rods, and accept only what can be built.
 
     NAME, CASE.toml and SURFACE are those of rodshell form; DIR is an earlier result, whose case is run again. --vary
@@ -38,7 +34,6 @@ def command(name: str, ends: str | None, **values: Any) -> int:
     A design is accepted if it lies flat, pops up from flat to the same shape, does not depend on the mesh, and stays
     stable and near its target when it is built with errors; else the form stays as it was.
     """
-    output = read_output_options(values)
     overrides = overrides_of(values)
     path = Path(name)
     if path.is_dir():

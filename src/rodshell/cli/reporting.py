@@ -4,15 +4,14 @@ import json
 import os
 import shutil
 import threading
-from collections.abc import Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Callable
 from dataclasses import dataclass
 from glob import escape
 from itertools import count
 from pathlib import Path
 from shlex import quote
 from time import monotonic
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import click
 
@@ -28,7 +27,6 @@ from rodshell.progress import Progress as ProgressFunction
 
 if TYPE_CHECKING:
     from rodshell.form import Form
-    from rodshell.results import Archive
     from rodshell.results.folder import ResultFolder
 
 UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one"
@@ -121,56 +119,23 @@ def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
         return compile_kernels(tell, every=every)
 
 
-class Result(Protocol):
-    """What every job returns. `status` is "converged" or says why not."""
-
-    @property
-    def status(self) -> str: ...
-    def summary(self) -> str:
-        """One screen of text."""
-        ...
-
-    def result(self) -> dict[str, Any]:
-        """What result.json holds."""
-        ...
-
-    def save(self, folder: "ResultFolder") -> object: ...
-
-
 @dataclass(frozen=True)
-class Kept:
-    """An archive as a result.
+class Outcome:
+    """What a job has come to.
 
     Args:
-        kinds: of files that are written with it; None: all.
-        more: files by name.
-        progress: while it is written.
-        offer: what a refinement would gain.
+        status: "converged", or why not.
+        summary: one screen of text.
+        content: what result.json holds.
+        save: writes it into a folder.
         refused: why its loads could not be checked.
     """
 
-    archive: "Archive"
-    kinds: list[str] | None
-    more: dict[str, str]
-    progress: ProgressFunction
-    offer: str
-    refused: str
-
-    @property
-    def status(self) -> str:
-        return self.archive.results.status
-
-    def summary(self) -> str:
-        offer = f"\n  refine    {self.offer}" if self.offer else ""
-        return self.archive.summary() + offer
-
-    def result(self) -> dict[str, Any]:
-        return self.archive.results.plain()
-
-    def save(self, folder: "ResultFolder") -> Path:
-        from rodshell.output.files import save
-
-        return save(self.archive, folder, self.kinds, more=self.more, progress=self.progress)
+    status: str
+    summary: str
+    content: dict[str, Any]
+    save: Callable[["ResultFolder"], object]
+    refused: str = ""
 
 
 def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before: bool = False) -> int:
@@ -178,13 +143,13 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
 
     Args:
         name: of the case, by which its folder is called.
-        output: where and what to write.
         formed_before: the form is on disk already; where its loads cannot be checked it is not written again.
     """
-    from rodshell.output.files import reserved
+    from rodshell.output.files import reserved, save
+    from rodshell.results.folder import open_folder
 
     names = ["result.json", "states.npz", *_names_of(case), *reserved(output.kinds)]
-    with output_folder(output.out, name, names, force=output.force) as place:
+    with open_folder(output.out or default_folder(name), reserved=names, force=output.force) as place:
         compile_before_first(quiet=output.quiet)
         from rodshell.job import Job
 
@@ -199,8 +164,19 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
         if form.search is not None and not (output.quiet or output.as_json):
             click.echo(form.search.table())
         offer = "" if output.quiet or output.as_json else _offer(form, progress, in_time)
-        kept = Kept(archive, output.kinds, _pictures(form), in_time, offer, refused)
-        return deliver(kept, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+        outcome = Outcome(
+            archive.results.status,
+            f"{archive.summary()}\n  refine    {offer}" if offer else archive.summary(),
+            archive.results.plain(),
+            lambda folder: save(archive, folder, output.kinds, more=_pictures(form), progress=in_time),
+            refused,
+        )
+        return deliver(outcome, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+
+
+def default_folder(name: str) -> Path:
+    """Where the result of a case, or a figure of the paper, is written unless a folder is given."""
+    return Path("out") / Path(name).stem
 
 
 def _names_of(case: Case) -> list[str]:
@@ -236,43 +212,30 @@ def _offer(form: "Form", progress: Progress, in_time: ProgressFunction) -> str:
     return "" if found is None else found.words
 
 
-def output_folder(
-    out: str | None, name: str, names: Iterable[str], *, force: bool
-) -> "AbstractContextManager[ResultFolder]":
-    """The folder for a result, by default out/NAME; opened before the job starts, see `open_folder`.
-
-    Args:
-        names: patterns of what will be written there.
-    """
-    from rodshell.results.folder import open_folder
-
-    return open_folder(out or Path("out") / Path(name).stem, reserved=names, force=force)
-
-
-def deliver(result: Result, place: "ResultFolder", *, progress: Progress, as_json: bool, quiet: bool) -> int:
-    """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
+def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_json: bool, quiet: bool) -> int:
+    """Save an outcome, print its summary, and return the exit code; not converged wins over not buildable."""
     from rodshell.results.results import LEVELS
     from rodshell.results.wording import CASE, FORM, FORM_AGAIN
 
     Interruption.check()
     with progress:
-        folder = _saved(result, place)
+        folder = _saved(outcome, place)
     again = f"{FORM} {quote(str(folder / CASE))}"
     if as_json:
-        click.echo(json.dumps({"out": str(folder), **result.result()}))
+        click.echo(json.dumps({"out": str(folder), **outcome.content}))
     elif not quiet:
-        click.echo(result.summary().replace(FORM_AGAIN, again))
+        click.echo(outcome.summary.replace(FORM_AGAIN, again))
         click.echo(f"written to {folder}")
-    if isinstance(result, Kept) and result.refused:
-        say(f"error: {result.refused}; the form is in {folder}, without its loads")
+    if outcome.refused:
+        say(f"error: {outcome.refused}; the form is in {folder}, without its loads")
         return BAD_INPUT
-    if result.status != "converged":
-        late = result.status.startswith("out of time")
-        said = result.status if late else f"NOT CONVERGED: {result.status}"
+    if outcome.status != "converged":
+        late = outcome.status.startswith("out of time")
+        said = outcome.status if late else f"NOT CONVERGED: {outcome.status}"
         say(f"{said}; partial results are in {folder}")
         return NOT_CONVERGED
-    verdict = result.result().get("verdict")
-    codes = {"unbuildable": UNBUILDABLE} | ({"unknown": NOT_CONVERGED} if result.result().get("pop_up") else {})
+    verdict = outcome.content.get("verdict")
+    codes = {"unbuildable": UNBUILDABLE} | ({"unknown": NOT_CONVERGED} if outcome.content.get("pop_up") else {})
     if verdict and (level := verdict["level"]) in codes:
         named = LEVELS[level].upper()
         say(f"{named}: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
@@ -280,12 +243,12 @@ def deliver(result: Result, place: "ResultFolder", *, progress: Progress, as_jso
     return FOUND
 
 
-def _saved(result: Result, place: "ResultFolder") -> Path:
+def _saved(outcome: Outcome, place: "ResultFolder") -> Path:
     """Where a result was saved: next to its place, if somebody put files there while the job ran."""
     from rodshell.results.folder import ForeignFileError, open_folder
 
     try:
-        result.save(place)
+        outcome.save(place)
         for name in place.kept:
             say(f"kept {place.path / name}: it was changed since an earlier run wrote it")
         return place.path

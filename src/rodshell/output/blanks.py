@@ -80,11 +80,8 @@ def boards_of(archive: Archive, rod: GridRod) -> Iterator[tuple[float, float]]:
 
 
 def curved_blank(archive: Archive, rod: GridRod, start: float, stop: float) -> Blank:
-    """A part of a lath, laid so that its board is as narrow as can be; past its ends its curvature continues.
-
-    Args:
-        start, stop: its cut ends, distances from the rod's start [m].
-    """
+    """A part of a lath between cut ends, distances from the rod's start [m], laid so that its board is as narrow as can
+    be; past its ends its curvature continues."""
     known, along = rod.record.rest_curvature, rod.record.stiffness
     assert known is not None
     turn = max(map(abs, known.curvatures)) * (stop - start)

@@ -157,12 +157,7 @@ def _scale(values: Floats, largest: float, colours: tuple[str, ...], caption: st
 
 
 def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
-    """Draw the map with ticks and caption.
-
-    Args:
-        right: x at which the bar ends [drawing units].
-        y: baseline of the numbers [drawing units].
-    """
+    """Draw the map with ticks and caption; it ends at x = `right`, the baseline of its numbers is y [drawing units]."""
     length = 200.0
     left, step = right - length, length / BINS
     for k, colour in enumerate(scale.palette):  # each under the next: no seams
@@ -177,11 +172,7 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
 
 
 def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
-    """Colours "#rrggbb" in a map of evenly spaced control points.
-
-    Args:
-        shares: (k,) places in the map, from 0 (its first point) to 1 (its last).
-    """
+    """Colours "#rrggbb" at shares (k,) of a map of evenly spaced control points: from 0, the first, to 1, the last."""
     table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
     at = np.linspace(0.0, 1.0, len(points))
     channels = [np.interp(shares, at, table[:, k]) for k in range(3)]

@@ -46,9 +46,7 @@ def save(
         InputError: an unknown kind, or a form in place of its archive. ForeignFileError : such files are there, and
             `force` is False. OutputError : the folder cannot be written.
     """
-    _require_archive(archive)
-    flag("force", force)
-    require_progress(progress)
+    _require(archive, force, progress)
     more = mapping("more", {} if more is None else more, "texts by the names of their files")
     for name, text in more.items():
         instance("the name of each file", name, str, "text")
@@ -90,9 +88,7 @@ def export(
     Raises:
         InputError: as of `save`, or a kind needs a package that is not installed. OutputError : as of `save`.
     """
-    _require_archive(archive)
-    flag("force", force)
-    require_progress(progress)
+    _require(archive, force, progress)
     names = list[str]()
     wanted = wanted_kinds(kinds)
     with open_folder(folder, reserved=reserved(wanted), force=force) as place:
@@ -144,12 +140,14 @@ def _known(kind: object) -> str:
     return kind
 
 
-def _require_archive(value: object) -> None:
-    if not isinstance(value, Archive):
+def _require(archive: object, force: object, progress: object) -> None:
+    if not isinstance(archive, Archive):
         raise InputError(
-            f"archive must be a rodshell Archive, not {described(value)}: a form is written with form.save, or give "
+            f"archive must be a rodshell Archive, not {described(archive)}: a form is written with form.save, or give "
             "form.archive()"
         )
+    flag("force", force)
+    require_progress(progress)
 
 
 def _dxf(archive: Archive) -> Files:
@@ -184,22 +182,10 @@ def _models(archive: Archive, suffix: str, make: Callable[[Archive, str], str | 
         yield f"model/{state}.{suffix}", make(archive, state)
 
 
-def _obj(archive: Archive) -> Files:
-    return _models(archive, "obj", obj_text, shells_among(archive.states))
-
-
-def _gltf(archive: Archive) -> Files:
-    return _models(archive, "glb", glb_bytes, _meshed(archive, archive.final))
-
-
 def _vtp(archive: Archive) -> Files:
     yield from _models(archive, "vtp", vtp_text, _meshed(archive, *shells_among(archive.states)))
     for name, text in time_series(archive):
         yield f"model/{name}", text
-
-
-def _compas(archive: Archive) -> Files:
-    return _models(archive, "json", compas_json, _meshed(archive, archive.final))
 
 
 def _rhino(archive: Archive) -> Files:
@@ -231,7 +217,11 @@ def _report(archive: Archive) -> Files:
 
 
 KINDS: dict[str, Callable[[Archive], Files]] = {
-    "dxf": _dxf, "svg": _svg, "pdf": _pdf, "csv": _csv, "obj": _obj, "gltf": _gltf, "vtp": _vtp, "compas": _compas,
+    "dxf": _dxf, "svg": _svg, "pdf": _pdf, "csv": _csv,
+    "obj": lambda archive: _models(archive, "obj", obj_text, shells_among(archive.states)),
+    "gltf": lambda archive: _models(archive, "glb", glb_bytes, _meshed(archive, archive.final)),
+    "vtp": _vtp,
+    "compas": lambda archive: _models(archive, "json", compas_json, _meshed(archive, archive.final)),
     "3dm": _rhino, "png": _png, "report": _report,
 }  # fmt: skip
 DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another package

@@ -28,7 +28,6 @@ class GridRod:
     """One rod of a result, with its geometry.
 
     Args:
-        record: what the result knows of it.
         course: (k, 2) x, y of points along it in the flat state [m]: its two ends, or more where it bends there.
         nodes: (k,) its nodes in the states, from start to end; empty if the states do not hold them.
     """
@@ -283,8 +282,7 @@ def shape_of(archive: Archive, name: str) -> Shape:
 
 def deployed_shape(archive: Archive, name: str) -> Shape:
     """A shape as the deployment passes it: the flat grid not in the axes of its drawings, but where it is laid out on
-    site before its ends move.
-    """
+    site before its ends move."""
     shape, final = shape_of(archive, name), archive.final
     if not shape.flat or final is None:
         return shape
@@ -293,11 +291,8 @@ def deployed_shape(archive: Archive, name: str) -> Shape:
 
 
 def laid_out(flat: Floats, final: Floats, ends: Ints) -> Floats:
-    """The flat grid (n, 3), moved in its plane to below a shape (n, 3): where its deployment begins.
-
-    Args:
-        ends: (e,) nodes of the rod ends, which come as near as they can to where they end.
-    """
+    """The flat grid (n, 3), moved in its plane to below a shape (n, 3), where its deployment begins: the rod ends, at
+    nodes (e,), come as near as they can to where they end."""
     goals = final[ends]
     return PlanarMotion.onto(flat[ends], goals).moved(flat, float(goals[:, 2].min()))
 

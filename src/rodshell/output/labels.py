@@ -1,7 +1,7 @@
 """Labels that never cover each other, and callouts: names along an outline, each with a line to its place."""
 
+import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from math import cos, hypot, sin
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from scipy.optimize import isotonic_regression
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.boxes import boxes_meet, lines_meet, lines_near
-from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
+from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Pencil, Text
 
 _Extent = tuple[float, float, float, float]
 
@@ -98,9 +98,11 @@ class Room:
             self.take(box)
         return free
 
-    def first(self, texts: Iterable[Text]) -> Text | None:
-        """The first of some texts that finds room, which it takes."""
-        return next((text for text in texts if self.claim(text.box())), None)
+    def write(self, pencil: Pencil, texts: Iterable[Text]) -> bool:
+        """Write the first of some texts that finds room, which it takes; whether one did."""
+        found = next((text for text in texts if self.claim(text.box())), None)
+        pencil.texts += [found] if found else []
+        return found is not None
 
     def join(self, other: "Room") -> None:
         """Take all that the other has taken."""
@@ -249,8 +251,7 @@ MANY = 24  # names: where more find no room, the drawing needs a larger scale, n
 FARTHEST = 8.0  # from a place to the start of its name's line
 
 
-@dataclass(frozen=True, eq=False)
-class Callout:
+class Callout(NamedTuple):
     """A name, and the line (k, 2) to it from its place."""
 
     written: Text
@@ -279,49 +280,27 @@ def callouts(
     Args:
         away: (k, 2) unit vectors from each place to the side where its name is to stand.
     """
-    best: _Tried | None = None
+    best = sys.maxsize, 0.0, list[Label | None](), room  # names without a place; size and labels of all, their room
     for size, gap in ((text * share, gap) for gap in GAPS for share in _CALLOUT_SIZES):
         taken, (starts, ways) = Room(4 * size, room), _slots(points, away, size, gap)
         labels = [_free(*slot, size, taken, lines) for slot in zip(names, points, starts, ways, strict=True)]
-        tried = _Tried(labels, size, taken)
-        best = tried if best is None or tried.missing < best.missing else best
-        if not best.missing or (size <= text * SMALL and best.missing > MANY):
+        best = min(best, (labels.count(None), size, labels, taken), key=lambda tried: tried[0])
+        if not best[0] or (size <= text * SMALL and best[0] > MANY):
             break
-    assert best is not None
-    room.join(best.room)
-    sizes = [text * share for share in _CALLOUT_SIZES if text * share <= best.size]
+    missing, largest, labels, taken = best
+    room.join(taken)
+    sizes = [text * share for share in _CALLOUT_SIZES if text * share <= largest]
     found = list[Callout]()
-    for label, name, place, way in zip(best.labels, names, points, away, strict=True):
+    for label, name, place, way in zip(labels, names, points, away, strict=True):
         if label is not None:
-            found.append(Callout(label.written(best.size), np.vstack([place, label.leader(best.size)])))
-        elif best.missing <= MANY:
-            found += _elsewhere(name, place, way, sizes, room, lines)
+            found.append(Callout(label.written(largest), np.vstack([place, label.leader(largest)])))
+            continue
+        for size in sizes if missing <= MANY else ():
+            if aside := nearby(name, place, way, size, room, lines):
+                take(aside, size, room)
+                found.append(Callout(aside.written(size), aside.leader(size)))
+                break
     return found
-
-
-@dataclass(frozen=True)
-class _Tried:
-    """Names of a size, None for each that found no room, and the room that they take."""
-
-    labels: list[Label | None]
-    size: float
-    room: Room
-
-    @property
-    def missing(self) -> int:
-        return sum(label is None for label in self.labels)
-
-
-def _elsewhere(
-    name: str, place: Floats, way: Floats, sizes: Sequence[float], room: Room, lines: Floats
-) -> list[Callout]:
-    """A name next to its place, in the first of the sizes that finds room, taken with the line to it; or none."""
-    for size in sizes:
-        label = nearby(name, place, way, size, room, lines)
-        if label is not None:
-            take(label, size, room)
-            return [Callout(label.written(size), label.leader(size))]
-    return []
 
 
 def _slots(points: Floats, away: Floats, size: float, gap: float) -> tuple[Floats, Floats]:

@@ -199,11 +199,8 @@ def _modes(archive: Archive, shells: Shells) -> Iterator[tuple[str, Ends, str]]:
     for k, factor in enumerate(shell.mode_factors[:_MOST_MODES].tolist(), start=1):
         state = f"loaded_buckling_{ends}_{name}_{k}"
         if state in archive.states and not isnan(factor):
-            yield (
-                f"Linear buckling mode {k} under {name}, {ends} ends: at {shown_factor(factor)} times the loads",
-                ends,
-                state,
-            )
+            at = f"at {shown_factor(factor)} times the loads"
+            yield f"Linear buckling mode {k} under {name}, {ends} ends: {at}", ends, state
     if (state := f"loaded_mode_{ends}_{name}") in archive.states:
         yield f"How the shell gives way under {name}, {ends} ends: {shell.limit_kind}", ends, state
 
@@ -215,7 +212,7 @@ def _foundation(results: Results, shell: LoadedShell) -> Row:
     load, held = (np.zeros(3) if total is None else np.nan_to_num(total) for total in sums)
     across = np.linalg.norm(forces[:, :2], axis=1)
     down = largest_at(forces[:, 2])
-    names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
+    names = results.rod_ends
     lifted = f"{_kilo(shell.uplift)} at {names[largest_at(-forces[:, 2])]}" if shell.uplift else "none"
     return {
         "Loads x, y, z": ", ".join(map(_kilo, load)),

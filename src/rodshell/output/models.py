@@ -22,18 +22,10 @@ from numpy.typing import NDArray
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import needs_package
 from rodshell.geometry.frames import cross, directors_along, unit
+from rodshell.output import grid
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.drawings.flat import flat_plan
-from rodshell.output.grid import (
-    STAGE,
-    Shape,
-    deployed_shape,
-    joint_places,
-    joints_of,
-    meshed_rods,
-    shape_names,
-    shape_of,
-)
+from rodshell.output.grid import STAGE, Shape
 from rodshell.output.sections import section_outline, section_widths
 from rodshell.output.svg import tag
 from rodshell.results import Archive
@@ -47,14 +39,14 @@ def obj_text(archive: Archive, state: str) -> str:
     nodes = archive.states[state]
     text = f"# rodshell, {state}, metres\n"
     text += len(nodes) * "v %.9f %.9f %.9f\n" % tuple(nodes.ravel().tolist())
-    for rod in meshed_rods(archive):
+    for rod in grid.meshed_rods(archive):
         text += f"o {' '.join(rod.id.split()) or 'rod'}\nl {' '.join(map(str, (rod.nodes + 1).tolist()))}\n"
     return text
 
 
 def vtp_text(archive: Archive, name: str) -> str:
     """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`."""
-    shape, rods = deployed_shape(archive, name), meshed_rods(archive)
+    shape, rods = grid.deployed_shape(archive, name), grid.meshed_rods(archive)
     nodes = archive.states["rod_nodes"]
     offsets = np.cumsum([len(rod.nodes) for rod in rods], dtype=np.int64)
     counts = {"Points": len(nodes), "Lines": len(rods), "Verts": 0, "Strips": 0, "Polys": 0}
@@ -71,13 +63,11 @@ def vtp_text(archive: Archive, name: str) -> str:
 
 def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
     """Names and contents of the stages from flat to popped, and of the collection that ParaView opens."""
-    stages = [name for name in shape_names(archive) if name.startswith(STAGE)]
+    stages = [name for name in grid.shape_names(archive) if name.startswith(STAGE)]
     if not stages:
         return
-    shares = archive.states["history_share"]
-    last = archive.deployed
-    entries = []
-    for share, name in zip(shares.tolist(), ["flat", *stages, last], strict=True):
+    shares, entries = archive.states["history_share"].tolist(), []
+    for share, name in zip(shares, ["flat", *stages, archive.deployed], strict=True):
         yield f"pop_up/{name}.vtp", vtp_text(archive, name)
         entries.append(tag("DataSet", timestep=f"{share:.6f}", group="", part="0", file=f"pop_up/{name}.vtp"))
     yield "pop_up.pvd", _vtk_file("Collection", tag("Collection", *entries))
@@ -108,20 +98,16 @@ def _vtk_file(kind: str, body: str) -> str:
 
 def compas_json(archive: Archive, state: str) -> str:
     """A state of the shell; the graph's nodes are joints, its edges the rods between them."""
-    positions, rods = archive.states[state], meshed_rods(archive)
-    joint_positions = joint_places(archive, positions)
+    positions, rods = archive.states[state], grid.meshed_rods(archive)
+    joint_positions = grid.joint_places(archive, positions)
     lines = [
-        {
-            "dtype": "compas.geometry/Polyline",
-            "data": {"points": positions[rod.nodes].tolist()},
-            "name": rod.id,
-        }
+        {"dtype": "compas.geometry/Polyline", "data": {"points": positions[rod.nodes].tolist()}, "name": rod.id}
         for rod in rods
     ]
     node = {repr(name): dict(zip("xyz", at.tolist(), strict=True)) for name, at in joint_positions.items()}
     edge: dict[str, dict[str, Any]] = {name: {} for name in node}
     on_rod: dict[int, list[tuple[float, str]]] = {}
-    for joint in joints_of(rods):
+    for joint in grid.joints_of(rods):
         for rod_index, at in zip(joint.rods, joint.at, strict=True):
             on_rod.setdefault(rod_index, []).append((at, repr(joint.id)))
     for rod_index, row in on_rod.items():
@@ -186,7 +172,7 @@ def rhino_bytes(archive: Archive) -> bytes:
     for joint, (x, y) in zip(plan.joints, plan.marks.tolist(), strict=True):
         model.Objects.AddPoint(r.Point3d(x, y, 0.0), about("MARK", joint.id))
     if archive.final:
-        for name, at in joint_places(archive, archive.states[archive.final]).items():
+        for name, at in grid.joint_places(archive, archive.states[archive.final]).items():
             model.Objects.AddPoint(r.Point3d(*(1e3 * at).tolist()), about("MARK", name))
     for outline in plan.boundary:
         closed = np.vstack([outline, outline[:1]])
@@ -202,7 +188,7 @@ FLOAT, INDEX, VERTICES, ELEMENTS = 5126, 5125, 34962, 34963  # glTF's numbers fo
 
 def glb_bytes(archive: Archive, state: str) -> bytes:
     """One node, mesh and name for each rod."""
-    shape, rods = shape_of(archive, state), meshed_rods(archive)
+    shape, rods = grid.shape_of(archive, state), grid.meshed_rods(archive)
     section = archive.results.rod.section if archive.results.rod else None
     outline = section_outline(section, float(np.ptp(shape.positions, axis=0).max()))
     scale = scale_of(archive, shape, "gap")

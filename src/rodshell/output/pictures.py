@@ -9,20 +9,10 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.bounds import bounds
+from rodshell.output import grid
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
 from rodshell.output.drawing import FAMILIES, Drawing, Path, Pen, Pencil
-from rodshell.output.grid import (
-    STAGE,
-    Shape,
-    deployed_shape,
-    end_nodes,
-    family_numbers,
-    meshed_rods,
-    opens,
-    outlines_of,
-    shape_names,
-    shape_of,
-)
+from rodshell.output.grid import STAGE, Shape
 from rodshell.output.svg import number, picture_document
 from rodshell.results.archive import Archive, made_once
 from rodshell.results.states import DRAPED, POPPED, is_shell, shells_among
@@ -138,11 +128,11 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 @made_once
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
     """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format."""
-    shape = shape_of(archive, state)
+    shape = grid.shape_of(archive, state)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)
     pencil = Pencil()
-    ends = end_nodes(meshed_rods(archive))
+    ends = grid.end_nodes(grid.meshed_rods(archive))
     front = view.depth(points[ends]) > 0.5
     ground_axes(pencil, view, SOFT, 12.5)
     _ground_curves(pencil, view, shape, archive)
@@ -164,7 +154,7 @@ MODE = 0.06  # of the shell's width: the largest displacement of a mode as it is
 
 def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
     """A mode, an array (n, 3) of the states, drawn as displacements of the shell over the shell as it stands."""
-    shape, pencil = shape_of(archive, POPPED + ends), Pencil()
+    shape, pencil = grid.shape_of(archive, POPPED + ends), Pencil()
     motion = archive.states[state]
     size = MODE * float(np.ptp(shape.positions[:, 0]))
     moved = replace(shape, positions=shape.positions + size * motion / max(float(np.abs(motion).max()), 1e-300))
@@ -177,7 +167,7 @@ def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
 
 def deployment_picture(archive: Archive) -> Drawing:
     """The way from flat to popped up in FRAMES shapes side by side, coloured as of `picture`."""
-    known = shape_names(archive)
+    known = grid.shape_names(archive)
     names = [name for name in known if name.startswith(STAGE) or name in ("flat", archive.deployed)]
     chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
     view, whole, last = _view_of(archive, stages=True), Pencil(), None
@@ -185,7 +175,7 @@ def deployment_picture(archive: Archive) -> Drawing:
     share = (width - 2 * GUTTER) / COLUMNS / WIDTH
     cell = np.array([share * WIDTH, -share * float(view.size[1]) - CAPTION])
     for k, name in enumerate(names[entry] for entry in chosen):
-        shape, ground = deployed_shape(archive, name), Pencil()
+        shape, ground = grid.deployed_shape(archive, name), Pencil()
         scale = scale_of(archive, shape, "stress")
         last = scale or last
         _ground_curves(ground, view, shape, archive)
@@ -228,7 +218,7 @@ def _view_of(archive: Archive, *, stages: bool) -> View:
 def _pieces(archive: Archive, length: float) -> tuple[Ints, Ints, Ints]:
     """Entries (d,) of `rod_nodes` that are drawn, at which of them each piece (s,) of a rod to the next begins, and the
     index (s,) of its rod. A piece has about a length [m]: of rods with shorter edges, nodes are left out evenly."""
-    rods = meshed_rods(archive)
+    rods = grid.meshed_rods(archive)
     whole, edges = sum(rod.length for rod in rods), sum(len(rod.nodes) - 1 for rod in rods)
     stride = max(1, round(length * edges / max(whole, 1e-12)))
     drawn, owner, first = list[int](), list[int](), 0
@@ -264,13 +254,13 @@ class _Rods:
     @staticmethod
     def of(archive: Archive, view: View, shape: Shape, scale: Scale | None, share: float = 1.0) -> "_Rods":
         """Of a shape, whose lengths are drawn at a share of the view's scale."""
-        rods, (drawn, first, of_rod) = meshed_rods(archive), _pieces(archive, PIECE / (share * view.scale))
+        rods, (drawn, first, of_rod) = grid.meshed_rods(archive), _pieces(archive, PIECE / (share * view.scale))
         nodes = archive.states["rod_nodes"][drawn]
         nearness = view.depth(shape.positions)[nodes]
         near = 0.5 * (nearness[first] + nearness[first + 1])
         layer = np.minimum((near * DEPTHS).astype(np.intp), DEPTHS - 1)
         if scale is None:
-            families = family_numbers(rod.family for rod in rods)
+            families = grid.family_numbers(rod.family for rod in rods)
             shade = (np.array(families, dtype=np.intp) % len(FAMILIES))[of_rod]
             palette, fade = list(FAMILIES), 0.0 if shape.flat else FADE
         else:
@@ -318,13 +308,13 @@ def _polylines(first: Ints, layer: Ints, shade: Ints) -> Polylines:
 
 def _ground_curves(pencil: Pencil, view: View, shape: Shape, archive: Archive) -> None:
     """The boundary: closed curves through the rods' ends, openings on top of what they open."""
-    rods = meshed_rods(archive)
-    ends = end_nodes(rods)
-    for loop in outlines_of(archive) if rods else ():
+    rods = grid.meshed_rods(archive)
+    ends = grid.end_nodes(rods)
+    for loop in grid.outlines_of(archive) if rods else ():
         outline = shape.positions[ends[loop]]
         fill = ""
         if np.ptp(outline[:, 2]) < LEVEL * np.ptp(outline[:, :2]):
-            fill = PAPER if opens(np.array([rod.flat for rod in rods]).reshape(-1, 2)[loop]) else GROUND
+            fill = PAPER if grid.opens(np.array([rod.flat for rod in rods]).reshape(-1, 2)[loop]) else GROUND
         pencil.line(view.project(outline), "BOUNDARY-FINAL", closed=True, pen=Pen(SOFT, 1.0, fill=fill))
 
 

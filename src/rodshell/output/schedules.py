@@ -18,7 +18,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.figures.checks import JointLoad
 from rodshell.figures.fabrication import Stock
-from rodshell.figures.form import Meeting, Stiffness
+from rodshell.figures.form import Bent, Meeting, Stiffness
 from rodshell.figures.records import printable
 from rodshell.geometry.frames import unit
 from rodshell.output.blanks import boards_of
@@ -31,15 +31,8 @@ from rodshell.results.wording import FINEST, Rounding, rounding_of
 from rodshell.rods.supports import finals_first
 
 Table = dict[str, list[str]]  # the cells of each column, from row to row
-UNITS = {
-    "Nm2": "N m\N{SUPERSCRIPT TWO}",
-    "mm": "mm",
-    "kg": "kg",
-    "MPa": "MPa",
-    "deg": "\N{DEGREE SIGN}",
-    "N": "N",
-    "Nm": "N m",
-}
+UNITS = {"Nm2": "N m\N{SUPERSCRIPT TWO}", "deg": "\N{DEGREE SIGN}", "Nm": "N m"}
+UNITS |= {unit: unit for unit in ("mm", "kg", "MPa", "N")}
 UNKNOWN = (np.nan, np.nan, np.nan)  # force
 FINE, OF_SHORTENING = 0.1, 20.0  # mm, of cables whose shortening is under so many steps of the other lengths
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
@@ -85,10 +78,10 @@ def rods_table(archive: Archive) -> Table:
         "max_geodesic_curvature_per_m": lambda rod: _significant(rod.record.geodesic_curvature),
         "max_twist_deg_per_m": lambda rod: _significant(rod.record.twist_rate, 180 / pi),
         "max_strain": lambda rod: _number(rod.record.max_strain, 6),
-        "max_stress_MPa": lambda rod: _mpa(rod.record.max_stress),
-        "max_torsion_stress_MPa": lambda rod: _mpa(rod.record.torsion_stress),
-        "max_stress_pop_up_MPa": lambda rod: _mpa(rod.record.pop_up.max_stress if rod.record.pop_up else None),
-        "utilisation_pop_up": lambda rod: _number(rod.record.pop_up.utilisation if rod.record.pop_up else None, 3),
+        "max_stress_MPa": lambda rod: _significant(rod.record.max_stress, 1e-6),
+        "max_torsion_stress_MPa": lambda rod: _significant(rod.record.torsion_stress, 1e-6),
+        "max_stress_pop_up_MPa": lambda rod: _significant((rod.record.pop_up or Bent()).max_stress, 1e-6),
+        "utilisation_pop_up": lambda rod: _number((rod.record.pop_up or Bent()).utilisation, 3),
         "splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.record.splices),
         "second_laths_mm": lambda rod: "; ".join(mm(stop - start) for start, stop in laths_on(rod.record)),
         "second_laths_splices_from_cut_end_mm": lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in _on(rod)),
@@ -241,8 +234,7 @@ def seams_table(archive: Archive) -> Table:
 def bracing_table(archive: Archive) -> Table:
     """One row a diagonal: its length flat and in the final shape, of cables also free of stress; where loads were
     checked the force that a cable is to be stressed to, its axial force under each combination, tension positive, and
-    which leave it slack.
-    """
+    which leave it slack."""
     results, rounding = archive.results, rounding_of(archive.results)
     mm, braces = rounding.mm, results.bracing
     table = {
@@ -271,10 +263,9 @@ def bracing_table(archive: Archive) -> Table:
 
 def foundations_table(archive: Archive) -> Table:
     """One row a rod end: its place, and what its support exerts on the shell under each combination of loads, with what
-    it exerts on the unloaded shell; the foundation carries the opposite.
-    """
+    it exerts on the unloaded shell; the foundation carries the opposite."""
     results = archive.results
-    table = {"id": [f"{rod.id}.{end}" for rod in rods_of(archive) for end in (0, 1)]}
+    table = {"id": results.rod_ends}
     table |= _by_axis("", "_mm", results.boundary, rounding_of(results).mm)
     for name, ends, shell in results.loaded_shells():
         table |= _by_axis("force_", f"_N_{ends}_{name}", shell.support_forces, _six)
@@ -359,10 +350,6 @@ def _degrees(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.degrees(2.0 * np.arctan2(apart, together)))
 
 
-def _mpa(value: float | None) -> str:
-    return _significant(value, 1e-6)
-
-
 def _significant(value: float | None, unit: float = 1.0) -> str:
     """What is weighed or computed, over a unit: four figures, never as 2.55e+04."""
     return "" if value is None else f"{float(f'{unit * value:.4g}'):.10f}".rstrip("0").rstrip(".")
@@ -386,7 +373,6 @@ class Schedule:
     """A schedule: all of it in its file, and the columns for which sheets and pages have room.
 
     Args:
-        title: on sheets.
         wide: patterns of the columns that only the file has.
         optional: patterns of those that only the file has where they say nothing.
         known: whether a result has it.

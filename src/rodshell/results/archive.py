@@ -38,11 +38,8 @@ PARTS = ".gltf"
 
 
 def read_inputs(case_toml: str, where: Callable[[str], Path | None] = Path) -> dict[str, bytes]:
-    """The contents of the files that a case names and that are to be kept with its result, by the path in the case.
-
-    Args:
-        where: the place of a file by its path in the case; None for one that is not read.
-    """
+    """The contents of the files that a case names and that are to be kept with its result, by the path in the case;
+    `where` gives the place of a file by that path, or None for one that is not read."""
     found, left = dict[str, bytes](), ALL_COPIES
     for name in _names(case_toml):
         path = where(name)
@@ -175,9 +172,7 @@ class Archive:
     __hash__ = None  # type: ignore[assignment]
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {
-            "_made": {}
-        }  # which is made again, and whose keys are functions that pickle does not find
+        return self.__dict__ | {"_made": {}}  # made again; its keys are functions that pickle does not find
 
     def __repr__(self) -> str:
         return (
@@ -245,11 +240,12 @@ def put_archive(archive: Archive, place: ResultFolder) -> None:
     Raises:
         OutputError: the folder cannot be written.
     """
+    case, copies = kept_case(archive.case_toml, archive.inputs, place.path)
     place.put("result.json", archive.results.text())
-    if archive.case_toml:
-        place.put("case.toml", kept_case(archive.case_toml, archive.inputs, place.path)[0])
+    if case:
+        place.put("case.toml", case)
     place.put("states.npz", packed(archive.states))
-    for name, content in kept_case(archive.case_toml, archive.inputs, Path())[1].items():
+    for name, content in copies.items():
         place.put(name, content)
 
 

@@ -166,7 +166,7 @@ def open_folder(
     stage, lock = None, None
     try:
         try:
-            made = _make(path)
+            _make(path, made)
             with _locked(path):
                 _recover(path)
                 stage = Path(tempfile.mkdtemp(prefix=STAGE, dir=path))
@@ -246,25 +246,20 @@ def _standing(path: Path, patterns: Iterable[str]) -> list[str]:
     return list(found)
 
 
-def _make(path: Path) -> list[Path]:
-    """Make `path` and the folders above it that are missing; returns those made, the outermost first."""
+def _make(path: Path, made: list[Path]) -> None:
+    """Make `path` and the folders above it that are missing, and list those that were `made`, the outermost first."""
     if path.exists() and not path.is_dir():
         raise OutputError(f"cannot write {path}: it is a file; choose a folder")
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     there = missing[-1].parent if missing else path
     if not there.is_dir():
         raise OutputError(f"cannot write {path}: {there} is a file; choose another folder")
-    made = list[Path]()
     try:
         for folder in reversed(missing):
             folder.mkdir()
             made.append(folder)
     except OSError as error:
-        for folder in reversed(made):
-            with suppress(OSError):
-                folder.rmdir()
         raise OutputError(f"cannot write {path}: {error.strerror} in {there}; choose another folder") from error
-    return made
 
 
 def _stages(path: Path) -> list[Path]:
@@ -283,11 +278,7 @@ def _recover(path: Path, but: Path | None = None) -> None:
     for stage in _stages(path):
         if stage == but:
             continue
-        try:
-            lock = _lock(stage, wait=False)
-        except BlockingIOError:
-            continue
-        try:
+        with suppress(BlockingIOError), _locked(stage, wait=False) as lock:  # which another process may hold
             if os.path.lexists(stage / RECORD):
                 if not _is_mine(stage):
                     raise OutputError(
@@ -298,9 +289,6 @@ def _recover(path: Path, but: Path | None = None) -> None:
             elif not _is_mine(stage) or (lock is None and time.time() - stage.stat().st_mtime < FORGOTTEN):
                 continue
             shutil.rmtree(stage, ignore_errors=True)
-        finally:
-            if lock is not None:
-                os.close(lock)
 
 
 @dataclass(frozen=True)
@@ -356,11 +344,11 @@ def _apply(path: Path, stage: Path) -> None:
 
 
 @contextmanager
-def _locked(path: Path, *, shared: bool = False) -> Iterator[None]:
-    """Wait until no other process writes into `path`."""
-    lock = _lock(path, shared=shared)
+def _locked(path: Path, *, shared: bool = False, wait: bool = True) -> Iterator[int | None]:
+    """Wait until no other process writes into `path`; see `_lock`."""
+    lock = _lock(path, shared=shared, wait=wait)
     try:
-        yield
+        yield lock
     finally:
         if lock is not None:
             os.close(lock)

@@ -231,18 +231,13 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
 
 def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
     """What states.npz holds of them: node positions (n, 3) [m] and stress (k,) [Pa], the mode at the limit and the
-    lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter".
-    """
+    lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter"."""
     states: dict[str, NDArray[Any]] = {}
     for name, by_ends in checks.shells.items():
         for ends, shell in by_ends.items():
-            states[f"loaded_{ends}_{name}"] = shell.positions
-            if shell.stress is not None:
-                states[f"loaded_stress_{ends}_{name}"] = shell.stress
-            if shell.mode is not None:
-                states[f"loaded_mode_{ends}_{name}"] = shell.mode
-            for k, mode in enumerate(shell.modes):
-                states[f"loaded_buckling_{ends}_{name}_{k + 1}"] = mode
+            found = {"": shell.positions, "stress_": shell.stress, "mode_": shell.mode}
+            states |= {f"loaded_{what}{ends}_{name}": each for what, each in found.items() if each is not None}
+            states |= {f"loaded_buckling_{ends}_{name}_{k}": mode for k, mode in enumerate(shell.modes, start=1)}
     return states
 
 

@@ -3,7 +3,7 @@
 This is the only file of the folder that knows the forms: in one piece, in patches, and from a table of rods.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict
 from importlib.metadata import version
 from math import degrees
@@ -21,12 +21,11 @@ from rodshell.figures.records import Ends, plain
 from rodshell.formfinding import Footprint, Stages, Trimmed
 from rodshell.formfinding.bound_drape import shape_of_net
 from rodshell.formfinding.finite_sections import is_flat
-from rodshell.formfinding.seams import End, Seams
+from rodshell.formfinding.seams import Seams
 from rodshell.formfinding.trim import ends_past_net
 from rodshell.joints import joint_parameters
 from rodshell.kernels import description
 from rodshell.layout import Profile
-from rodshell.nets import ChebyshevNet
 from rodshell.results.results import Results
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod
@@ -55,14 +54,13 @@ def results_of(stages: Stages) -> Results:
         "layout": figures.Layout.model_validate(stages.layout.parameters()),
         "end_tangents": stages.boundary.tangents.tolist(),
         "agreement": _agreements(stages),
-    }
-    known |= {
         "target": _target(stages.target, flat=is_flat(stages.on_target, stages.rod)),
         "drape": _drape_of_all([_drape(part.trimmed) for part in stages.parts]),
     }
     if nets := [part.draped.net for part in stages.parts if part.draped.net is not None]:
         tightest = min(nets, key=lambda net: net.min_angle)
-        known["net"] = _net(tightest).changed(error_estimate=max(net.error_estimate for net in nets))
+        error = max(net.error_estimate for net in nets)
+        known["net"] = figures.Net.model_validate(shape_of_net(tightest)).changed(error_estimate=error)
     if stages.seams is None:
         grid = stages.footprint.mesh.grid
         known["crossings_without_joint"] = len(grid.meetings()) - len(grid.crossings)
@@ -95,10 +93,11 @@ def states_of(stages: Stages) -> States:
 
 def with_seam_forces(results: Results, seams: Seams, checks: Checks) -> Results:
     """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces."""
-    row = {rod.id: k for k, rod in enumerate(results.rods)}
+    first = {rod.id: 2 * k for k, rod in enumerate(results.rods)}  # row of a rod's start among all ends
     forced = list[figures.Seam]()
     for k, seam in enumerate(results.seams):
-        ends = [[_end_index(row, end) for end in meeting.ends] for meeting in seams.meetings if meeting.seam == k]
+        met = [meeting.ends for meeting in seams.meetings if meeting.seam == k]
+        ends = [[first[f"{end.patch}-{end.rod}"] + end.side for end in both] for both in met]
         index = np.array(ends, dtype=np.intp).reshape(-1, 2)
         forces = {support: _seam_forces(held.forces[index].sum(axis=1)) for support, held in checks.reactions.items()}
         forced.append(seam.changed(forces=forces))
@@ -154,10 +153,6 @@ def _target(target: Target, *, flat: bool) -> figures.Target:
     known = {**plain(target.parameters()), "reference_size": target.size}
     known |= {"deviation": target.deviation._asdict()} if target.deviation else {}
     return figures.Target.model_validate(known | ({"flat": True} if flat else {}))
-
-
-def _net(net: ChebyshevNet) -> figures.Net:
-    return figures.Net.model_validate(shape_of_net(net))
 
 
 def _drape(trimmed: Trimmed) -> figures.Drape:
@@ -219,16 +214,15 @@ def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, s
         for (k, other), distance in zip((pair, pair[::-1]), at, strict=True):
             name, start = footprint.rods[other].name, footprint.rods[k].start
             joints[k].append(figures.RodJoint(other=name, at=distance - start))
-    rods = [
-        figures.Rod.taken_from(rod, id=rod.name, joints=tuple(sorted(on_rod, key=lambda joint: joint.at)))
-        for rod, on_rod in zip(footprint.rods, joints, strict=True)
-    ]
-    for k, rod in enumerate(footprint.rods):
+    rods = list[figures.Rod]()
+    for rod, on_rod in zip(footprint.rods, joints, strict=True):
+        more: dict[str, Any] = {"joints": tuple(sorted(on_rod, key=lambda joint: joint.at))}
         if rod.profile is not None:
-            rods[k] = rods[k].changed(stiffness=_stiffness(rod.profile, rod.length, kind))
+            more["stiffness"] = _stiffness(rod.profile, rod.length, kind)
         if rod.curve is not None:
             at, curvatures = rod.curve.between(rod.start, rod.end)
-            rods[k] = rods[k].changed(rest_curvature=figures.RestCurvature(at=at, curvatures=curvatures))
+            more["rest_curvature"] = figures.RestCurvature(at=at, curvatures=curvatures)
+        rods.append(figures.Rod.taken_from(rod, id=rod.name, **more))
     return {
         "rods": tuple(rods),
         "dropped": tuple(figures.Dropped(id=name, reason=reason) for name, reason in dropped),
@@ -279,7 +273,7 @@ def _patch(stages: Stages, seams: Seams, k: int) -> figures.Patch:
         spacing=laid.layout.spacing,
         flat_shift=moved[:2].tolist(),
         ends_moved=seams.moved[name],
-        net=_net(laid.net),
+        net=figures.Net.model_validate(shape_of_net(laid.net)),
         agreement=_agreements(found),
         drape=_drape(found.trimmed),
         pop_up=_pop_ups(found),
@@ -299,8 +293,3 @@ def _seam_forces(forces: Floats) -> figures.SeamForces:
     """Of the forces (k, 3) [N] at a seam's meetings."""
     largest = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
     return figures.SeamForces(each=forces.tolist(), largest=largest, sum=forces.sum(axis=0).tolist())
-
-
-def _end_index(row: Mapping[str, int], end: End) -> int:
-    """Row of a rod end among all, start and end of each rod in turn."""
-    return 2 * row[f"{end.patch}-{end.rod}"] + end.side

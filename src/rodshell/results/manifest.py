@@ -67,10 +67,7 @@ def own_table(folder: Path, name: str) -> dict[str, Any]:
 
 
 def read_table(path: Path, most: float) -> dict[str, Any]:
-    """The keys of a JSON file.
-
-    Args:
-        most: bytes that it may have, see `read_bytes`.
+    """The keys of a JSON file of `most` bytes at most, see `read_bytes`.
 
     Raises:
         OutputError: it cannot be read, is too large, or holds no table of keys.
@@ -111,8 +108,7 @@ def foreign(folder: Path, marks: Mapping[str, Mark | None]) -> list[str]:
 
 def _behind(folder: Path, name: str) -> str | None:
     """The first of the folders above a name that is in fact something else; another mount too, into which files cannot
-    be moved in one step.
-    """
+    be moved in one step."""
     return next((part for part in above(name) if is_no_folder(folder / part)), None)
 
 

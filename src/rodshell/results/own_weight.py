@@ -126,11 +126,8 @@ def _carried(results: Results, ends: Sequence[Ends]) -> dict[Ends, SelfWeight]:
 
 def _below(found: Mapping[Ends, SelfWeight], least: float) -> dict[Ends, float]:
     """Factors on the own weight that are below `least`."""
-    return {
-        end: each.load_factor
-        for end, each in found.items()
-        if each.load_factor is not None and each.load_factor < least
-    }
+    factors = {end: each.load_factor for end, each in found.items()}
+    return {end: factor for end, factor in factors.items() if factor is not None and factor < least}
 
 
 def _asked(results: Results) -> str:

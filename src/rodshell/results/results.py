@@ -186,6 +186,11 @@ class Results(Record, metaclass=_Refusing):
         """All diagonals; none where there is no fabrication."""
         return self.fabrication.bracing if self.fabrication else ()
 
+    @property
+    def rod_ends(self) -> list[str]:
+        """Names of the start and the end of each rod in turn: "U01.0", "U01.1"."""
+        return [f"{rod.id}.{end}" for rod in self.rods for end in (0, 1)]
+
     def loaded_shells(self) -> Iterator[tuple[str, Ends, LoadedShell]]:
         """Every combination of loads with each end condition, and the shell under it."""
         return ((name, ends, shell) for name, found in self.loads.items() for ends, shell in found.items())
@@ -264,7 +269,7 @@ def contradictions(results: Results) -> Iterator[str]:
     for where, name in _named_rods(results):
         if name not in known:
             yield f'{where}: there is no rod "{name}"'
-    ends = {f"{name}.{end}" for name in ids for end in (0, 1)}
+    ends = set(results.rod_ends)
     for k, seam in enumerate(results.seams):
         for j, meeting in enumerate(seam.meetings):
             for end in meeting.ends:
@@ -341,13 +346,10 @@ _EXPECTED = {
     "greater_than_equal": "it must be a number from %(ge)g",
     "less_than_equal": "it must be a number up to %(le)g",
     "finite_number": "it must be a finite number, or null where it is not known",
-    "int_type": "it must be a whole number",
-    "int_from_float": "it must be a whole number",
+    **dict.fromkeys(("int_type", "int_from_float"), "it must be a whole number"),
     "bool_type": "it must be true or false",
     "string_type": "it must be a text",
     "too_short": "it must not be empty",
     "tuple_type": "it must be a list",
-    "dict_type": "it must be a table of keys",
-    "model_type": "it must be a table of keys",
-    "model_attributes_type": "it must be a table of keys",
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "it must be a table of keys"),
 }

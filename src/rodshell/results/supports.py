@@ -22,8 +22,7 @@ def in_the_air(results: Results) -> EndsInTheAir | None:
         return None
     size = (results.target.reference_size if results.target else None) or width(results) / 2
     seams = {end for seam in results.seams for meeting in seam.meetings for end in meeting.ends}
-    names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
-    held = {k for k, name in enumerate(names) if name in seams}
+    held = {k for k, name in enumerate(results.rod_ends) if name in seams}
     for of_supports in [*_forces(results)][:1]:
         held |= {*np.flatnonzero(unheld(of_supports)).tolist()}
     ground = min(known)

@@ -85,11 +85,10 @@ class Jobs:
             status: dict[str, Any] = read_record(folder / "status.json", _STATUS)
             if status["status"] == "done":
                 status["result"] = read_record(result / "result.json", dict[str, Any])
+                files = [path for path in sorted(result.rglob("*")) if path.is_file() and not path.is_symlink()]
+                status["files"] = [path.relative_to(result).as_posix() for path in files]
         except InputError:
             return {"id": name, "status": "failed", "sentence": "what was kept of this job is damaged: send it again"}
-        if status["status"] == "done":
-            files = [path for path in sorted(result.rglob("*")) if path.is_file() and not path.is_symlink()]
-            status["files"] = [path.relative_to(result).as_posix() for path in files]
         return {"id": name} | status
 
     def file(self, name: str, path: str) -> Path | None:

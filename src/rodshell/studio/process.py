@@ -56,8 +56,7 @@ class WorkerProcess:
         self._files.clear()
 
     def _kill(self) -> None:
-        if self._watch is not None:
-            self._watch.cancel()
+        self._watch_over(None)
         if self._process is not None:
             self._process.kill()
             self._process.join()
@@ -107,11 +106,8 @@ class WorkerProcess:
     def _hear(self, process: Any, news: News) -> None:
         if process is not self._process:
             return
-        if self._watch is not None:
-            self._watch.cancel()
         over = self._busy is not None and news.serial == self._busy.serial and news.kind in ENDS
-        if self._busy is not None and not over:
-            self._watch_over(self._busy)
+        self._watch_over(None if over else self._busy)
         self._heard(news)
         if over:
             self._next()
@@ -129,11 +125,11 @@ class WorkerProcess:
             self._heard(News(lost.serial, "failed", {"sentence": sentence}))
         self._next()
 
-    def _watch_over(self, order: Order) -> None:
+    def _watch_over(self, order: Order | None) -> None:
+        """From now on, stop this order if it says nothing for too long, and none before it."""
         if self._watch is not None:
             self._watch.cancel()
-        loop = asyncio.get_running_loop()
-        self._watch = loop.call_later(order.time_limit + _GRACE, self._stop, order)
-
-    def _stop(self, order: Order) -> None:
-        self._lose(f"out of time: the job was stopped, since it said nothing for {order.time_limit + _GRACE:g} s")
+        if order is not None:
+            longest = order.time_limit + _GRACE
+            late = f"out of time: the job was stopped, since it said nothing for {longest:g} s"
+            self._watch = asyncio.get_running_loop().call_later(longest, self._lose, late)

@@ -7,7 +7,7 @@ token; whoever reaches it through another site's page is refused, by the Origin 
 import asyncio
 import json
 import secrets
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import ExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
 from importlib.resources import files
@@ -34,7 +34,9 @@ from rodshell.version import __version__
 
 STATIC = files("rodshell.studio").joinpath("static")
 TYPES = {".js": "text/javascript", ".css": "text/css"}
-_PAGES = ("studio.js", "studio.css", "lil-gui.js", "lil-gui.css")
+_OURS = ("studio.js", "studio.css", "lil-gui.js", "lil-gui.css")
+_FILES: dict[str, Callable[[], str | bytes]] = {name: STATIC.joinpath(name).read_bytes for name in _OURS}
+_FILES |= {"viewer.js": viewer_script, "viewer.css": viewer_style}
 DEEPEST = 20  # tables and lists of a case within one another
 _NO_CASE = "the body must be a case as JSON, with the tables of a case file"
 _OTHER_PAGE = "the page and the server are of different versions: load the page again"
@@ -196,13 +198,9 @@ async def _page(_: Request, status: int = 200) -> Response:
 
 async def _static(request: Request) -> Response:
     name = request.path_params["name"]
-    if name == "viewer.js":
-        return Response(viewer_script(), media_type="text/javascript")
-    if name == "viewer.css":
-        return Response(viewer_style(), media_type="text/css")
-    if name not in _PAGES:
+    if name not in _FILES:
         return _missing("file")
-    return Response(STATIC.joinpath(name).read_bytes(), media_type=TYPES[Path(name).suffix])
+    return Response(_FILES[name](), media_type=TYPES[Path(name).suffix])
 
 
 async def _version(_: Request) -> Response:

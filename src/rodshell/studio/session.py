@@ -168,22 +168,21 @@ class Session:
         (self.folder / f"{key}.scene").write_bytes(self._scene)
         kept = {"figures": self._facts["figures"], "verdict": self._facts["verdict"]}
         self.state.variants.append({"name": name.strip()[:80], "case": self.state.case, "scene": key, **kept})
-        self._keep()
-        self._tell_variants()
+        self._keep_variants()
 
     def drop_variant(self, name: str) -> None:
         """Forget a variant."""
         self._drop(name)
-        self._keep()
-        self._tell_variants()
+        self._keep_variants()
 
     def _drop(self, name: str) -> None:
         for variant in [variant for variant in self.state.variants if variant["name"] == name.strip()[:80]]:
             self.state.variants.remove(variant)
             (self.folder / f"{variant['scene']}.scene").unlink(missing_ok=True)
 
-    def _tell_variants(self) -> None:
+    def _keep_variants(self) -> None:
         """Every page of the session shows the same variants."""
+        self._keep()
         self._publish(News(0, "variants", {"variants": list(self.state.variants)}))
 
     def scene_of_variant(self, key: str) -> bytes | None:
@@ -232,7 +231,6 @@ class Sessions:
     """All sessions of a server, by their ids.
 
     Args:
-        folder: in which each session has a folder.
         first: the case with which a new session begins, and files that it names, by name.
     """
 

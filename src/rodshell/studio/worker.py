@@ -26,8 +26,7 @@ from rodshell.errors import InputError, RodshellError
 from rodshell.form import Form
 from rodshell.job import Job
 from rodshell.progress import Progress
-from rodshell.studio.preview import Preview
-from rodshell.studio.showing import checked
+from rodshell.studio.preview import Preview, checked
 from rodshell.threads import work_for_parent
 
 _TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
@@ -125,24 +124,20 @@ class _Worker:
             self._send(order, "left")
             return
         self._send(order, "taken")
-        start = process_time()
+        start, kind, facts = process_time(), "failed", dict[str, Any]()
         try:
             {"form": self._find, "files": self._files, "job": self._job}[order.kind](order)
+            kind, facts = "done", {"cpu": process_time() - start}
         except _Superseded:
-            self._send(order, "left")
+            kind = "left"
         except RodshellError as error:
-            self._send(order, "failed", {"sentence": str(error)})
+            facts = {"sentence": str(error)}
         except MemoryError:
-            self._form = None
-            self._send(order, "failed", {"sentence": _TOO_LARGE})
+            self._form, facts = None, {"sentence": _TOO_LARGE}
         except Exception as error:
-            self._send(
-                order,
-                "failed",
-                {"sentence": f"the program failed ({type(error).__name__}: {error}): please report this case"},
-            )
-        else:
-            self._send(order, "done", {"cpu": process_time() - start})
+            said = f"the program failed ({type(error).__name__}: {error}): please report this case"
+            facts = {"sentence": said}
+        self._send(order, kind, facts)
 
     def _find(self, order: Order) -> None:
         show, job = self._preview, job_of(order)

@@ -24,7 +24,6 @@ class AskTell:
         lower, upper: (n,) bounds.
         first: (k, n) population.
         objectives, constraints: their numbers.
-        seed: of the random numbers.
 
     Raises:
         ImportError: pymoo is not installed.

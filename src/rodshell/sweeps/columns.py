@@ -24,8 +24,6 @@ CONVERGED = "converged"
 ANY = "NAME"  # in a table whose keys are the user's, such as load combinations
 SHORT = 3  # a list with so many numbers is kept: a point, a pair
 
-Short = dict[str, Any]
-
 
 @dataclass(frozen=True)
 class Column:
@@ -80,18 +78,17 @@ def read_column(name: object) -> Column:
         if part not in inside and ANY not in inside:
             if path in ("target", "rod.section"):  # whose keys depend on its kind
                 return Column(name)
+            if not inside:
+                kept = "is a single value or a list, of which the number of entries is shown"
+                raise InputError(f"columns: {name}: {path} {kept}: use {path}")
             near = get_close_matches(part, inside, n=1)
             prefix = f"{path}." if path else ""
             hint = f"did you mean {prefix}{near[0]}?" if near else f"{path or 'result.json'} has {', '.join(inside)}"
-            raise InputError(f"columns: result.json has no key {name}: {hint}" if inside else _too_deep(name, path))
+            raise InputError(f"columns: result.json has no key {name}: {hint}")
         node, path = inside.get(part) or inside[ANY], f"{path}.{part}" if path else part
     if inside := _inside(node):
         raise InputError(f"columns: {name} is a table: name one of its keys, such as {name}.{next(iter(inside))}")
     return Column(name, any("items" in choice for choice in _choices(node)))
-
-
-def _too_deep(name: str, path: str) -> str:
-    return f"columns: {name}: {path} is a single value or a list, of which the number of entries is shown: use {path}"
 
 
 @cache

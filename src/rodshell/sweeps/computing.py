@@ -28,7 +28,6 @@ class Wanted:
     """A job that is wanted.
 
     Args:
-        id: its identity.
         archive: the folder for its files; None: they are not wanted.
         again: whether it is run even if it is finished.
     """
@@ -66,7 +65,6 @@ class Computation:
 
         Args:
             wanted: jobs, taken one by one as there is room for them; the same job may come twice.
-            total: number of jobs.
 
         Raises:
             KeyboardInterrupt: what is finished is recorded. OutputError : it cannot be recorded. EngineError : jobs
@@ -136,10 +134,7 @@ def _time_text(seconds: float) -> str:
 def opened_computation(
     plan: Plan, folder: Path, progress: Progress, *, retry: bool, address: str | None
 ) -> Iterator[Computation]:
-    """A computation into a folder, in which the table shows what is finished however this is left.
-
-    Args:
-        retry, address: as of `Computation` and `opened_engine`.
+    """A `Computation` by an `opened_engine` into a folder, whose table shows what is finished however this is left.
 
     Raises:
         InputError, EngineError: the engine cannot be used. OutputError : the folder cannot be written, is in use, or

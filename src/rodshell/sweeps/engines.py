@@ -6,7 +6,7 @@ which machine.
 
 import json
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -29,17 +29,15 @@ class Engine:
     """Runs tasks, at the same time `slots` at most.
 
     Args:
-        workers: of this process; None: those of dask.
+        run: what the executor does with a task and its limits, as `Workers.run`.
         settings: with the limits of a job.
     """
 
-    def __init__(self, executor: Executor, workers: Workers | None, settings: Settings) -> None:
-        self._executor, self._workers, self._settings = executor, workers, settings
+    def __init__(self, executor: Executor, run: Callable[..., Reply], settings: Settings) -> None:
+        self._executor, self._run, self._settings = executor, run, settings
 
     def submit(self, task: Task) -> "Future[Reply]":
-        limits = (self._settings.time_limit, self._settings.memory_limit)
-        run = _run_here if self._workers is None else self._workers.run
-        return self._executor.submit(run, task, *limits)
+        return self._executor.submit(self._run, task, self._settings.time_limit, self._settings.memory_limit)
 
     def reply(self, future: "Future[Reply]") -> Reply:
         """What a task that has finished came to.
@@ -59,7 +57,7 @@ class DaskEngine(Engine):
     """As `Engine`, on a cluster whose workers may come and go."""
 
     def __init__(self, client: Any, settings: Settings) -> None:
-        super().__init__(client.get_executor(pure=False, retries=0), None, settings)
+        super().__init__(client.get_executor(pure=False, retries=0), _run_here, settings)
         self._client = client
         self._slots, self._counted = 0, -_COUNTED
 
@@ -98,43 +96,42 @@ def opened_engine(settings: Settings, address: str | None = None) -> Iterator[En
     Raises:
         InputError: dask is not installed, or not reached. EngineError : no process can be started.
     """
+    if address is not None:
+        instance("address", address, str, 'text such as "tls://10.0.0.1:8786" or "scheduler.json"')
     with ExitStack() as stack:
-        if address is not None:
-            instance("address", address, str, 'text such as "tls://10.0.0.1:8786" or "scheduler.json"')
         if settings.engine == "dask" or address is not None:
-            yield stack.enter_context(_dask(settings, address))
+            yield DaskEngine(_dask_client(settings, address, stack), settings)
             return
         workers = Workers()
         executor = ThreadPoolExecutor(settings.workers, "rodshell-worker")
         stack.callback(executor.shutdown, cancel_futures=True)
         stack.callback(workers.stop)
-        yield Engine(executor, workers, settings)
+        yield Engine(executor, workers.run, settings)
 
 
-@contextmanager
-def _dask(settings: Settings, address: str | None) -> Iterator[Engine]:
+def _dask_client(settings: Settings, address: str | None, stack: ExitStack) -> Any:
+    """A client of the scheduler of `opened_engine`, which is closed with the stack."""
     with needs_package("the engine dask", "distributed", "cluster"):
         import dask
         from distributed import Client, LocalCluster
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    with ExitStack() as stack:
-        given = dask.config.get("scheduler-address", None) if address is None else address
-        if given is None:
-            HERE.open()
-            cluster = LocalCluster(
-                n_workers=1, threads_per_worker=settings.workers, processes=False, memory_limit=0,
-                dashboard_address=_HERE, worker_dashboard_address=_HERE, scheduler_kwargs={"dashboard": False},
-            )  # fmt: skip
-            place = stack.enter_context(cluster)
-        else:
-            place = _address_in(given) if given.endswith(".json") else given
-        try:
-            client = stack.enter_context(Client(place, timeout=10))  # with TLS as dask's own settings say
-        except (OSError, ValueError, TypeError) as error:
-            raise InputError(f"no dask scheduler answers at {given}: {error}") from None
-        if given is None:
-            stack.callback(HERE.stop)
-        yield DaskEngine(client, settings)
+    given = dask.config.get("scheduler-address", None) if address is None else address
+    if given is None:
+        HERE.open()
+        cluster = LocalCluster(
+            n_workers=1, threads_per_worker=settings.workers, processes=False, memory_limit=0,
+            dashboard_address=_HERE, worker_dashboard_address=_HERE, scheduler_kwargs={"dashboard": False},
+        )  # fmt: skip
+        place = stack.enter_context(cluster)
+    else:
+        place = _address_in(given) if given.endswith(".json") else given
+    try:
+        client = stack.enter_context(Client(place, timeout=10))  # with TLS as dask's own settings say
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"no dask scheduler answers at {given}: {error}") from None
+    if given is None:
+        stack.callback(HERE.stop)
+    return client
 
 
 def _address_in(file: str) -> str:

@@ -90,7 +90,6 @@ class Plan:
     """What the plan of a sweep and that of a search have in common.
 
     Args:
-        origin: what it was read from.
         keys: by whose values a design is known: of the case, or "base", or "generation".
         columns: in addition to those of every table.
     """
@@ -178,11 +177,8 @@ def read_plan(source: Source) -> SweepPlan:
 def read_origin(source: Source, tables: Sequence[str]) -> Origin:
     """What a plan is read from.
 
-    Args:
-        tables: that the file may have.
-
     Raises:
-        InputError: it cannot be read, has an unknown key, or its base cannot be used.
+        InputError: it cannot be read, has a key that is not one of the `tables`, or its base cannot be used.
     """
     if isinstance(source, Mapping):
         name, text, folder, given = "sweep", "", Path(), source

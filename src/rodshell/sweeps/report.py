@@ -28,7 +28,6 @@ class Page:
     """What a report says.
 
     Args:
-        kind, summary: in its heading.
         first: the two columns that are shown first, across and up.
         measures: columns that say how good a design is; of two the front is shown.
         larger: those of them that are to be large, and not small.
@@ -67,6 +66,7 @@ def write_report(store: Store, page: Page) -> Path:
     environment = Environment(
         loader=PackageLoader("rodshell.sweeps", "templates"), autoescape=True, undefined=StrictUndefined
     )
+    data = json.dumps(_data(store, page), separators=(",", ":"))
     text = environment.get_template("sweep.html.j2").render(
         kind=page.kind,
         title=page.plan.origin.name,
@@ -76,7 +76,7 @@ def write_report(store: Store, page: Page) -> Path:
         studio=page.plan.origin.studio_command,
         shapes=[shape | {"svg": Markup(shape["svg"])} for shape in _shapes(store, page)],
         plotly=Markup(get_plotlyjs()),
-        data=Markup(_script_json(_data(store, page))),
+        data=Markup(data.replace("<", "\\u003c")),  # so that it can stand in a script
     )
     file = store.folder / REPORT
     with replaced(file) as part:
@@ -130,8 +130,3 @@ def _shapes(store: Store, page: Page) -> Iterable[dict[str, str]]:
             given = ", ".join(f"{name} {in_short(by_job[job][name])}" for name in said if by_job[job][name] != "")
             link = _report(store, job) or ""
             yield {"svg": inline(picture_svg(archive, archive.final)), "link": link, "caption": given}
-
-
-def _script_json(content: Any) -> str:
-    """JSON that can stand in a script of a page."""
-    return json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")

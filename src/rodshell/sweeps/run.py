@@ -26,14 +26,13 @@ class Swept:
     """What a sweep has come to.
 
     Args:
-        folder: of the sweep; None: nothing was written.
         computed: number of jobs that were computed now.
         verdicts: number of designs by verdict, "not checked" and "no form" among them.
         not_converged: number of forms that did not converge.
         failures: sentences of designs without a form, with their number, the most frequent first.
     """
 
-    folder: Path | None
+    folder: Path
     designs: int
     computed: int
     verdicts: dict[str, int]

@@ -179,11 +179,8 @@ def front_of(plan: SearchPlan, store: Store) -> tuple[list[Finished], int]:
 
     Of designs that are as good in every objective, the first is taken.
     """
-    kept = [
-        (_judged(plan, design.outcome, design.row)[0], design)
-        for design in store.finished()
-        if _is_feasible(plan, design)
-    ]
+    judged = ((*_judged(plan, design.outcome, design.row), design) for design in store.finished())
+    kept = [(values, design) for values, violations, design in judged if max(violations) <= 0]
     if not kept:
         return [], 0
     all_values = np.array([values for values, _ in kept])

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.figures.findings import CODES
-from rodshell.job import Job
 from rodshell.sweeps.axes import Axis, Span, count_of, flat_keys, read_listed, read_span
 from rodshell.sweeps.columns import FINDINGS, NUMBERS, STANDARD, number_of, read_column, read_columns
 from rodshell.sweeps.plan import GENERATION, Plan, Source, known, read_origin, read_settings, table
@@ -62,12 +60,7 @@ class Constraint:
 
 @dataclass(frozen=True)
 class SearchPlan(Plan):
-    """A whole search; its keys are "generation" and those of its variables.
-
-    Args:
-        variables: intervals, or lists of values.
-        objectives, constraints: on columns of the table.
-    """
+    """A whole search; its keys are "generation" and those of its variables, which are intervals or lists of values."""
 
     variables: tuple[Span | Axis, ...]
     objectives: tuple[Objective, ...]
@@ -89,7 +82,10 @@ def read_search(source: Source) -> SearchPlan:
         raise InputError("base: a search has one: choose among targets by a variable such as target.kind")
     given = origin.tables
     variables = tuple(
-        _variable(key, value, origin.first, origin.folder) for key, value in flat_keys(table(given, "variables"))
+        read_span(key, value, origin.first, ("from", "to", "scale"))
+        if isinstance(value, Mapping)
+        else read_listed(key, value, origin.first, origin.folder)
+        for key, value in flat_keys(table(given, "variables"))
     )
     if not variables:
         raise InputError(
@@ -117,12 +113,6 @@ def read_search(source: Source) -> SearchPlan:
     for corner in (0.0, 0.5, 1.0):
         plan.job(plan.values(1, np.full(len(variables), corner)))
     return plan
-
-
-def _variable(key: str, value: Any, base: Job, folder: Path) -> Span | Axis:
-    if isinstance(value, Mapping):
-        return read_span(key, value, base, ("from", "to", "scale"))
-    return read_listed(key, value, base, folder)
 
 
 def _objectives(given: Mapping[str, Any]) -> tuple[Objective, ...]:

@@ -35,12 +35,7 @@ FOUND = "found"
 LOST = ("stopped", "crashed")  # by a limit or with its process: another try may end differently
 _OUTCOMES = (FOUND, "refused", "failed", *LOST)
 JOB = re.compile(r"\w+")  # that was found: the name of its folder
-KINDS = {
-    "status": str,
-    "verdict": str,
-    "findings": str | None,
-    "results": dict,
-}  # of what is kept of a job; all else are numbers
+KINDS = {"status": str, "verdict": str, "findings": str | None, "results": dict}  # kept of a job; all else are numbers
 ROW = 20e6  # bytes of what is kept of a job
 _MOST_OF_SQLITE = 1e9  # bytes of a value that SQLite can be asked for
 REMEDY = "move it to compute all designs again, or choose another folder"
@@ -54,7 +49,6 @@ class Finished:
     """A design whose job is finished.
 
     Args:
-        job: its identity.
         keys: values of the axes' keys, in JSON's types.
         outcome: "found", "refused" (bad input), "failed" (an error of the program), "stopped" (by a limit) or
             "crashed".

@@ -26,20 +26,12 @@ HEADER = "header"  # note of the store: {"keys", "columns"}
 
 
 def header_notes(keys: Sequence[str], columns: Sequence[Column]) -> dict[str, str]:
-    """What the table's columns are, to be noted with the designs.
-
-    Args:
-        columns: in addition to those of every sweep.
-    """
+    """What the table's columns are, in addition to those of every sweep, to be noted with the designs."""
     return {HEADER: json.dumps({"keys": list(keys), "columns": [column.name for column in columns]})}
 
 
 class Sheet:
-    """The table of a store as it is now: the axes' keys, the standard columns, and those that the sweep names.
-
-    Args:
-        more: further columns.
-    """
+    """The table of a store as it is now: the axes' keys, the standard columns, those that the sweep names, and more."""
 
     def __init__(self, store: Store, more: Sequence[str] = ()) -> None:
         self._store = store
@@ -60,13 +52,10 @@ class Sheet:
                     raise ValueError(
                         f"its design {design.position} has {len(design.keys)} values for {len(self.keys)} keys"
                     )
-            standard = [design.row.get(name) for name in STANDARD]
-            cells = [*design.keys, *standard, *(_cell(design, column) for column in self._columns)]
+            kept = design.row.get("results", {})
+            more = (design.job if column.name == JOB else column.of(kept) for column in self._columns)
+            cells = [*design.keys, *(design.row.get(name) for name in STANDARD), *more]
             yield design, dict(zip(self.names, cells, strict=True))
-
-
-def _cell(design: Finished, column: Column) -> Any:
-    return design.job if column.name == JOB else column.of(design.row.get("results", {}))
 
 
 class Table:

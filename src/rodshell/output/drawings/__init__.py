@@ -8,35 +8,9 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.figures.checks import OTHER_SHAPES
 from rodshell.output.drawing import TEXT, Drawing
-from rodshell.output.drawings.flat import (
-    TALL,
-    FlatPlan,
-    flat_drawing,
-    flat_plan,
-    sheets_of_strips,
-    strip_size,
-    strips_drawing,
-)
-from rodshell.output.drawings.sheets import (
-    SCALES,
-    Compose,
-    Layout,
-    Paper,
-    Sheet,
-    bound,
-    laid_out,
-    room,
-    table,
-    title_block,
-    with_title,
-)
-from rodshell.output.drawings.shell import (
-    bracing_drawing,
-    elevations_drawing,
-    erection_drawing,
-    final_curves,
-    supports_drawing,
-)
+from rodshell.output.drawings import flat, sheets, shell
+from rodshell.output.drawings.flat import FlatPlan, flat_plan
+from rodshell.output.drawings.sheets import Compose, Layout, Paper, Sheet
 from rodshell.output.grid import lies_flat, supported
 from rodshell.output.schedules import SCHEDULES
 from rodshell.output.settings import PAPERS
@@ -56,11 +30,11 @@ FINER = {"bracing": 0.5}  # smallest texts of a drawing at 1:1 over those of the
 def drawing_set(archive: Archive) -> dict[str, Drawing]:
     """Every drawing that the archive has content for, at 1:1 with a title block, by name."""
     plan = flat_plan(archive)
-    block = title_block(archive, plan.summary)
+    block = sheets.title_block(archive, plan.summary)
     drawings = {name: layout.detail for name, layout in _layouts(archive).items()}
     first = {"plan": drawings.pop("plan")} if "plan" in drawings else {}
-    first["strips"] = strips_drawing(plan, plan.text)
-    return {name: with_title(drawing, block) for name, drawing in (first | drawings).items()}
+    first["strips"] = flat.strips_drawing(plan, plan.text)
+    return {name: sheets.with_title(drawing, block) for name, drawing in (first | drawings).items()}
 
 
 @made_once
@@ -75,20 +49,20 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
     checked = _checked(archive.results)
     about = {"supports": _held(archive), "bracing": checked, "rods": checked}
 
-    def schedule(name: str) -> Iterator[Sheet]:
-        found = SCHEDULES[name]
-        return table(found.title + about.get(name, ""), found.brief(archive), paper)
+    def listed(name: str) -> Iterator[Sheet]:
+        schedule = SCHEDULES[name]
+        return sheets.table(schedule.title + about.get(name, ""), schedule.brief(archive), paper)
 
     first = layouts.pop("plan").sheets(paper) if "plan" in layouts else ()
-    sheets = [*first, *_strips(plan, paper)]
+    found = [*first, *_strips(plan, paper)]
     for name, layout in layouts.items():
-        sheets += layout.sheets(paper)
+        found += layout.sheets(paper)
         if name in SCHEDULES:
-            sheets += schedule(name)
+            found += listed(name)
     for name in ("rods", "joints", "sections", "seams", "stock"):
         if SCHEDULES[name].known(archive):
-            sheets += schedule(name)
-    return bound(sheets, title_block(archive, plan.summary), paper), paper
+            found += listed(name)
+    return sheets.bound(found, sheets.title_block(archive, plan.summary), paper), paper
 
 
 def _held(archive: Archive) -> str:
@@ -113,9 +87,9 @@ def _layouts(archive: Archive) -> dict[str, Layout]:
     extent = np.ptp(np.concatenate([plan.cuts.reshape(-1, 2), *plan.footprint]), axis=0)
     layouts = dict[str, Layout]()
     if lies_flat(archive):
-        layouts["plan"] = laid_out(partial(flat_drawing, plan), extent, paper, plan.text, true_size=True)
-    for name, (compose, extent) in _of_the_shell(archive, plan).items():
-        layouts[name] = laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
+        layouts["plan"] = sheets.laid_out(partial(flat.flat_drawing, plan), extent, paper, plan.text, true_size=True)
+    for name, (compose, extent) in _of_the_shell(archive).items():
+        layouts[name] = sheets.laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
     return layouts
 
 
@@ -124,42 +98,42 @@ def _paper(archive: Archive) -> Paper:
     return PAPERS[style.paper if style else "A3"]
 
 
-def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, Floats]]:
+def _of_the_shell(archive: Archive) -> dict[str, tuple[Compose, Floats]]:
     """Drawings that need a shape in space, and what each takes at least without its texts (2,) [mm]."""
     if archive.final is None or "rod_nodes" not in archive.states:
         return {}
-    width, depth, height = np.ptp(np.concatenate(final_curves(archive)), axis=0)
+    width, depth, height = np.ptp(np.concatenate(shell.final_curves(archive)), axis=0)
     above, both_sides = np.array([width, depth]), np.array([max(width, depth), 2 * height])
     makers: dict[str, tuple[Compose, Floats]] = {
-        "supports": (partial(supports_drawing, archive, plan), above),
-        "elevations": (partial(elevations_drawing, archive), both_sides),
+        "supports": (partial(shell.supports_drawing, archive), above),
+        "elevations": (partial(shell.elevations_drawing, archive), both_sides),
     }
     if archive.results.bracing:
-        makers["bracing"] = (partial(bracing_drawing, archive), above)
+        makers["bracing"] = (partial(shell.bracing_drawing, archive), above)
     if "history" in archive.states and archive.results.deployment:
-        makers["erection"] = (partial(erection_drawing, archive), above)
+        makers["erection"] = (partial(shell.erection_drawing, archive), above)
     return makers
 
 
 def _strips(plan: FlatPlan, paper: Paper) -> list[Sheet]:
     """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
-    low, high = room(paper)
+    low, high = sheets.room(paper)
     width, height = high - low
 
     def fits(scale: float) -> bool:
-        sizes = [strip_size(plan, rod, scale * TEXT) for rod in plan.rods]
+        sizes = [flat.strip_size(plan, rod, scale * TEXT) for rod in plan.rods]
         longest = max((long for long, _ in sizes), default=1.0)
         broadest = max((across for _, across in sizes), default=0.0)
-        fitting = (longest + 12 * scale * TEXT) / scale <= width and broadest / scale + (TALL + 3) * TEXT <= height
+        fitting = (longest + 12 * scale * TEXT) / scale <= width and broadest / scale + (flat.TALL + 3) * TEXT <= height
         return bool(fitting)
 
-    scale = next((scale for scale in SCALES if fits(scale)), SCALES[-1])
-    groups = sheets_of_strips(plan, scale * height, scale * TEXT)
-    sheets = []
+    scale = next((scale for scale in sheets.SCALES if fits(scale)), sheets.SCALES[-1])
+    groups = flat.sheets_of_strips(plan, scale * height, scale * TEXT)
+    found = []
     for k, rods in enumerate(groups):
-        drawing = strips_drawing(plan, scale * TEXT, rods)
+        drawing = flat.strips_drawing(plan, scale * TEXT, rods)
         top = drawing.box()[1][1]
         placed = drawing.placed(1 / scale, low + (4.0, height - top / scale))
         many = f", {k + 1} of {len(groups)}" if len(groups) > 1 else ""
-        sheets.append(Sheet(drawing.title + many, placed, scale))
-    return sheets
+        found.append(Sheet(drawing.title + many, placed, scale))
+    return found

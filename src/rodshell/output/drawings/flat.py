@@ -64,7 +64,6 @@ class FlatPlan:
         footprint: closed curves (f, 2) through them [mm].
         boundary: closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if
             they are not known.
-        rounding: how finely lengths are shown.
         laths: how much lies on the rods, in words; "" where nothing does.
         blanks: outlines by the names of rods that are more than a length, see `blanks_of` [m].
         slot_depth: of strips that cross by slots [m].
@@ -101,12 +100,10 @@ class FlatPlan:
     def notes(self) -> list[str]:
         """Of each joint: its id, and where it is on both rods."""
 
-        def place(rod: GridRod, at: float) -> str:
-            return f"{rod.id} at {self.rounding.mm(rod.from_cut_end(at))} mm"
+        def place(rod: int, at: float) -> str:
+            return f"{self.rods[rod].id} at {self.rounding.mm(self.rods[rod].from_cut_end(at))} mm"
 
-        pairs = (zip((self.rods[k] for k in joint.rods), joint.at, strict=True) for joint in self.joints)
-        said = (", ".join(place(rod, at) for rod, at in pair) for pair in pairs)
-        return [f"{joint.id}: {where}" for joint, where in zip(self.joints, said, strict=True)]
+        return [f"{joint.id}: {', '.join(map(place, joint.rods, joint.at))}" for joint in self.joints]
 
     @cached_property
     def diagonals(self) -> list[tuple[Floats, Floats]]:
@@ -221,10 +218,9 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
         off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
         labels = [Label(joint.id, mark + off * corner, 0.0, mark, moved=False).written(size) for corner in CORNERS]
         tried = product((both, lines), labels if size >= SMALL * text else ())
-        if written := room.first(label for clear_of, label in tried if not lines_meet(label.box(), clear_of)):
-            pencil.texts.append(written)
-        else:
-            left_out += 1
+        left_out += not room.write(
+            pencil, (label for clear_of, label in tried if not lines_meet(label.box(), clear_of))
+        )
     pencil.leave_out(left_out, len(plan.joints), "joint ids (named by the rods that cross)")
     return room
 
@@ -291,8 +287,7 @@ def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float
         Text(words, a + share * along, size, "DIM", "middle", angle, colour="#8a6a1c")
         for size, share in product((text, SMALL * text), shares)
     )
-    if written := room.first(tried):
-        pencil.texts.append(written)
+    room.write(pencil, tried)
 
 
 def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:

@@ -131,9 +131,8 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     pencil.line([(left, y + 1.6 * size), (right, y + 1.6 * size)], "TITLE")
     pencil.write(f"{block.name}: {drawing.title.lower()}{TRUE_SIZE}", (left, y), 1.4 * size, "TITLE", bold=True)
     rows = [block.entries[k : k + COLUMNS] for k in range(0, len(block.entries), COLUMNS)]
-    lines = [" \N{MIDDLE DOT} ".join(f"{label}: {value}" for label, value in row) for row in rows] + block.notes(
-        drawing
-    )
+    entries = (" \N{MIDDLE DOT} ".join(f"{label}: {value}" for label, value in row) for row in rows)
+    lines = [*entries, *block.notes(drawing)]
     for k, line in enumerate(lines, start=1):
         pencil.write(line, (left, y - 1.5 * k * size), size, "TITLE")
     if block.verdict:
@@ -285,11 +284,8 @@ def tiled(drawing: Drawing, paper: Paper, scale: float = 1) -> Iterator[Sheet]:
             shift = low + OVERLAP - corner
             part = drawing.clipped(low - shift, high - shift).placed(1.0, shift)
             lines = _match_lines(low + OVERLAP, high - OVERLAP, (row, column), count, part)
-            yield Sheet(
-                f"{drawing.title} 1:{scale:g}, part {_part(row, column)} of {_part(*(count[::-1] - 1))}",
-                part + lines,
-                scale,
-            )
+            here, last = _part(row, column), _part(*(count[::-1] - 1))
+            yield Sheet(f"{drawing.title} 1:{scale:g}, part {here} of {last}", part + lines, scale)
 
 
 def table(title: str, content: Table, paper: Paper) -> Iterator[Sheet]:
@@ -371,14 +367,13 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: Pape
         pencil.write(shortened(value, step - start - 2.0, FINE), (x + start, down), FINE, "TITLE")
     y -= ROW * ceil(len(block.entries) / COLUMNS)
     room = right - left - (_bar_length(BAR, sheet.scale) + 3 * TEXT if sheet.scale else 0.0)
-    for k, line in enumerate(block.notes(sheet.content)):
+    notes = block.notes(sheet.content)
+    for k, line in enumerate(notes):
         written = shortened(line, room, FINE)
         pencil.write(written, (left, y - 0.3 - ROW * k), FINE, "TITLE", colour=SOFT if k == 0 else WARNING)
     if block.verdict:
-        written = block.verdict_within(room, FINE)
-        pencil.write(
-            written, (left, y - 0.3 - ROW * len(block.notes(sheet.content))), FINE, "TITLE", bold=True, colour=WARNING
-        )
+        written, below = block.verdict_within(room, FINE), y - 0.3 - ROW * len(notes)
+        pencil.write(written, (left, below), FINE, "TITLE", bold=True, colour=WARNING)
     if sheet.scale:
         pencil.write(f"Scale 1:{sheet.scale:g}", (right - 38, top - 7.0), TEXT, "TITLE", anchor="end")
         _scale_bar(pencil, right, MARGIN + 5.2, BAR, TEXT, sheet.scale)
@@ -418,9 +413,9 @@ def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, 
         written = Text(words, line[0], TEXT, "TITLE", angle=angle, colour=pen.colour)
         crossed = np.ceil(length_beneath(written.box(), shifts, drawn) / TEXT)
         ordered = shifts[np.argsort(crossed, kind="stable")]
-        if placed := free.first(written._replace(at=line[0] + shift) for shift in ordered):
-            pencil.texts.append(placed)
-        elif aside := _led_aside(words, line, part, pencil.texts, low - OVERLAP, high + OVERLAP):
+        if free.write(pencil, (written._replace(at=line[0] + shift) for shift in ordered)):
+            continue
+        if aside := _led_aside(words, line, part, pencil.texts, low - OVERLAP, high + OVERLAP):
             take(aside, TEXT, free)
             pencil.line(aside.leader(TEXT), "TITLE", pen=Pen(WARNING, 0.18))
             pencil.texts.append(aside.written(TEXT)._replace(layer="TITLE", colour=pen.colour))

@@ -13,21 +13,8 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.figures.fabrication import Brace
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.boxes import each_meets
-from rodshell.output.drawing import (
-    BACK,
-    INK,
-    LAYERS,
-    LETTER,
-    PALE,
-    SMALL,
-    SOFT,
-    Drawing,
-    Pen,
-    Pencil,
-    Text,
-    corners,
-)
-from rodshell.output.drawings.flat import FlatPlan, side_ticks
+from rodshell.output.drawing import BACK, INK, LAYERS, LETTER, PALE, SMALL, SOFT, Drawing, Pen, Pencil, Text, corners
+from rodshell.output.drawings.flat import side_ticks
 from rodshell.output.grid import end_nodes, joint_places, meshed_rods, outlines_of
 from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
 from rodshell.output.schedules import seam_meetings
@@ -179,22 +166,22 @@ def axes(pencil: Pencil, text: float) -> None:
 # Supports
 
 
-def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
+def supports_drawing(archive: Archive, text: float) -> Drawing:
     """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
-    pencil, drawn = Pencil(), meshed_rods(archive)
+    pencil, names = Pencil(), archive.results.rod_ends
     _seen_from_above(pencil, archive, text)
     curves = [curve[:, :2] for curve in final_curves(archive)]
     ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
     arrives = np.array([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).reshape(-1, 2)
     arrives /= np.maximum(np.linalg.norm(arrives, axis=1), 1e-9)[:, None]
-    names = [f"{rod.id}.{end}" for rod in drawn for end in (0, 1)]
     room, tick = Room(4 * text), Pen(LAYERS["MARK"].colour, 0.12 * text)
     for name, end, way in zip(names, ends, arrives, strict=True):
         pencil.mark(end, RADIUS * text, "MARK", note=name)
         pencil.line([end, end + TICK * text * way], "MARK", pen=tick)
         room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
     lines = segments(_thinned(_thinned(curve)) for curve in curves)  # what names keep clear of
-    alone = ~np.isin(names, list(_sewn(archive)))
+    on_seams = [end for _, meeting in seam_meetings(archive.results) for end in meeting.ends]  # these have numbers
+    alone = ~np.isin(names, on_seams)
     for seam in (run for loop in outlines_of(archive) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
     walks, left_out = list(_walks(outlines_of(archive), ends, alone)), 0
@@ -247,11 +234,6 @@ def _runs(loop: Ints, alone: Bools) -> list[Ints]:
     return [run for run in parts if len(run)]
 
 
-def _sewn(archive: Archive) -> set[str]:
-    """The rod ends on seams; these have the number of their meeting instead of a name."""
-    return {end for seam in archive.results.seams for meeting in seam.meetings for end in meeting.ends}
-
-
 def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None:
     """The numbers of the places on seams where rods meet, as in the table of the seams, where there is room."""
     size, left_out = SMALL * text, 0
@@ -261,10 +243,7 @@ def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None
             Text(number, at + text * np.array([side, up]), size, "LABEL", "start" if side > 0 else "end")
             for up, side in product((0.4, -1.1), (0.5, -0.5))
         )
-        if written := room.first(tried):
-            pencil.texts.append(written)
-        else:
-            left_out += 1
+        left_out += not room.write(pencil, tried)
     pencil.leave_out(left_out, sum(1 for _ in seam_meetings(archive.results)), "numbers of meetings (table Seams)")
 
 
@@ -281,8 +260,8 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     assert final is not None
     _seen_from_above(pencil, archive, text)
     joints = joint_places(archive, archive.states[final])
-    supports = [f"{rod.id}.{end}" for rod in archive.results.rods for end in (0, 1)]
-    joints |= {name: np.array(place) for name, place in zip(supports, archive.results.boundary, strict=False)}
+    supports = zip(archive.results.rod_ends, archive.results.boundary, strict=False)
+    joints |= {name: np.array(place) for name, place in supports}
     braces = [brace for brace in archive.results.bracing if {brace.start, brace.end} <= joints.keys()]
     ends = 1e3 * np.array([[joints[end][:2] for end in (brace.start, brace.end)] for brace in braces])
     ends = ends.reshape(-1, 2, 2)

@@ -17,18 +17,10 @@ from numpy.typing import NDArray
 from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.geometry.bounds import bounds
 from rodshell.geometry.frames import cross, unit
+from rodshell.output import grid
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
 from rodshell.output.drawing import FAMILIES
-from rodshell.output.grid import (
-    GridRod,
-    Shape,
-    family_numbers,
-    joint_entries,
-    laid_out,
-    meshed_rods,
-    shape_names,
-    shape_of,
-)
+from rodshell.output.grid import GridRod, Shape
 from rodshell.output.schedules import SCHEDULES, Table, heading
 from rodshell.output.sections import section_outline, section_widths
 from rodshell.results import Archive, wording
@@ -102,7 +94,7 @@ class Drawn:
 
     def scene(self) -> Scene:
         """It as bytes for the viewer."""
-        data, entries = _Data(), _entries(self.counts, self.meeting)
+        entries = _entries(self.counts, self.meeting)
         nodes, counts = self.nodes[entries], np.diff(np.searchsorted(entries, np.cumsum([0, *self.counts])))
         meeting = np.searchsorted(entries, self.meeting).astype(np.uint32)
         lying = self._lying()
@@ -110,11 +102,11 @@ class Drawn:
         low, high = bounds(np.concatenate([*clouds, *([] if self.target is None else [self.target[0]])]))
         size = high - low
         outline = self.outline(float(size.max()))
-        frame = _Frame(low, float(size.max()), entries, data)
+        frame = _Frame(low, float(size.max()), entries)
         laths = _laths(outline)
         known = {kind: coloured.scale for _, colours in self.shapes for kind, coloured in colours.items()}
         shown = {kind: known[kind] for kind in COLOURS if kind in known}
-        families = family_numbers(family for _, family in self.rods)
+        families = grid.family_numbers(family for _, family in self.rods)
         header: dict[str, Any] = {
             "version": VERSION,
             "name": self.name,
@@ -125,7 +117,7 @@ class Drawn:
                 {"id": name, "count": count, "ink": FAMILIES[family % len(FAMILIES)]}
                 for (name, _), count, family in zip(self.rods, counts.tolist(), families, strict=True)
             ],
-            "joints": {"ids": list(self.joints), "entries": data.put(meeting)},
+            "joints": {"ids": list(self.joints), "entries": frame.put(meeting)},
             "outline": (outline / frame.size).tolist(),
             "kinds": {kind: scale.caption.split(" in ")[0] for kind, scale in shown.items()},
             "palettes": {kind: scale.palette for kind, scale in shown.items()},
@@ -136,19 +128,19 @@ class Drawn:
             "rows": self.rows,
         }
         if self.widths is not None:
-            header["widths"] = data.put(self.widths[entries].astype("<f4"))
+            header["widths"] = frame.put(self.widths[entries].astype("<f4"))
         if self.target is not None:
             points, faces = self.target
-            header["target"] = {"points": frame.points(points), "faces": data.put(faces.astype("<u4"))}
+            header["target"] = {"points": frame.points(points), "faces": frame.put(faces.astype("<u4"))}
         last = np.cumsum(counts)
         header["supports"] = {
-            "entries": data.put(np.column_stack([last - counts, last - 1]).astype("<u4")),
+            "entries": frame.put(np.column_stack([last - counts, last - 1]).astype("<u4")),
             "reactions": {
-                name: {"forces": data.put(forces.astype("<f4")), "largest": largest}
+                name: {"forces": frame.put(forces.astype("<f4")), "largest": largest}
                 for name, (forces, largest) in self.reactions.items()
             },
         }
-        return Scene(header, bytes(data))
+        return Scene(header, bytes(frame))
 
     def _lying(self) -> Floats:
         """The flat grid (n, 3), moved in its plane to below the last shape: a target may be far from the origin."""
@@ -158,21 +150,16 @@ class Drawn:
         final = next((shape.positions for shape, _ in reversed(self.shapes) if not shape.flat), flat)
         if not len(flat):
             return flat
-        return laid_out(flat, final, ends)
+        return grid.laid_out(flat, final, ends)
 
 
-def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
-    """All shapes of an archive, the draped one among them; None where it has no shape in space.
-
-    Args:
-        schedules: whether rods and joints have the rows of the schedules with them, which takes most of the time.
-    """
-    rods = meshed_rods(archive)
-    names = sorted(shape_names(archive), key=lambda name: name != DRAPED) if rods else []
+def scene_of(archive: Archive) -> Scene | None:
+    """All shapes of an archive, the draped one among them; None where it has no shape in space."""
+    rods = grid.meshed_rods(archive)
+    names = sorted(grid.shape_names(archive), key=lambda name: name != DRAPED) if rods else []
     if len(names) < 2:
         return None
-    joints, shapes = joint_entries(archive), [shape_of(archive, name) for name in names]
-    tables = {kind: SCHEDULES[f"{kind}s"].brief(archive) for kind in ("rod", "joint") if schedules}
+    joints, shapes = grid.joint_entries(archive), [grid.shape_of(archive, name) for name in names]
     target = archive.states.get("target_points")
     return Drawn(
         archive.name,
@@ -185,41 +172,17 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
         partial(section_outline, archive.results.rod.section if archive.results.rod else None),
         None if target is None else (target, archive.states["target_faces"]),
         _reactions(archive, rods),
-        {kind: _rows(table) for kind, table in tables.items()},
+        {kind: _rows(SCHEDULES[f"{kind}s"].brief(archive)) for kind in ("rod", "joint")},
         _widths(archive, rods),
     ).scene()
 
 
-@dataclass(frozen=True, eq=False)
-class _Frame:
-    """Where a scene lies, and which entries are drawn."""
+class _Frame(bytearray):
+    """Collects the arrays of a scene, which lies in a cube of `size` [m] from `low` on; some `entries` are drawn."""
 
-    low: Floats
-    size: float
-    entries: Ints
-    data: "_Data"
-
-    def points(self, points: NDArray[np.floating]) -> dict[str, Any]:
-        return self.data.put(np.rint((points - self.low) / self.size * STEPS).astype("<u2"))
-
-    def stage(
-        self, shape: Shape, colours: Mapping[Colour, Coloured], cloud: Floats, normals: Floats | None
-    ) -> dict[str, Any]:
-        stage: dict[str, Any] = {"name": shape.name, "caption": shape.caption, "points": self.points(cloud)}
-        if normals is not None:
-            stage["normals"] = self.data.put(np.rint(127 * normals).astype(np.int8))
-        stage["colours"] = {kind: self._coloured(coloured) for kind, coloured in colours.items()}
-        return stage
-
-    def _coloured(self, coloured: Coloured) -> dict[str, Any]:
-        scale = coloured.scale
-        bins = np.where(np.isfinite(scale.values), scale.bins, UNKNOWN)[self.entries].astype(np.uint8)
-        worst = {"at": ((coloured.where - self.low) / self.size).tolist(), "text": coloured.worst}
-        return {"bins": self.data.put(bins), "caption": scale.caption, "ticks": _ticks(scale), "worst": worst}
-
-
-class _Data(bytearray):
-    """Collects arrays."""
+    def __init__(self, low: Floats, size: float, entries: Ints) -> None:
+        super().__init__()
+        self.low, self.size, self.entries = low, size, entries
 
     def put(self, values: NDArray[Any]) -> dict[str, Any]:
         """Where the values stand."""
@@ -228,6 +191,24 @@ class _Data(bytearray):
         self += plain.tobytes()
         self += b"\0" * (-len(self) % 4)
         return here
+
+    def points(self, points: NDArray[np.floating]) -> dict[str, Any]:
+        return self.put(np.rint((points - self.low) / self.size * STEPS).astype("<u2"))
+
+    def stage(
+        self, shape: Shape, colours: Mapping[Colour, Coloured], cloud: Floats, normals: Floats | None
+    ) -> dict[str, Any]:
+        stage: dict[str, Any] = {"name": shape.name, "caption": shape.caption, "points": self.points(cloud)}
+        if normals is not None:
+            stage["normals"] = self.put(np.rint(127 * normals).astype(np.int8))
+        stage["colours"] = {kind: self._coloured(coloured) for kind, coloured in colours.items()}
+        return stage
+
+    def _coloured(self, coloured: Coloured) -> dict[str, Any]:
+        scale = coloured.scale
+        bins = np.where(np.isfinite(scale.values), scale.bins, UNKNOWN)[self.entries].astype(np.uint8)
+        worst = {"at": ((coloured.where - self.low) / self.size).tolist(), "text": coloured.worst}
+        return {"bins": self.put(bins), "caption": scale.caption, "ticks": _ticks(scale), "worst": worst}
 
 
 def _entries(counts: Ints, meeting: Ints) -> Ints:
