@@ -8,6 +8,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError, NetLimitError
+from rodshell.geometry.curves import arc_lengths
 from rodshell.geometry.frames import dot, unit
 from rodshell.nets.surface_curves import STEP, SurfaceCurves
 from rodshell.targets import Target
@@ -66,7 +67,7 @@ def drawn_curves(target: Target, lines: Sequence[Floats], names: Sequence[str]) 
     """
     step = STEP * target.size
     splines = [_spline(line, name) for line, name in zip(lines, names, strict=True)]
-    counts = [int(np.ceil(FINER * _chords(line)[-1] / step)) + DEGREE + 1 for line in lines]
+    counts = [int(np.ceil(FINER * arc_lengths(line)[-1] / step)) + DEGREE + 1 for line in lines]
     line = np.repeat(np.arange(len(lines)), counts)
     samples = _sampled(target, splines, line, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts]))
     moved = np.where(samples.inside, samples.moved, 0.0)
@@ -107,7 +108,7 @@ def _spline(line: Floats, name: str) -> BSpline:
             f"rod {name} has a corner of {np.degrees(np.arccos(turn[k])):.0f} degrees at {_place(line[k + 1])}: draw a "
             "smooth curve, or two rods"
         )
-    u = _chords(line)
+    u = arc_lengths(line)
     return make_interp_spline(u / u[-1], line, k=min(3, len(line) - 1))
 
 
@@ -149,13 +150,13 @@ class _Laid(NamedTuple):
 def _laid(target: Target, samples: _Samples, run: Ints, step: float) -> _Laid | None:
     """A part of a line inside the target, continued past both of its ends with the curvature there; None: too short."""
     x, stops = samples.points[run], (samples.u[run[0]] == 0.0, samples.u[run[-1]] == 1.0)
-    at = np.floor(_chords(x) / (CLOSEST * step))
+    at = np.floor(arc_lengths(x) / (CLOSEST * step))
     kept = (at != at[-1]) & np.append(True, np.diff(at) > 0)
     kept[-1] = True
     x = x[kept]
     if len(x) <= DEGREE:
         return None
-    within = make_interp_spline(_chords(x), x, k=DEGREE)
+    within = make_interp_spline(arc_lengths(x), x, k=DEGREE)
     ahead = step / FINER * np.arange(1, 2 * FINER + 1)[:, None]
     ends = []
     for place, way in ((0.0, -1.0), (within.t[-1], 1.0)):
@@ -166,7 +167,7 @@ def _laid(target: Target, samples: _Samples, run: Ints, step: float) -> _Laid | 
     longer = np.vstack([ends[0][::-1], x, ends[1]])
     if not np.isfinite(longer).all():
         raise NetLimitError(f"the target cannot be continued past its end near {_place(x[-1])}: let rods end before it")
-    chords = _chords(longer)
+    chords = arc_lengths(longer)
     curve = make_interp_spline(chords, longer, k=DEGREE)
     nodes, weights = np.polynomial.legendre.leggauss(DEGREE)
     between = chords[:-1, None] + 0.5 * np.diff(chords)[:, None] * (1.0 + nodes)
@@ -181,7 +182,3 @@ def _laid(target: Target, samples: _Samples, run: Ints, step: float) -> _Laid | 
     low, high = (stop and off for stop, off in zip(stops, short, strict=True))
     limits = (0.0 if low else -np.inf, length if high else np.inf)
     return _Laid(points, unit(slopes - dot(slopes, normal)[:, None] * normal), limits)
-
-
-def _chords(x: Floats) -> Floats:
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1)))
