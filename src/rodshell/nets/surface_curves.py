@@ -266,11 +266,8 @@ def _stepped(target: Target, law: Law, x: Floats, tangents: Floats, step: float)
 
 def _joined(target: Target, step: float, count: int, knots: list[tuple[Ints, Floats, Floats]]) -> SurfaceCurves:
     """The curves of which both arms, k and k + count, have these `knots`, one after the other."""
-    arm, number = (
-        np.concatenate([rows for rows, _, _ in knots]),
-        np.repeat(np.arange(len(knots)), [len(k[0]) for k in knots]),
-    )
-    points, tangents = (np.concatenate([knot[k] for knot in knots]) for k in (1, 2))
+    number = np.repeat(np.arange(len(knots)), [len(arms) for arms, _, _ in knots])
+    arm, points, tangents = (np.concatenate(parts) for parts in zip(*knots, strict=True))
     back = arm >= count
     kept = ~(back & (number == 0))  # the seed is the first knot of both
     curve, place = (arm % count)[kept], np.where(back, -number, number)[kept]

@@ -274,6 +274,11 @@ def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
     return first, kind.reshape(-1)
 
 
+def turned(faces: Ints, first: Ints) -> Ints:
+    """Rows (m, 3), such as the corners of triangles, each turned until its entry `first` (m,) comes first."""
+    return np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
+
+
 def chains(edges: Ints) -> list[Ints]:
     """Vertices of the rows into which edges (e, 2) fall at vertices where other than two of them meet; the
     last of a ring is its first."""
