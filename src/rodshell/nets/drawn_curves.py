@@ -12,6 +12,7 @@ from rodshell.geometry.curves import arc_lengths
 from rodshell.geometry.frames import dot, unit
 from rodshell.nets.surface_curves import STEP, SurfaceCurves
 from rodshell.targets import Target
+from rodshell.units import point_text
 
 CORNER = np.radians(45.0)  # between two pieces of a line: rods bend, and have none
 FINER = 8  # samples a step
@@ -74,8 +75,8 @@ def drawn_curves(target: Target, lines: Sequence[Floats], names: Sequence[str]) 
     if moved.max(initial=0.0) > FARTHEST * target.size:
         k = int(np.argmax(moved))
         raise InputError(
-            f"rod {names[line[k]]} lies {moved[k]:.3g} m off the target near {_place(samples.points[k])}: draw it on "
-            "the target, or give its plan alone"
+            f"rod {names[line[k]]} lies {moved[k]:.3g} m off the target near {point_text(samples.points[k])}: draw it "
+            "on the target, or give its plan alone"
         )
     samples = _up_to_the_end(target, splines, samples, step)
     change = np.flatnonzero((np.diff(samples.line) != 0) | np.diff(samples.inside)) + 1
@@ -91,10 +92,6 @@ def drawn_curves(target: Target, lines: Sequence[Floats], names: Sequence[str]) 
     return DrawnCurves(curves, np.array([of for of, _ in laid]), float(moved.max(initial=0.0)))
 
 
-def _place(point: Floats) -> str:
-    return f"({', '.join(f'{x:.4g}' for x in point)}) m"
-
-
 def _spline(line: Floats, name: str) -> BSpline:
     """The smooth curve through the points of a line, from 0 to 1."""
     line = line[np.append(True, (np.diff(line, axis=0) != 0).any(axis=1))]
@@ -105,8 +102,8 @@ def _spline(line: Floats, name: str) -> BSpline:
     if turn.min(initial=1.0) < np.cos(CORNER):
         k = int(np.argmin(turn))
         raise InputError(
-            f"rod {name} has a corner of {np.degrees(np.arccos(turn[k])):.0f} degrees at {_place(line[k + 1])}: draw a "
-            "smooth curve, or two rods"
+            f"rod {name} has a corner of {np.degrees(np.arccos(turn[k])):.0f} degrees at {point_text(line[k + 1])}: "
+            "draw a smooth curve, or two rods"
         )
     u = arc_lengths(line)
     return make_interp_spline(u / u[-1], line, k=min(3, len(line) - 1))
@@ -166,7 +163,8 @@ def _laid(target: Target, samples: _Samples, run: Ints, step: float) -> _Laid | 
         ends.append(target.retract(start + way * ahead * t + 0.5 * ahead**2 * bent))
     longer = np.vstack([ends[0][::-1], x, ends[1]])
     if not np.isfinite(longer).all():
-        raise NetLimitError(f"the target cannot be continued past its end near {_place(x[-1])}: let rods end before it")
+        where = point_text(x[-1])
+        raise NetLimitError(f"the target cannot be continued past its end near {where}: let rods end before it")
     chords = arc_lengths(longer)
     curve = make_interp_spline(chords, longer, k=DEGREE)
     nodes, weights = np.polynomial.legendre.leggauss(DEGREE)

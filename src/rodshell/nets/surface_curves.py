@@ -19,6 +19,7 @@ from rodshell.errors import NetLimitError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout.flatgrid import Crossings
 from rodshell.targets import Target
+from rodshell.units import point_text
 
 STEP = 0.02  # of the size, between knots
 ACCURACY = 1e-11  # of one step, relative to the size
@@ -55,9 +56,8 @@ def asymptotic(target: Target, x: Floats, tangents: Floats) -> tuple[Floats, Flo
     a, b, c = (np.einsum("ni,nij,nj->n", left, hessian, right) for left, right in pairs)
     square = b * b - a * c
     if not (square > 0.0).all():
-        px, py, pz = x[int(np.argmin(square))]
         raise NetLimitError(
-            f"the target has no asymptotic lines at ({px:.4g}, {py:.4g}, {pz:.4g}) m, where it is not a saddle: "
+            f"the target has no asymptotic lines at {point_text(x[np.argmin(square)])}, where it is not a saddle: "
             "they need negative Gaussian curvature everywhere"
         )
     slope = -a / (b + np.copysign(np.sqrt(square), b))  # the smaller root of a + 2 b q + c q^2 = 0
@@ -236,9 +236,8 @@ def trace(target: Target, law: Law, seeds: Floats, tangents: Floats) -> SurfaceC
 
 
 def _off_the_end(point: Floats, why: str) -> NetLimitError:
-    x, y, z = point
     return NetLimitError(
-        f"a rod that leads through ({x:.4g}, {y:.4g}, {z:.4g}) m to the end of the target {why}: use a smaller part of "
+        f"a rod that leads through {point_text(point)} to the end of the target {why}: use a smaller part of "
         "the target, or another anchor or heading"
     )
 
