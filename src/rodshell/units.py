@@ -357,6 +357,11 @@ def percent_text(share: float) -> str:
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
+def point_text(point: Iterable[float]) -> str:
+    """A point by its coordinates [m]: "(0.1, 0.25, -0.03) m"."""
+    return f"({', '.join(f'{x:.4g}' for x in point)}) m"
+
+
 FEW = 4  # places that are named one by one
 
 

@@ -64,6 +64,11 @@ def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     return lagrange(near, around, s)
 
 
+def arc_lengths(x: Floats) -> Floats:
+    """Arc lengths (n,) from the first to each point of a polyline (n, d)."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1)))
+
+
 @njit("f1 f3 i f1 f")  # type: ignore[untyped-decorator, unused-ignore]
 def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: float) -> Floats:
     """Interpolate m lines with common knots, as `on_curve` does.

@@ -51,8 +51,9 @@ def grid_cells(grid: FlatGrid) -> Ints:
     for joint, (p, q) in enumerate(rods):
         for on in next_to[joint, p]:
             for over in next_to[joint, q]:
-                corner = _meeting(next_to, rods, on, over, p, q)
-                if corner is not None:
+                both = {*next_to[on, _other(rods, on, p)]} & {*next_to[over, _other(rods, over, q)]}
+                if both:
+                    corner = min(both)
                     found.setdefault(frozenset((joint, on, corner, over)), (joint, on, corner, over))
     return np.array(list(found.values()), dtype=np.intp).reshape(-1, 4)
 
@@ -89,7 +90,7 @@ def rim_diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     found = list[tuple[int, int, int]]()  # joint where it starts, the rod's last joint, and the end
     for rod, row in sorted(rows.items()):
         for end, last in ((2 * rod, row[0]), (2 * rod + 1, row[-1])):
-            other = rows[rods[last][1] if rods[last][0] == rod else rods[last][0]]
+            other = rows[_other(rods, last, rod)]
             k = other.index(last)
             found += [(start, last, end) for start in other[max(k - 1, 0) : k] + other[k + 1 : k + 2]]
     pairs = np.array([(start, end) for start, _, end in found], dtype=np.intp).reshape(-1, 2)
@@ -199,11 +200,7 @@ def _lattice(grid: FlatGrid) -> Ints:
     return result
 
 
-def _meeting(
-    next_to: dict[tuple[int, int], list[int]], rods: Sequence[Sequence[int]], on: int, over: int, p: int, q: int
-) -> int | None:
-    """The joint next to `on` on its other rod and next to `over` on its own, or None."""
-    other_of_on = rods[on][1] if rods[on][0] == p else rods[on][0]
-    other_of_over = rods[over][1] if rods[over][0] == q else rods[over][0]
-    both = set(next_to[on, other_of_on]) & set(next_to[over, other_of_over])
-    return min(both) if both else None
+def _other(rods: Sequence[Sequence[int]], joint: int, rod: int) -> int:
+    """The rod that crosses a rod at a joint."""
+    first, second = rods[joint]
+    return second if first == rod else first

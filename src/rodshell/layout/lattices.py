@@ -213,10 +213,8 @@ class Curves(SurfaceLattice):
         plans = [np.array(line)[:, :2] for line in self.lines]
         first, last = (np.concatenate([plan[part] for plan in plans]) for part in (slice(None, -1), slice(1, None)))
         lengths = np.linalg.norm(last - first, axis=1)
-        points, weights = (
-            np.vstack([first, 0.5 * (first + last), last]),
-            np.outer([1, 4, 1], lengths).ravel(),
-        )  # Simpson
+        points = np.vstack([first, 0.5 * (first + last), last])
+        weights = np.outer([1, 4, 1], lengths).ravel()  # Simpson
         about = points - np.average(points, axis=0, weights=weights)
         spread = np.linalg.det(about.T @ (weights[:, None] * about) / max(weights.sum(), 1e-300))
         area = 12.0 * np.sqrt(max(float(spread), 0.0))  # of a rectangle, whose sides have the variances a^2 / 12

@@ -332,10 +332,8 @@ def _divided(
     parts = np.append(edges, 1)
     parts[begin[1:] - 1] = 1
     starts = np.cumsum(parts) - parts
-    point, rod = (
-        np.repeat(np.arange(len(s)), parts),
-        np.repeat(np.arange(len(lines)), np.diff(np.append(starts, parts.sum())[begin])),
-    )
+    point = np.repeat(np.arange(len(s)), parts)
+    rod = np.repeat(np.arange(len(lines)), np.diff(np.append(starts, parts.sum())[begin]))
     step = np.arange(len(point)) - starts[point]
     stations = s[point] + (np.append(s[1:], s[-1:])[point] - s[point]) * step / parts[point]
     rod_nodes = np.where(step == 0, nodes[point], count - 1 + np.cumsum(step > 0))

@@ -24,7 +24,7 @@ from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.targets import Target
-from rodshell.units import length_text, shown
+from rodshell.units import length_text, point_text, shown
 from rodshell.validation import instance, number, point
 
 _SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
@@ -161,9 +161,9 @@ def chebyshev_net(
         raise InputError("no rod of the layout touches the target: move the layout (offset, anchor), or give more rods")
     warnings = list[str]()
     if error > LOOSE * min(layout.spacing):
-        x, y, z = np.where(np.abs(loosest) < 1e-6 * target.size, 0.0, loosest)
+        there = point_text(np.where(np.abs(loosest) < 1e-6 * target.size, 0.0, loosest))
         warnings.append(
-            f"rod ends on the line through ({x:.4g}, {y:.4g}, {z:.4g}) m have an error of up to {error:.3g} m: the "
+            f"rod ends on the line through {there} have an error of up to {error:.3g} m: the "
             "target bends too sharply for the steps of the march, or the line runs along its end; use a smaller "
             "spacing or shorter edges"
         )
@@ -198,9 +198,9 @@ def _require_room(target: Target, net: Covering, height: float) -> None:
     curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
     k = int(np.argmax(curvature))
     if height * curvature[k] >= 1.0:
-        x, y, z = np.where(np.abs(points[k]) < 1e-6 * target.size, 0.0, points[k])
+        there = point_text(np.where(np.abs(points[k]) < 1e-6 * target.size, 0.0, points[k]))
         raise InputError(
-            f"near ({x:.4g}, {y:.4g}, {z:.4g}) m the target's radius of curvature is {length_text(1 / curvature[k])}, "
+            f"near {there} the target's radius of curvature is {length_text(1 / curvature[k])}, "
             f"and half of the joints' eccentricity {length_text(height)}: use a smaller eccentricity or a larger target"
         )
 
@@ -215,9 +215,8 @@ def _hole(net: Covering) -> NetLimitError:
 
 
 def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
-    x, y, z = where
     return NetLimitError(
-        f"no inextensible net covers this target: near ({x:.4g}, {y:.4g}, {z:.4g}) m {what}; "
+        f"no inextensible net covers this target: near {point_text(where)} {what}; "
         "use a smaller part of the target (a higher base, or seams), or another anchor or heading; a larger spacing "
         "does not help"
     )

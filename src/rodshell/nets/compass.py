@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.frames import cross, unit
 from rodshell.kernels import njit
 from rodshell.targets import Implicit, Target
@@ -65,23 +65,37 @@ class Axes(NamedTuple):
     tangents: Floats
 
 
+def arms(net: Net) -> tuple[Ints, Ints, Floats, Ints]:
+    """The nodes (n,) of the axes but the anchor by their indices, one arm after the other, outwards as `Axes.tangents`;
+    the steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
+    i0, j0 = net.origin
+    (right, left), (ahead, back) = (
+        (np.arange(origin + 1, len(lines)), np.arange(origin - 1, -1, -1))
+        for origin, lines in ((i0, net.u), (j0, net.v))
+    )
+    stops = np.cumsum([0, len(right), len(left), len(ahead), len(back)])
+    rows = np.concatenate([right, left, np.full(len(ahead) + len(back), i0)])
+    columns = np.concatenate([np.full(len(right) + len(left), j0), ahead, back])
+    du, dv = np.diff(net.u), np.diff(net.v)
+    return rows, columns, np.concatenate([du[i0:], du[:i0][::-1], dv[j0:], dv[:j0][::-1]]), stops
+
+
 def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERANCE) -> None:
     """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer; see `geodesics`."""
-    i0, j0 = net.origin
     anchor, tangents = start
-    net.points[i0, j0] = anchor
-    steps = [np.diff(net.u[i0:]), np.diff(-net.u[i0::-1]), np.diff(net.v[j0:]), np.diff(-net.v[j0::-1])]
+    net.points[net.origin] = anchor
+    rows, columns, chords, stops = arms(net)
+    steps = np.split(chords, stops[1:-1])
     if net.heights == ON_SURFACE:
-        arms = geodesics(target, np.repeat(anchor[None], 4, axis=0), tangents, steps, tolerance=tolerance)
+        found = geodesics(target, np.repeat(anchor[None], 4, axis=0), tangents, steps, tolerance=tolerance)
     else:
-        arms = list[Floats]()
+        found = list[Floats]()
         for height, pair in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
             layer = Layer(target, height)
             begin = np.repeat(layer.of(anchor[None]), 2, axis=0)
             on_layer = geodesics(layer, begin, tangents[pair], steps[pair], tolerance=tolerance)
-            arms += [layer.below(arm) for arm in on_layer]
-    net.points[i0 + 1 :, j0], net.points[i0 - 1 :: -1, j0] = arms[0], arms[1] if i0 else arms[1][:0]
-    net.points[i0, j0 + 1 :], net.points[i0, j0 - 1 :: -1] = arms[2], arms[3] if j0 else arms[3][:0]
+            found += [layer.below(arm) for arm in on_layer]
+    net.points[rows, columns] = np.concatenate(found)
 
 
 def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:

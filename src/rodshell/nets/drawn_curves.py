@@ -8,9 +8,11 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError, NetLimitError
+from rodshell.geometry.curves import arc_lengths
 from rodshell.geometry.frames import dot, unit
 from rodshell.nets.surface_curves import STEP, SurfaceCurves
 from rodshell.targets import Target
+from rodshell.units import point_text
 
 CORNER = np.radians(45.0)  # between two pieces of a line: rods bend, and have none
 FINER = 8  # samples a step
@@ -66,15 +68,15 @@ def drawn_curves(target: Target, lines: Sequence[Floats], names: Sequence[str]) 
     """
     step = STEP * target.size
     splines = [_spline(line, name) for line, name in zip(lines, names, strict=True)]
-    counts = [int(np.ceil(FINER * _chords(line)[-1] / step)) + DEGREE + 1 for line in lines]
+    counts = [int(np.ceil(FINER * arc_lengths(line)[-1] / step)) + DEGREE + 1 for line in lines]
     line = np.repeat(np.arange(len(lines)), counts)
     samples = _sampled(target, splines, line, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts]))
     moved = np.where(samples.inside, samples.moved, 0.0)
     if moved.max(initial=0.0) > FARTHEST * target.size:
         k = int(np.argmax(moved))
         raise InputError(
-            f"rod {names[line[k]]} lies {moved[k]:.3g} m off the target near {_place(samples.points[k])}: draw it on "
-            "the target, or give its plan alone"
+            f"rod {names[line[k]]} lies {moved[k]:.3g} m off the target near {point_text(samples.points[k])}: draw it "
+            "on the target, or give its plan alone"
         )
     samples = _up_to_the_end(target, splines, samples, step)
     change = np.flatnonzero((np.diff(samples.line) != 0) | np.diff(samples.inside)) + 1
@@ -90,10 +92,6 @@ def drawn_curves(target: Target, lines: Sequence[Floats], names: Sequence[str]) 
     return DrawnCurves(curves, np.array([of for of, _ in laid]), float(moved.max(initial=0.0)))
 
 
-def _place(point: Floats) -> str:
-    return f"({', '.join(f'{x:.4g}' for x in point)}) m"
-
-
 def _spline(line: Floats, name: str) -> BSpline:
     """The smooth curve through the points of a line, from 0 to 1."""
     line = line[np.append(True, (np.diff(line, axis=0) != 0).any(axis=1))]
@@ -104,10 +102,10 @@ def _spline(line: Floats, name: str) -> BSpline:
     if turn.min(initial=1.0) < np.cos(CORNER):
         k = int(np.argmin(turn))
         raise InputError(
-            f"rod {name} has a corner of {np.degrees(np.arccos(turn[k])):.0f} degrees at {_place(line[k + 1])}: draw a "
-            "smooth curve, or two rods"
+            f"rod {name} has a corner of {np.degrees(np.arccos(turn[k])):.0f} degrees at {point_text(line[k + 1])}: "
+            "draw a smooth curve, or two rods"
         )
-    u = _chords(line)
+    u = arc_lengths(line)
     return make_interp_spline(u / u[-1], line, k=min(3, len(line) - 1))
 
 
@@ -149,13 +147,13 @@ class _Laid(NamedTuple):
 def _laid(target: Target, samples: _Samples, run: Ints, step: float) -> _Laid | None:
     """A part of a line inside the target, continued past both of its ends with the curvature there; None: too short."""
     x, stops = samples.points[run], (samples.u[run[0]] == 0.0, samples.u[run[-1]] == 1.0)
-    at = np.floor(_chords(x) / (CLOSEST * step))
+    at = np.floor(arc_lengths(x) / (CLOSEST * step))
     kept = (at != at[-1]) & np.append(True, np.diff(at) > 0)
     kept[-1] = True
     x = x[kept]
     if len(x) <= DEGREE:
         return None
-    within = make_interp_spline(_chords(x), x, k=DEGREE)
+    within = make_interp_spline(arc_lengths(x), x, k=DEGREE)
     ahead = step / FINER * np.arange(1, 2 * FINER + 1)[:, None]
     ends = []
     for place, way in ((0.0, -1.0), (within.t[-1], 1.0)):
@@ -165,8 +163,9 @@ def _laid(target: Target, samples: _Samples, run: Ints, step: float) -> _Laid | 
         ends.append(target.retract(start + way * ahead * t + 0.5 * ahead**2 * bent))
     longer = np.vstack([ends[0][::-1], x, ends[1]])
     if not np.isfinite(longer).all():
-        raise NetLimitError(f"the target cannot be continued past its end near {_place(x[-1])}: let rods end before it")
-    chords = _chords(longer)
+        where = point_text(x[-1])
+        raise NetLimitError(f"the target cannot be continued past its end near {where}: let rods end before it")
+    chords = arc_lengths(longer)
     curve = make_interp_spline(chords, longer, k=DEGREE)
     nodes, weights = np.polynomial.legendre.leggauss(DEGREE)
     between = chords[:-1, None] + 0.5 * np.diff(chords)[:, None] * (1.0 + nodes)
@@ -181,7 +180,3 @@ def _laid(target: Target, samples: _Samples, run: Ints, step: float) -> _Laid | 
     low, high = (stop and off for stop, off in zip(stops, short, strict=True))
     limits = (0.0 if low else -np.inf, length if high else np.inf)
     return _Laid(points, unit(slopes - dot(slopes, normal)[:, None] * normal), limits)
-
-
-def _chords(x: Floats) -> Floats:
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1)))

@@ -8,7 +8,7 @@ three rounds, whatever the number of nodes. The equations, and so the net, are t
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.curves import resampled
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
@@ -20,6 +20,7 @@ from rodshell.nets.compass import (
     Heights,
     Layer,
     Net,
+    arms,
     dot,
     fill_quadrants,
     inverse_of,
@@ -93,7 +94,7 @@ def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> boo
     """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
     starts = np.repeat(start.anchor[None], 4, axis=0)
     net.points[net.origin] = start.anchor
-    rows, columns, steps, stops = _arms(net)
+    rows, columns, steps, stops = arms(net)
     points = net.points[rows, columns]
     if not np.isfinite(points).all():
         return False
@@ -119,21 +120,6 @@ def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> boo
         points = np.concatenate([layer.below(points[part]) for layer, part in layers])
     net.points[rows, columns] = points
     return True
-
-
-def _arms(net: Net) -> tuple[Ints, Ints, Floats, Ints]:
-    """The nodes (n,) of the axes but the anchor by their indices, one arm after the other, outwards as `Axes.tangents`;
-    the steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
-    i0, j0 = net.origin
-    (right, left), (ahead, back) = (
-        (np.arange(origin + 1, len(lines)), np.arange(origin - 1, -1, -1))
-        for origin, lines in ((i0, net.u), (j0, net.v))
-    )
-    stops = np.cumsum([0, len(right), len(left), len(ahead), len(back)])
-    rows = np.concatenate([right, left, np.full(len(ahead) + len(back), i0)])
-    columns = np.concatenate([np.full(len(right) + len(left), j0), ahead, back])
-    du, dv = np.diff(net.u), np.diff(net.v)
-    return rows, columns, np.concatenate([du[i0:], du[:i0][::-1], dv[j0:], dv[:j0][::-1]]), stops
 
 
 @njit("f2 f2 f1 i1 f2 f1 f2 f3")

@@ -19,6 +19,7 @@ from rodshell.errors import NetLimitError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout.flatgrid import Crossings
 from rodshell.targets import Target
+from rodshell.units import point_text
 
 STEP = 0.02  # of the size, between knots
 ACCURACY = 1e-11  # of one step, relative to the size
@@ -55,9 +56,8 @@ def asymptotic(target: Target, x: Floats, tangents: Floats) -> tuple[Floats, Flo
     a, b, c = (np.einsum("ni,nij,nj->n", left, hessian, right) for left, right in pairs)
     square = b * b - a * c
     if not (square > 0.0).all():
-        px, py, pz = x[int(np.argmin(square))]
         raise NetLimitError(
-            f"the target has no asymptotic lines at ({px:.4g}, {py:.4g}, {pz:.4g}) m, where it is not a saddle: "
+            f"the target has no asymptotic lines at {point_text(x[np.argmin(square)])}, where it is not a saddle: "
             "they need negative Gaussian curvature everywhere"
         )
     slope = -a / (b + np.copysign(np.sqrt(square), b))  # the smaller root of a + 2 b q + c q^2 = 0
@@ -236,9 +236,8 @@ def trace(target: Target, law: Law, seeds: Floats, tangents: Floats) -> SurfaceC
 
 
 def _off_the_end(point: Floats, why: str) -> NetLimitError:
-    x, y, z = point
     return NetLimitError(
-        f"a rod that leads through ({x:.4g}, {y:.4g}, {z:.4g}) m to the end of the target {why}: use a smaller part of "
+        f"a rod that leads through {point_text(point)} to the end of the target {why}: use a smaller part of "
         "the target, or another anchor or heading"
     )
 
@@ -266,11 +265,8 @@ def _stepped(target: Target, law: Law, x: Floats, tangents: Floats, step: float)
 
 def _joined(target: Target, step: float, count: int, knots: list[tuple[Ints, Floats, Floats]]) -> SurfaceCurves:
     """The curves of which both arms, k and k + count, have these `knots`, one after the other."""
-    arm, number = (
-        np.concatenate([rows for rows, _, _ in knots]),
-        np.repeat(np.arange(len(knots)), [len(k[0]) for k in knots]),
-    )
-    points, tangents = (np.concatenate([knot[k] for knot in knots]) for k in (1, 2))
+    number = np.repeat(np.arange(len(knots)), [len(arms) for arms, _, _ in knots])
+    arm, points, tangents = (np.concatenate(parts) for parts in zip(*knots, strict=True))
     back = arm >= count
     kept = ~(back & (number == 0))  # the seed is the first knot of both
     curve, place = (arm % count)[kept], np.where(back, -number, number)[kept]

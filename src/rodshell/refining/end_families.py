@@ -14,7 +14,7 @@ from rodshell.refining.change import Change
 from rodshell.refining.length_families import FIRST, MOST, usual_span
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
-from rodshell.refining.variables import Box, Grid
+from rodshell.refining.variables import Box, Grid, Variables
 from rodshell.rods.supports import CLAMPED
 from rodshell.targets import Target
 from rodshell.units import shown
@@ -25,7 +25,7 @@ CORRECTIONS = 4  # of a support's place
 
 
 @dataclass(frozen=True, eq=False)
-class Directions:
+class Directions(Variables):
     """Variables: two tangents of angles for each clamp, by which it is tilted out of the surface and turned within it.
 
     Args:
@@ -38,31 +38,23 @@ class Directions:
     box: Box
     image: Callable[[Operation], Image]
 
-    stock = None
-    common = False
-
-    def tangents(self, values: Floats) -> Floats:
-        """(2m, 3) directions of the clamps by `values` (4m,)."""
-        first = self.structure.popped.boundary.tangents
+    def _turned(self, values: Floats) -> Floats:
+        """(2m, 3) directions of the clamps by `values` (4m,), not of length 1."""
         tilt, turn = values.reshape(-1, 2).T[:, :, None] * self.axes
-        return unit(first + tilt + turn)
+        return np.asarray(self.structure.popped.boundary.tangents + tilt + turn)
 
     def change(self, values: Floats) -> Change:
-        structure = self.structure
-        first, now = structure.popped.boundary.tangents, self.tangents(values)
-        tilt, turn = values.reshape(-1, 2).T[:, :, None] * self.axes
-        length = np.linalg.norm(first + tilt + turn, axis=1)[:, None]
-        reach, ends = last_edges(structure.mesh)[:, None], len(now)
-        none = Change.none(len(structure.mesh.edges), 2 * ends, 2 * ends)
-        held, slopes = none.held, none.held_slopes
-        held[ends:] = reach * (now - first)
+        result, turned = self.no_change(), self._turned(values)
+        length, now = np.linalg.norm(turned, axis=1)[:, None], unit(turned)
+        reach, ends = last_edges(self.structure.mesh)[:, None], len(now)
+        result.held[ends:] = reach * (now - self.structure.popped.boundary.tangents)
         for k, axis in enumerate(self.axes):
             across = (axis - np.einsum("ex,ex->e", axis, now)[:, None] * now) / length
-            slopes[2 * np.arange(ends) + k, ends + np.arange(ends)] = reach * across
-        return replace(none, held=held, held_slopes=slopes)
+            result.held_slopes[2 * np.arange(ends) + k, ends + np.arange(ends)] = reach * across
+        return result
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        return replace(grid, boundary=replace(grid.boundary, tangents=self.tangents(values)))
+        return replace(grid, boundary=replace(grid.boundary, tangents=unit(self._turned(values))))
 
 
 @dataclass(frozen=True)
@@ -93,7 +85,7 @@ class Clamps:
 
 
 @dataclass(frozen=True, eq=False)
-class Slides:
+class Slides(Variables):
     """Variables: how far each rod end is moved along the target's end, with its clamp; it stays as near to that end.
 
     Args:
@@ -107,9 +99,6 @@ class Slides:
     box: Box
     image: Callable[[Operation], Image]
 
-    stock = None
-    common = False
-
     def moved(self, values: Floats) -> Floats:
         """(2m, 3) displacements of the rod ends by `values` (2m,) [m].
 
@@ -119,17 +108,12 @@ class Slides:
         return np.asarray(self._placed(values) - self._placed(0.0 * values))
 
     def change(self, values: Floats) -> Change:
-        structure, count = self.structure, len(values)
-        held = len(structure.held)
-        none = Change.none(len(structure.mesh.edges), held, count)
-        step = PROBE * structure.target.size
+        result, every, step = self.no_change(), np.arange(len(values)), PROBE * self.structure.target.size
         ahead, behind = (self._placed(values + sign * step) for sign in (1.0, -1.0))
-        moved, slopes = none.held, none.held_slopes
-        every = np.arange(count)
-        for first in range(0, held, count):  # the ends, and the ghost nodes of clamps
-            moved[first : first + count] = self.moved(values)
-            slopes[every, first + every] = (ahead - behind) / (2.0 * step)
-        return replace(none, held=moved, held_slopes=slopes)
+        for first in range(0, len(result.held), len(values)):  # the ends, and the ghost nodes of clamps
+            result.held[first + every] = self.moved(values)
+            result.held_slopes[every, first + every] = (ahead - behind) / (2.0 * step)
+        return result
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
         return replace(grid, boundary=replace(grid.boundary, points=grid.boundary.points + self.moved(values)))

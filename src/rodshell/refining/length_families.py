@@ -16,7 +16,7 @@ from rodshell.layout.flatgrid import Crossings
 from rodshell.refining.change import Change
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
-from rodshell.refining.variables import Box, Grid
+from rodshell.refining.variables import Box, Grid, Variables
 
 MOST = 0.35  # of the usual span: how far a point may move along its rod
 SQUARE = 1e-6  # largest cosine of what counts as a right angle
@@ -24,7 +24,7 @@ FIRST = 0.05  # of the usual span: the change that counts as one
 
 
 @dataclass(frozen=True, eq=False)
-class Stations:
+class Stations(Variables):
     """Variables that move points along rods.
 
     Args:
@@ -39,14 +39,10 @@ class Stations:
     image: Callable[[Operation], Image]
     across: csr_array | None = None
 
-    stock = None
-    common = False
-
     def change(self, values: Floats) -> Change:
-        mesh, held = self.structure.mesh, len(self.structure.held)
+        mesh = self.structure.mesh
         slopes = csc_array(self.shifts[mesh.edge_entries + 1] - self.shifts[mesh.edge_entries])
-        none = Change.none(len(mesh.edges), held, len(values))
-        return replace(none, lengths=slopes @ values, length_slopes=slopes)
+        return replace(self.no_change(), lengths=slopes @ values, length_slopes=slopes)
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
         rods = len(grid.mesh.grid.rods)

@@ -59,14 +59,9 @@ class Offer:
         else:
             words = f"double laths over {part}, {self.ends} ends: gap {gain} (--vary double --ends {self.ends})"
         for ends, gap in self.others.items():
-            better = min(self.after, self.before)
-            if gap < better:
-                words += (
-                    f"; with {ends} ends, which need supports that hold the rods' directions, it is "
-                    f"{percent_text(gap)} rms as it is"
-                )
-            else:
-                words += f"; with {ends} ends it is {percent_text(gap)} rms as it is"
+            better = gap < min(self.after, self.before)
+            needs = ", which need supports that hold the rods' directions," if better else ""
+            words += f"; with {ends} ends{needs} it is {percent_text(gap)} rms as it is"
         return words
 
 

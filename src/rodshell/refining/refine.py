@@ -147,8 +147,7 @@ def refine(
     if any(sizes is not None for sizes in variables.stock):
         chosen, more = rounded(variables, accepted[-1], goals, floor.allows)
         spent += more
-        nearer = chosen is not None and chosen.rms < here.rms
-        accepted = (here, chosen) if chosen is not None and nearer else (here,)
+        accepted = (here, chosen) if chosen is not None and chosen.rms < here.rms else (here,)
     after, made = popped_up(stages, variables, accepted[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:

@@ -19,7 +19,7 @@ from rodshell.layout.profile import DOUBLE, Varies
 from rodshell.refining.change import STIFFNESSES, Change
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
-from rodshell.refining.variables import Box, Grid
+from rodshell.refining.variables import Box, Grid, Variables
 from rodshell.rods.varied import sizes
 
 _Per = Literal["shell", "family", "rod"]
@@ -27,7 +27,7 @@ PROBE = 1e-4  # of a number of a profile: differences are then exact to 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Profiles:
+class Profiles(Variables):
     """Variables that are numbers of profiles.
 
     Args:
@@ -50,23 +50,16 @@ class Profiles:
         return replace(grid, mesh=grid.mesh.with_profiles(self._profiles(values[self.variable_of])))
 
     def change(self, values: Floats) -> Change:
-        structure, numbers = self.structure, values[self.variable_of]
-        none = Change.none(len(structure.mesh.edges), len(structure.held), len(values))
-        rods, rows, columns, entries = structure.mesh.edge_rods, list[Ints](), list[Ints](), list[Floats]()
-        every = np.arange(STIFFNESSES * len(rods))
-        for r in range(numbers.shape[1]):
-            ahead, behind = numbers.copy(), numbers.copy()
-            ahead[:, r] += PROBE
-            behind[:, r] -= PROBE
-            entries.append(((self._logarithms(ahead) - self._logarithms(behind)) / (2 * PROBE)).ravel())
-            rows.append(every)
-            columns.append(np.repeat(self.variable_of[rods, r], STIFFNESSES))
-        slopes = csc_array(
-            (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))),
-            shape=(len(every), len(values)),
-        )
-        before = np.log(structure.edges.table[:, :STIFFNESSES])
-        return replace(none, stiffness=self._logarithms(numbers) - before, stiffness_slopes=slopes)
+        numbers, rods = values[self.variable_of], self.structure.mesh.edge_rods
+        probes = PROBE * np.eye(numbers.shape[1])  # of one number each
+        entries = [
+            (self._logarithms(numbers + probe) - self._logarithms(numbers - probe)) / (2 * PROBE) for probe in probes
+        ]
+        columns = np.repeat(self.variable_of[rods].T, STIFFNESSES)
+        rows = np.tile(np.arange(STIFFNESSES * len(rods)), len(probes))
+        slopes = csc_array((np.ravel(entries), (rows, columns)), shape=(STIFFNESSES * len(rods), len(values)))
+        stiffness = self._logarithms(numbers) - np.log(self.structure.edges.table[:, :STIFFNESSES])
+        return replace(self.no_change(), stiffness=stiffness, stiffness_slopes=slopes)
 
     def _profiles(self, numbers: Floats) -> tuple[Profile, ...]:
         made: dict[bytes, Profile] = {}

@@ -120,16 +120,14 @@ def ties(count: int, images: Sequence[Image]) -> csc_array:
         images: where each symmetry maps them.
     """
     every = np.arange(count)
-    if not images:
-        return csc_array((np.ones(count), (every, every)), shape=(count, count))
     rows, columns = [every], [every]
     for image in images:
         opposite = image.sign < 0
         for side in (False, True):
             rows.append(every + count * side)
             columns.append(image.index + count * (opposite ^ side))
-    rows_, columns_ = np.concatenate(rows), np.concatenate(columns)
-    graph = coo_array((np.ones(len(rows_)), (rows_, columns_)), shape=(2 * count, 2 * count))
+    links = np.concatenate(rows), np.concatenate(columns)
+    graph = coo_array((np.ones(len(links[0])), links), shape=(2 * count, 2 * count))
     label = connected_components(graph, directed=False)[1]
     plus, minus = label[:count], label[count:]
     free = plus != minus

@@ -1,6 +1,7 @@
 """Variables of a design: values within bounds, what they do to a shell, and how they are built."""
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -50,33 +51,32 @@ class Box:
         return Box(zero, zero - most, zero + most, zero + first)
 
 
-class Variables(Protocol):
-    """The variables of a family on one shell; on a symmetric one they are `Tied`."""
+class Variables(ABC):
+    """The variables of a family on one shell; on a symmetric one they are `Tied`.
 
-    @property
-    def box(self) -> Box: ...
+    Attributes:
+        stock: the only values that can be built, ascending; None: all within the bounds.
+        common: whether adding the same to all of them multiplies every stiffness alike.
+        image: where a symmetry maps the variables.
+    """
 
-    @property
-    def stock(self) -> Floats | None:
-        """The only values that can be built, ascending; None: all within the bounds."""
-        ...
+    structure: Structure
+    box: Box
+    stock: Floats | None = None
+    common: bool = False
+    image: Callable[[Operation], Image]
 
-    @property
-    def common(self) -> bool:
-        """Whether adding the same to all of them multiplies every stiffness alike."""
-        ...
-
-    def image(self, by: Operation) -> Image:
-        """Where a symmetry maps the variables."""
-        ...
-
+    @abstractmethod
     def change(self, values: Floats) -> Change:
         """What a design of values (n,) does, with its derivatives."""
-        ...
 
+    @abstractmethod
     def applied(self, grid: Grid, values: Floats) -> Grid:
         """The grid built to a design of values (n,), from one before, or with what other variables have changed."""
-        ...
+
+    def no_change(self) -> Change:
+        """No effect of these variables."""
+        return Change.none(len(self.structure.mesh.edges), len(self.structure.held), len(self.box.start))
 
 
 class Family(Protocol):

@@ -3,11 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
+from rodshell.geometry.curves import arc_lengths
 from rodshell.progress import Progress, silent
 from rodshell.targets.creases import KINK, NEAR
 from rodshell.targets.field_fitting import Fit
@@ -42,13 +44,14 @@ class Creased(Freeform):
         """The piece on these sides of the seams; where there is none, the one that differs in the fewest."""
         return self.pieces[min(self.pieces, key=lambda known: sum(np.not_equal(known, sides).tolist()))]
 
-    def _by_piece(self, x: Floats) -> list[tuple[Freeform, Bools]]:
-        """The pieces, and which of the points (n, 3) are on their sides of the seams."""
-        side = (
-            np.array([np.where(seam.distance(x) > 0, 1, -1) for seam in self.seams]).reshape(len(self.seams), len(x)).T
-        )
-        kinds, kind = np.unique(side, axis=0, return_inverse=True)
-        return [(self.piece(tuple(sides)), kind.reshape(-1) == k) for k, sides in enumerate(kinds.tolist())]
+    def _by_piece(self, x: Floats, held: Mapping[int, int] = MappingProxyType({})) -> list[tuple[Freeform, Bools]]:
+        """The pieces, and which of the points (n, 2 or 3) are on their sides of the seams; of the seams that are `held`
+        all points are on the given side."""
+        sides = np.array([np.where(seam.distance(x) > 0, 1, -1) for seam in self.seams])
+        for seam, side in held.items():
+            sides[seam] = side
+        kinds, kind = np.unique(sides, axis=1, return_inverse=True)
+        return [(self.piece(tuple(signs)), kind.reshape(-1) == k) for k, signs in enumerate(kinds.T.tolist())]
 
     @property
     def deviation(self) -> Deviation:
@@ -99,13 +102,11 @@ class Creased(Freeform):
             out = points[[0, -1]] - points[[1, -2]]
             ends = points[[0, -1]] + 2 * extent * out / np.linalg.norm(out, axis=1)[:, None]
             points = np.vstack([ends[:1], points, ends[1:]])
-        edge = np.diff(points, axis=0)
+        edge, s = np.diff(points, axis=0), arc_lengths(points)
         length = np.linalg.norm(edge, axis=1)
-        s = np.append(0.0, np.cumsum(length))
         at = np.arange(0.0, s[-1], STEP * extent)
-        across = (np.column_stack([-edge[:, 1], edge[:, 0]]) / length[:, None])[
-            np.searchsorted(s, at, side="right") - 1
-        ]
+        on = np.searchsorted(s, at, side="right") - 1
+        across = np.column_stack([-edge[:, 1], edge[:, 0]])[on] / length[on, None]
         x = np.column_stack([np.interp(at, s, points[:, axis]) for axis in range(2)])
         z = self._heights_of_facets(x)
         x, across, z = x[np.isfinite(z)], across[np.isfinite(z)], z[np.isfinite(z)]
@@ -129,12 +130,8 @@ class Creased(Freeform):
 
     def _continued(self, x: Floats, z: Floats, k: int, side: int) -> tuple[Floats, Floats]:
         """Heights (n,) near z (n,), and slopes (n, 2), of the piece on a side of the k-th seam over points (n, 2)."""
-        sides = np.array([np.where(seam.distance(x) > 0, 1, -1) for seam in self.seams])
-        sides[k] = side
-        kinds, kind = np.unique(sides, axis=1, return_inverse=True)
         height, slope = np.empty(len(x)), np.empty((len(x), 2))
-        for n, signs in enumerate(kinds.T.tolist()):
-            here, piece = kind.reshape(-1) == n, self.piece(tuple(signs))
+        for piece, here in self._by_piece(x, {k: side}):
             height[here] = piece._straight_up(np.column_stack([x, z])[here])
             gradient = piece.level(np.column_stack([x, height])[here])[1]
             slope[here] = -gradient[:, :2] / gradient[:, 2:]

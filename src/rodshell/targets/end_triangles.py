@@ -13,6 +13,7 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.target import Target
+from rodshell.targets.trianglemesh import turned
 
 _BISECTIONS = 40
 _ON_THE_END = 1e-6  # of the size: a vertex of a mesh so near to its end is inside
@@ -106,7 +107,8 @@ def _cut(
     and whether they lie inside: with it the sides that lead out are cut by bisection."""
     count = inside[faces].sum(axis=1)
     single, double = (faces[count == k] for k in (1, 2))
-    single, double = _turned(single, inside[single]), _turned(double, ~inside[double])  # the odd corner first
+    single = turned(single, inside[single].argmax(axis=1))  # the odd corner first
+    double = turned(double, inside[double].argmin(axis=1))
     out = np.concatenate([single[:, [0, 1]], single[:, [0, 2]], double[:, [1, 0]], double[:, [2, 0]]])
     sides, back = np.unique(out, axis=0, return_inverse=True)
     low, high = points[sides[:, 0]], points[sides[:, 1]]
@@ -129,11 +131,6 @@ def _about_middles(points: Floats, quads: Ints, retract: Callable[[Floats], Floa
     sides = zip(quads.T, np.roll(quads, -1, axis=1).T, strict=True)
     faces = np.concatenate([np.column_stack([p, q, middle]) for p, q in sides])
     return np.vstack([points, retract(points[quads].mean(axis=1))]), faces
-
-
-def _turned(faces: Ints, first: Bools) -> Ints:
-    """Faces (m, 3), each turned until the corner that is marked comes first."""
-    return np.take_along_axis(faces, (first.argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
 
 
 def _sides(*faces: Ints) -> tuple[Ints, list[Ints], Bools]:
@@ -177,9 +174,8 @@ def _halves(faces: Ints, halved: Bools, middle: Ints) -> tuple[Ints, Ints]:
     count = halved.sum(axis=1)
     found, quads = [faces[count == 0]], np.empty((0, 4), dtype=np.intp)
     for n, odd in ((1, halved), (2, ~halved), (3, halved)):  # the odd side first: the one halved, or the one not
-        turn = (odd[count == n].argmax(axis=1)[:, None] + np.arange(3)) % 3
-        a, b, c = np.take_along_axis(faces[count == n], turn, axis=1).T
-        ab, bc, ca = np.take_along_axis(middle[count == n], turn, axis=1).T
+        first = odd[count == n].argmax(axis=1)
+        (a, b, c), (ab, bc, ca) = (turned(of[count == n], first).T for of in (faces, middle))
         if n == 2:
             quads = np.column_stack([b, bc, ca, a])
         halves, tip = [(a, ab, c), (ab, b, c)], [(ca, bc, c)]

@@ -19,7 +19,7 @@ from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Deviation, Gap, Implicit, Target
 from rodshell.targets.trianglemesh import FARTHEST, TriangleMesh, sound_mesh
 from rodshell.targets.wall_below_rim import WalledSurface, walled_surface
-from rodshell.units import length_text
+from rodshell.units import length_text, point_text
 from rodshell.untrusted import limit, raised
 from rodshell.validation import array, number
 
@@ -385,14 +385,14 @@ class Freeform(Target):
             return curve
         z = self.height_at(curve[:, :2])
         if not np.isfinite(z).all():
-            x, y, _ = curve[int(np.argmin(np.isfinite(z)))]
+            where = point_text(curve[np.argmin(np.isfinite(z)), :2])
             width, across = float(np.ptp(curve[:, :2], axis=0).max()), 2 * self._extent
             if width > OTHER_UNIT * across:
                 raise InputError(
                     f"the boundary curve is {length_text(width)} wide and the surface {length_text(across)}: draw it "
                     "in the unit of the surface, in which it is read"
                 )
-            raise InputError(f"the boundary curve leaves the surface in plan near ({x:.4g}, {y:.4g}) m: draw it inside")
+            raise InputError(f"the boundary curve leaves the surface in plan near {where}: draw it inside")
         return np.column_stack([curve[:, :2], z])
 
     def _is_in_space(self, curve: Floats) -> bool:
@@ -439,10 +439,9 @@ class Freeform(Target):
         off, x = self._fitted.off, self.surface.vertices
         k = int(np.argmax(off))
         if not off[k] < OFF * self._extent:
-            px, py, pz = x[k]
             how = f"vertices lie {off[k]:.2g} m off it" if np.isfinite(off[k]) else "or another sheet's normals differ"
             raise InputError(
-                f"{name} cannot be followed by a smooth surface near ({px:.4g}, {py:.4g}, {pz:.4g}) m, where its "
+                f"{name} cannot be followed by a smooth surface near {point_text(x[k])}, where its "
                 f"{how}: smooth it, mesh it more finely there, or separate sheets that touch or cross each other"
             )
 

@@ -33,6 +33,7 @@ from rodshell.targets.mesh_files import (
 )
 from rodshell.targets.nurbs import grid_triangles
 from rodshell.targets.nurbs_files import RHINO_FILES, read_3dm, read_step
+from rodshell.targets.rim import smoothest
 from rodshell.units import length_text, shown
 from rodshell.untrusted import read_text
 from rodshell.validation import brief, choice, file_path, instance, keep, number, numbers, positive
@@ -59,7 +60,7 @@ SQUARE = 0.01  # relative difference allowed between the proportions of the poin
 COARSE = 1 / 300  # of white: an image whose levels are further apart, such as one of 8 bits, has terraces
 ROUNDING = 12**-0.5  # levels, rms: error that rounding to levels adds to a smooth height
 MOST_MOVED = 1.0  # levels by which a height may be changed
-HALVINGS = 12
+POWERS, HALVINGS = (-3.0, 8.0), 12  # of the weight: at the largest a bend of a hundred pixels is still followed
 
 
 def read_heights(path: Path, size: tuple[float, float], height: float | None) -> FileSurface:
@@ -239,17 +240,12 @@ def smoothed(grey: Floats, step: float) -> Floats:
     It is a smoothing spline along both axes [Eilers and Marx 1996], which keeps planes. Its weight is the largest that
     changes heights by the rms error of rounding, and none by more than a step.
     """
-    low, high = -3.0, 8.0  # powers of ten; at the largest a bend of a hundred pixels is still followed
-    best = grey
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        tried = _splined(_splined(grey, 10**middle).T, 10**middle).T
+
+    def allowed(tried: Floats) -> bool:
         off = (tried - grey) / step
-        if np.std(off) <= ROUNDING and np.abs(off).max() <= MOST_MOVED:
-            low, best = middle, tried
-        else:
-            high = middle
-    return best
+        return bool(np.std(off) <= ROUNDING and np.abs(off).max() <= MOST_MOVED)
+
+    return smoothest(grey, lambda weight: _splined(_splined(grey, weight).T, weight).T, allowed, POWERS, HALVINGS)
 
 
 def _splined(values: Floats, weight: float) -> Floats:

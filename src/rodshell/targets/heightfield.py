@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
-from math import e, inf, isfinite, pi
+from itertools import accumulate
+from math import e, isfinite, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from rodshell.targets.jet import Jet
 from rodshell.targets.rim import Disc, Rectangle
 from rodshell.targets.target import Implicit
 from rodshell.targets.wall_below_rim import WalledTarget
-from rodshell.units import shown
+from rodshell.units import as_float, shown
 from rodshell.validation import instance
 
 _FUNCTIONS: dict[str, Callable[[Any], Any]] = {
@@ -181,7 +182,7 @@ class _Compiler:
             case ast.Name(name) if name in ("x", "y") or name in _CONSTANTS:
                 return lambda: _CONSTANTS.get(name, name), []
             case ast.Constant(int() | float() as value) if type(value) is not bool:
-                return lambda: self._finite(node, _number(value)), []
+                return lambda: self._finite(node, as_float(value)), []
         raise _refusal(self.text, self._piece(node), _meant(node))
 
     def _apply(self, node: ast.expr, function: Callable[..., Any], operands: list[_Operand]) -> _Operand:
@@ -228,19 +229,8 @@ def _meant(node: ast.expr) -> str | None:
     return None
 
 
-def _number(literal: int | float) -> float:
-    try:
-        return float(literal)
-    except OverflowError:  # an integer larger than any float
-        return inf
-
-
 def _nesting(source: str) -> int:
-    depth = deepest = 0
-    for character in source:
-        depth += (character == "(") - (character == ")")
-        deepest = max(deepest, depth)
-    return deepest
+    return max(accumulate((character == "(") - (character == ")") for character in source))
 
 
 @dataclass(frozen=True, kw_only=True)

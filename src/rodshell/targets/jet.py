@@ -16,90 +16,6 @@ _Part = Any
 LN2, _LN10 = float(np.log(2.0)), float(np.log(10.0))
 
 
-@dataclass(slots=True, eq=False, repr=False)
-class Jet:
-    """A function of x and y at n points: value, gradient and Hessian through arithmetic and numpy functions.
-
-    A part that is constant stays a float, and 0.0 and 1.0 cost nothing: most parts of x, of y and of functions of
-    a single variable. Parts may be jets: a jet of jets has higher derivatives. Operations without a derivative here
-    (comparisons, np.where, np.maximum, float()) are refused with a TypeError.
-
-    Args:
-        value, dx, dy, dxx, dxy, dyy: (n,) arrays, floats or jets.
-    """
-
-    value: _Part
-    dx: _Part = 0.0
-    dy: _Part = 0.0
-    dxx: _Part = 0.0
-    dxy: _Part = 0.0
-    dyy: _Part = 0.0
-
-    @property
-    def parts(self) -> tuple[_Part, ...]:
-        """Value, first and second derivatives, in the order of the arguments."""
-        return self.value, self.dx, self.dy, self.dxx, self.dxy, self.dyy
-
-    @staticmethod
-    def variables(x: _Part, y: _Part) -> tuple["Jet", "Jet"]:
-        """The variables `x` and `y` (n,) as jets."""
-        return Jet(x, dx=1.0), Jet(y, dy=1.0)
-
-    def __add__(self, other: Any) -> "Jet":
-        return _add(self, other)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> "Jet":
-        return _subtract(self, other)
-
-    def __rsub__(self, other: Any) -> "Jet":
-        return _subtract(other, self)
-
-    def __mul__(self, other: Any) -> "Jet":
-        return _multiply(self, other)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> "Jet":
-        return _divide(self, other)
-
-    def __rtruediv__(self, other: Any) -> "Jet":
-        return _divide(other, self)
-
-    def __pow__(self, other: Any) -> Any:
-        return _power(self, other)
-
-    def __rpow__(self, other: Any) -> Any:
-        return _power(other, self)
-
-    def __neg__(self) -> "Jet":
-        return Jet(*(-part for part in self.parts))
-
-    def __pos__(self) -> "Jet":
-        return self
-
-    def __abs__(self) -> "Jet":
-        return _chain(self, np.abs(self.value), np.sign(_plain(self.value)), 0.0)
-
-    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        rule = _RULES.get(ufunc)
-        if rule is None or method != "__call__" or options:
-            return NotImplemented
-        return rule(*inputs)
-
-    def __array_function__(self, function: Any, *_: Any) -> NoReturn:
-        raise TypeError(f"{getattr(function, '__name__', function)} has no derivative here")
-
-    def _refuse(self, *_: Any) -> NoReturn:
-        raise TypeError("a jet is not a plain array: use arithmetic and smooth numpy functions only")
-
-    __array__ = __bool__ = __float__ = __int__ = __len__ = __iter__ = _refuse
-    __lt__ = __le__ = __gt__ = __ge__ = _refuse
-    __eq__ = __ne__ = _refuse
-    __hash__ = None  # type: ignore[assignment]
-
-
 def _times(a: _Part, b: _Part) -> _Part:
     """a b, without arithmetic where a factor is a plain 0 or 1: a part that is zero everywhere stays so."""
     if a.__class__ is float:
@@ -142,21 +58,21 @@ def _plain(part: _Part) -> Any:
     return part
 
 
-def _jet(a: Any) -> Jet:
+def _jet(a: Any) -> "Jet":
     return a if a.__class__ is Jet else Jet(a)
 
 
-def _add(a: Any, b: Any) -> Jet:
+def _add(a: Any, b: Any) -> "Jet":
     a, b = _jet(a), _jet(b)
     return Jet(a.value + b.value, *map(_plus, a.parts[1:], b.parts[1:]))
 
 
-def _subtract(a: Any, b: Any) -> Jet:
+def _subtract(a: Any, b: Any) -> "Jet":
     a, b = _jet(a), _jet(b)
     return Jet(a.value - b.value, *map(_minus, a.parts[1:], b.parts[1:]))
 
 
-def _multiply(a: Any, b: Any) -> Jet:
+def _multiply(a: Any, b: Any) -> "Jet":
     if a.__class__ is not Jet:
         a, b = b, a
     f, p, q = a.value, a.dx, a.dy
@@ -173,7 +89,7 @@ def _multiply(a: Any, b: Any) -> Jet:
     )
 
 
-def _divide(a: Any, b: Any) -> Jet:
+def _divide(a: Any, b: Any) -> "Jet":
     a, b = _jet(a), _jet(b)
     g, r, s = b.value, b.dx, b.dy
     f = a.value / g
@@ -202,7 +118,7 @@ def _power(a: Any, b: Any) -> Any:
     return _chain(a, u**c, c * u ** (c - 1.0), c * (c - 1.0) * u ** (c - 2.0))
 
 
-def _chain(u: Jet, value: _Part, d1: _Part, d2: _Part) -> Jet:
+def _chain(u: "Jet", value: _Part, d1: _Part, d2: _Part) -> "Jet":
     """f(u) from f, f' and f'' at u's value."""
     p, q = u.dx, u.dy
     dx, dy = _times(d1, p), _times(d1, q)
@@ -215,6 +131,71 @@ def _chain(u: Jet, value: _Part, d1: _Part, d2: _Part) -> Jet:
         _plus(_times(d1, u.dxy), _times(bend_x, q)),
         _plus(_times(d1, u.dyy), _times(bend_y, q)),
     )
+
+
+def _swapped(rule: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    return lambda right, left: rule(left, right)
+
+
+@dataclass(slots=True, eq=False, repr=False)
+class Jet:
+    """A function of x and y at n points: value, gradient and Hessian through arithmetic and numpy functions.
+
+    A part that is constant stays a float, and 0.0 and 1.0 cost nothing: most parts of x, of y and of functions of
+    a single variable. Parts may be jets: a jet of jets has higher derivatives. Operations without a derivative here
+    (comparisons, np.where, np.maximum, float()) are refused with a TypeError.
+
+    Args:
+        value, dx, dy, dxx, dxy, dyy: (n,) arrays, floats or jets.
+    """
+
+    value: _Part
+    dx: _Part = 0.0
+    dy: _Part = 0.0
+    dxx: _Part = 0.0
+    dxy: _Part = 0.0
+    dyy: _Part = 0.0
+
+    @property
+    def parts(self) -> tuple[_Part, ...]:
+        """Value, first and second derivatives, in the order of the arguments."""
+        return self.value, self.dx, self.dy, self.dxx, self.dxy, self.dyy
+
+    @staticmethod
+    def variables(x: _Part, y: _Part) -> tuple["Jet", "Jet"]:
+        """The variables `x` and `y` (n,) as jets."""
+        return Jet(x, dx=1.0), Jet(y, dy=1.0)
+
+    def __neg__(self) -> "Jet":
+        return Jet(*(-part for part in self.parts))
+
+    def __pos__(self) -> "Jet":
+        return self
+
+    def __abs__(self) -> "Jet":
+        return _chain(self, np.abs(self.value), np.sign(_plain(self.value)), 0.0)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        rule = _RULES.get(ufunc)
+        if rule is None or method != "__call__" or options:
+            return NotImplemented
+        return rule(*inputs)
+
+    def __array_function__(self, function: Any, *_: Any) -> NoReturn:
+        raise TypeError(f"{getattr(function, '__name__', function)} has no derivative here")
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        raise TypeError("a jet is not a plain array: use arithmetic and smooth numpy functions only")
+
+    __add__ = __radd__ = _add
+    __mul__ = __rmul__ = _multiply
+    __sub__, __rsub__ = _subtract, _swapped(_subtract)
+    __truediv__, __rtruediv__ = _divide, _swapped(_divide)
+    __pow__, __rpow__ = _power, _swapped(_power)
+    __array__ = __bool__ = __float__ = __int__ = __len__ = __iter__ = _refuse
+    __lt__ = __le__ = __gt__ = __ge__ = _refuse
+    __eq__ = __ne__ = _refuse
+    __hash__ = None  # type: ignore[assignment]
 
 
 # f'(u, f) and f''(u, f, f') of smooth functions f(u)

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.geometry.curves import arc_lengths
 from rodshell.geometry.frames import dot, unit
 from rodshell.targets.nurbs import GRID, Nurbs, grid_triangles
 
@@ -77,7 +78,7 @@ def _inwards(grid: Floats) -> list[Floats]:
 
 def _even(t: Floats, x: Floats, share: Floats) -> Floats:
     """The parameters at these shares of the length of a curve through `x` (n, 3), of parameters `t` (n,)."""
-    s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1)))
+    s = arc_lengths(x)
     return np.asarray(np.interp(share * s[-1], s, t) if s[-1] > 0 else t[0] + share * (t[-1] - t[0]))
 
 

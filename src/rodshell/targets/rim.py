@@ -33,10 +33,7 @@ IN_A_BALL = 32  # points in each bounding ball
 SHARP = 0.35  # [rad], 20 degrees: an edge between two such turns to opposite sides is a jog
 FEWEST = 4  # successive jogs that make an edge jagged: a real corner or notch has fewer
 RUN = 2.5  # times sqrt(n): edges between successive jogs; a lattice cut along a circle of n edges has 1.1 sqrt(n)
-MOST, RMS = (
-    1.0,
-    0.35,
-)  # edge lengths: moves of vertices, largest and rms; steps of a lattice deviate by 0.29 rms
+MOST, RMS = 1.0, 0.35  # edge lengths: moves of vertices, largest and rms; steps of a lattice deviate by 0.29 rms
 HALVINGS = 20
 
 Given = Literal["plan", "space", "surface"]  # where a loop is drawn
@@ -396,12 +393,24 @@ def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
         return None
     length = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     edge = np.max([np.roll(length, k) for k in (-1, 0, 1, 2)], axis=0)[:, None]  # the longest nearby
-    low, high, best = -4.0, 10.0, loop  # powers of ten
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        tried = _splined(loop, edge, free, 10**middle)
+
+    def allowed(tried: Floats) -> bool:
         off = np.linalg.norm((tried - loop) / edge, axis=1)[free]
-        if off.max() <= MOST and np.sqrt(np.mean(off**2)) <= RMS:
+        return bool(off.max() <= MOST and np.sqrt(np.mean(off**2)) <= RMS)
+
+    return smoothest(loop, lambda weight: _splined(loop, edge, free, weight), allowed, (-4.0, 10.0), HALVINGS)
+
+
+def smoothest(
+    given: Floats, splined: Callable[[float], Floats], allowed: Callable[[Floats], bool], powers: tuple[float, float],
+    halvings: int,
+) -> Floats:  # fmt: skip
+    """The smoothing spline with the largest weight between two powers of ten that is allowed; else what is given."""
+    (low, high), best = powers, given
+    for _ in range(halvings):
+        middle = (low + high) / 2
+        tried = splined(10**middle)
+        if allowed(tried):
             low, best = middle, tried
         else:
             high = middle

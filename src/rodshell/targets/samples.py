@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.targets.trianglemesh import TriangleMesh, unique_rows
+from rodshell.targets.trianglemesh import TriangleMesh, turned, unique_rows
 
 LONGEST = 0.9  # spacings: longest edge that is not divided
 FINEST = 48  # divisions of an edge
@@ -57,7 +57,7 @@ def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
     divisions = np.clip(np.ceil(longest / (LONGEST * spacing)), 1, FINEST).astype(int)
     narrow = 2 * mesh.areas < APART * spacing * longest
     first = np.where(narrow, edges.argmax(axis=1), 0)
-    faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
+    faces = turned(faces, first)
     areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.areas * (divisions == 1) / 3, 3), len(mesh.vertices))
     rim_first = np.argsort(~np.isin(np.arange(len(mesh.vertices)), np.concatenate([[-1], *mesh.loops])), kind="stable")
     found: list[_Parts] = [(mesh.vertices[rim_first], mesh.normals[rim_first], np.asarray(areas[rim_first], float))]

@@ -5,6 +5,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.targets.nurbs import grid_triangles
 from rodshell.targets.target import Target
+from rodshell.targets.trianglemesh import turned
 
 CELLS = 56  # along the longer side of the plan
 BEYOND = 0.08  # of the plan's width: how far outside the points the surface is shown
@@ -53,18 +54,14 @@ def _cut(faces: Ints, inside: np.ndarray, first: int) -> tuple[Ints, Ints]:
     """
     # turned so that the corner that is alone on its side comes first
     alone = np.where(inside[faces].sum(axis=1) == 1, inside[faces].argmax(axis=1), inside[faces].argmin(axis=1))
-    turned = np.take_along_axis(faces, (alone[:, None] + np.arange(3)) % 3, axis=1)
-    within = inside[turned[:, 0]]
-    pairs = np.concatenate([turned[:, [0, 1]], turned[:, [0, 2]]])
+    faces = turned(faces, alone)
+    within, (tip, p, q) = inside[faces[:, 0]], faces.T
+    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [0, 2]]])
     pairs[~inside[pairs[:, 0]]] = pairs[~inside[pairs[:, 0]]][:, ::-1]
     edges, index = np.unique(pairs, axis=0, return_inverse=True)
     left, right = (first + index.reshape(2, -1)).astype(np.intp)
-    tips = np.column_stack([turned[:, 0], left, right])[within]
-    rest = ~within
-    quads = [
-        np.column_stack([left, turned[:, 1], turned[:, 2]])[rest],
-        np.column_stack([left, turned[:, 2], right])[rest],
-    ]
+    tips = np.column_stack([tip, left, right])[within]
+    quads = [np.column_stack(corners)[~within] for corners in ((left, p, q), (left, q, right))]
     return np.concatenate([tips, *quads]), edges
 
 

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from rodshell.arrays import Bools, Floats, Ints, Longs
 from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.units import point_text
 
 CREASE = 40.0  # degrees between faces, and between what is on either side: a smooth piece ends there
 STRAY = 0.01  # of the area: separate pieces with less in sum are left out
@@ -274,6 +275,11 @@ def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
     return first, kind.reshape(-1)
 
 
+def turned(faces: Ints, first: Ints) -> Ints:
+    """Rows (m, 3), such as the corners of triangles, each turned until its entry `first` (m,) comes first."""
+    return np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
+
+
 def chains(edges: Ints) -> list[Ints]:
     """Vertices of the rows into which edges (e, 2) fall at vertices where other than two of them meet; the
     last of a ring is its first."""
@@ -312,14 +318,12 @@ class Neighbours:
     def of(mesh: TriangleMesh, name: str) -> "Neighbours":
         a, b, edge, shared = mesh.sides
         if (shared > 2).any():
-            k = int(np.argmin(np.where(shared > 2, edge, len(edge))))
-            raise InputError(
-                f"{name} is not manifold: three faces or more share the edge near {place(mesh, a[k])}: remove one"
-            )
+            where = point_text(mesh.vertices[a[np.argmin(np.where(shared > 2, edge, len(edge)))]])
+            raise InputError(f"{name} is not manifold: three faces or more share the edge near {where}: remove one")
         twins, rim = mesh.sides.twins, shared == 1
         ends = np.bincount(np.concatenate([a[rim], b[rim]]), minlength=len(mesh.vertices))
         if (ends > 2).any():
-            where = place(mesh, int(np.argmax(ends)))
+            where = point_text(mesh.vertices[np.argmax(ends)])
             raise InputError(
                 f"{name} is not manifold: two parts of it touch in the single point {where}: add or remove a face there"
             )
@@ -348,7 +352,7 @@ class Neighbours:
         result = np.array(turned)
         wrong = (result[i] ^ result[j]) != self.against
         if wrong.any():
-            where = place(mesh, int(self.edges[np.argmax(wrong), 0]))
+            where = point_text(mesh.vertices[self.edges[np.argmax(wrong), 0]])
             raise InputError(f"{name} has only one side, as a Moebius strip has (found near {where}): cut it")
         return result
 
@@ -390,7 +394,8 @@ def smooth_piece(mesh: TriangleMesh, neighbours: Neighbours, name: str) -> Sound
     share = mesh.areas[pieces == chosen].sum() / mesh.areas.sum()
     if len(within) or share < 0.1:
         worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(cosine))
-        angle, where = degrees(np.arccos(np.clip(cosine[worst], -1, 1))), place(mesh, neighbours.edges[worst, 0])
+        angle = degrees(np.arccos(np.clip(cosine[worst], -1, 1)))
+        where = point_text(mesh.vertices[neighbours.edges[worst, 0]])
         creased = (
             f"{name} is creased: faces meet at {angle:.0f} degrees near {where}, and a target must be smooth: "
             "round it off, or mesh it more finely"
@@ -409,9 +414,3 @@ def _cosine(a: Floats, b: Floats) -> Floats:
     """Of the angles between vectors (n, 3); 1 where one has no length."""
     length = np.sqrt(dot(a, a) * dot(b, b))
     return np.asarray(np.where(length > 0, dot(a, b) / np.maximum(length, 1e-300), 1.0))
-
-
-def place(mesh: TriangleMesh, vertex: int) -> str:
-    """Coordinates of a vertex as text."""
-    x, y, z = mesh.vertices[vertex]
-    return f"({x:.4g}, {y:.4g}, {z:.4g}) m"

@@ -17,6 +17,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
 from rodshell.targets.rim import CORNER, UPRIGHT, Domain, Rim
 from rodshell.targets.target import Gap, Implicit, Target, offset_shape
+from rodshell.units import point_text
 
 if TYPE_CHECKING:
     from rodshell.targets.smooth_field import SmoothField
@@ -241,9 +242,9 @@ def walled_surface(
     x, up = mesh.vertices, mesh.normals[:, 2]
     inside = surface.margin(x) > 0
     if base is None and up[inside].min() < UPRIGHT:
-        px, py, pz = x[inside][np.argmin(up[inside])]
+        where = point_text(x[inside][np.argmin(up[inside])])
         raise InputError(
-            f"a grid cannot fall on {surface.name}, which is too steep near ({px:.4g}, {py:.4g}, {pz:.4g}) m for an "
-            f"edge that is not level: {instead}"
+            f"a grid cannot fall on {surface.name}, which is too steep near {where} for an edge that is not level: "
+            f"{instead}"
         )
     return WalledSurface(surface=surface, field=field, rim_plan=RimPlan(rims[0]), level_edge=base)
