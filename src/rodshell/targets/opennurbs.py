@@ -27,18 +27,20 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
     """
     import rhino3dm
 
-    model = rhino3dm.File3dm.FromByteArray(Path(request["path"]).read_bytes())  # type: ignore[arg-type]
+    model: Any = rhino3dm.File3dm.FromByteArray(Path(request["path"]).read_bytes())  # type: ignore[arg-type]
     if model is None:
         return {}
     found: dict[str, Any] = {"unit": model.Settings.ModelUnitSystem.name}
+    shapes = [item.Geometry for item in model.Objects]
     if "most" in request:
-        curves = _curves_of(model)
+        curves = [shape for shape in shapes if isinstance(shape, rhino3dm.Curve)]
         drawn = [divided(curve, request["along_edges"]) for curve in curves[: int(request["most"])]]
         ends = np.cumsum([0, *map(len, drawn)])
         return found | {"count": len(curves), "points": np.vstack([np.empty((0, 3)), *drawn]), "ends": ends}
     surfaces = list(_surfaces_of(model))
     found["names"] = json.dumps([names for *names, _ in surfaces])
-    found["others"] = json.dumps(_numbers_of(model))
+    kinds = rhino3dm.Mesh, rhino3dm.SubD, rhino3dm.Curve
+    found["others"] = json.dumps([sum(isinstance(shape, kind) for shape in shapes) for kind in kinds])
     wanted = [(shape, faces) for name, layer, faces, shape in surfaces if request["name"] in (None, name, layer)]
     number = request["name"] or ""
     if not wanted and number.isdecimal() and 0 < int(number) <= len(surfaces):
@@ -61,21 +63,6 @@ def main(request: dict[str, Any]) -> dict[str, Any]:
             found |= {f"{key}{k}": value for key, value in values.items()}
         found |= {"surfaces": count, "trims": np.array(trims).reshape(-1, request["along_edges"] + 1, 3)}
     return found
-
-
-def _curves_of(model: Any) -> list[Any]:
-    """Every curve object."""
-    import rhino3dm
-
-    return [item.Geometry for item in model.Objects if isinstance(item.Geometry, rhino3dm.Curve)]
-
-
-def _numbers_of(model: Any) -> list[int]:
-    """How many meshes, SubDs and curves a file has."""
-    import rhino3dm
-
-    kinds = rhino3dm.Mesh, rhino3dm.SubD, rhino3dm.Curve
-    return [sum(isinstance(item.Geometry, kind) for item in model.Objects) for kind in kinds]
 
 
 def _surfaces_of(model: Any) -> Any:

@@ -12,7 +12,7 @@ BEYOND = 0.08  # of the plan's width: how far outside the points the surface is 
 HALVINGS = 14  # of a mesh edge that crosses the end
 
 
-def surface_mesh(target: Target, around: Floats, *, cells: int = CELLS) -> tuple[Floats, Ints]:
+def surface_mesh(target: Target, around: Floats) -> tuple[Floats, Ints]:
     """Points (n, 3) [m] and triangles (t, 3) of the uppermost part of a target, over the plan of some points.
 
     It is made for pictures: the surface is sampled on a square mesh, whose triangles are cut at the end of the shell.
@@ -20,10 +20,9 @@ def surface_mesh(target: Target, around: Floats, *, cells: int = CELLS) -> tuple
 
     Args:
         around: (k, 3) points of a shell on the target [m].
-        cells: of the mesh along the longer side of the plan.
     """
     low, high = around[:, :2].min(axis=0), around[:, :2].max(axis=0)
-    step = float((high - low).max()) * (1 + 2 * BEYOND) / cells
+    step = float((high - low).max()) * (1 + 2 * BEYOND) / CELLS
     counts = np.ceil((high - low) * (1 + 2 * BEYOND) / step).astype(int)
     corner = 0.5 * (low + high - counts * step)
     x, y = (corner[k] + step * np.arange(counts[k] + 1) for k in range(2))
