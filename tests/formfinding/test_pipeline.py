@@ -327,7 +327,7 @@ def test_the_kept_case_asks_for_the_same_ends(ends, tmp_path):
     for form in (whole, sewn):
         (tmp_path / "case.toml").write_text(form.archive(options=rs.OutputOptions(stages=0)).case_toml)
         case = load_case(tmp_path / "case.toml")
-        assert tuple(support.name for support in case.supports) == form.ends == tuple(form.popped) == ends
+        assert tuple(support.name for support in case.popped_on) == form.ends == tuple(form.popped) == ends
 
 
 @pytest.mark.slow
