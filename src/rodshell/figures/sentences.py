@@ -26,12 +26,12 @@ SENTENCES = {
     ),
     "ends_in_the_air": (
         "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
-        "beam, an arch or a ring has to hold them{against}; it was taken as rigid here and has to be designed"
+        "beam, an arch or a ring has to hold them{against}; it was taken as {stiff} here and has to be designed"
     ),
     "falls": "{alone}the shell does not stand under its own weight{bracing}: it carries only {parts}{others}{advice}",
     "falls_after_years": (
-        "under {place} with {ends} ends the shell falls after years at {factor} times these loads, as deflections grow "
-        "by {creep} times what they are at first (creep)"
+        "under {place} with {ends} ends{imperfections} the shell falls after years at {factor} times these loads, as "
+        "deflections grow by {creep} times what they are at first (creep)"
     ),
     "falls_under_loads": "with {ends} ends the shell falls under {place}: it {how} at {factor} times these loads",
     "flat": "the target is flat, nothing pops up",

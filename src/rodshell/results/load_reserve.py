@@ -31,7 +31,8 @@ def fall(found: LoadedShell, name: str, ends: Ends) -> Iterator[Said]:
         yield said("imperfect", ends, imperfect, 1, place=name, factor=rounded_down(imperfect))
     elif years is not None and (least := _least(years)) < 1 and not _lost(years):
         factor, creep = rounded_down(least), rounded(years.creep or 0.0)
-        yield said("falls_after_years", ends, least, 1, place=name, factor=factor, creep=creep)
+        also = " and imperfections" * (years.imperfect_factor == least)
+        yield said("falls_after_years", ends, least, 1, place=name, factor=factor, creep=creep, imperfections=also)
 
 
 def open_points(found: LoadedShell, name: str, ends: Ends, shown: Length) -> Iterator[Said]:

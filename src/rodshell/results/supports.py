@@ -64,7 +64,9 @@ def air_findings(results: Results) -> Iterator[Said]:
     force = found.largest_force
     under = "those under the loads among them" if results.loads else "before own weight and loads act"
     against = "" if force is None else f" against forces of up to {newtons(force)} each, {under}"
+    yields = any(held.figures for held in results.reactions.values())
+    stiff = "stiff as the supports that were given" if yields else "rigid"
     yield said(
-        "ends_in_the_air", None, found.highest, 0, "m",
+        "ends_in_the_air", None, found.highest, 0, "m", stiff=stiff,
         count=found.count, all=len(results.boundary), high=high, against=against,
     )  # fmt: skip
