@@ -84,7 +84,16 @@ if TYPE_CHECKING:
     from rodshell.rods.local_energy import LocalEnergy
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
-    from rodshell.rods.support_groups import FreeEnds, HeldEnds, SlidingEnds, SprungEnds, SupportGroups
+    from rodshell.rods.support_groups import (
+        Arch,
+        EdgeBeam,
+        FreeEnds,
+        HeldEnds,
+        Ring,
+        SlidingEnds,
+        SprungEnds,
+        SupportGroups,
+    )  # fmt: skip
     from rodshell.rods.supports import Support
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.problem import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
@@ -143,7 +152,9 @@ _HOMES = {
     "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.rods.local_energy": ("LocalEnergy",),
     "rodshell.rods.supports": ("Support",),
-    "rodshell.rods.support_groups": ("FreeEnds", "HeldEnds", "SlidingEnds", "SprungEnds", "SupportGroups"),
+    "rodshell.rods.support_groups": (
+        "Arch", "EdgeBeam", "FreeEnds", "HeldEnds", "Ring", "SlidingEnds", "SprungEnds", "SupportGroups",
+    ),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.solve.problem": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
@@ -161,21 +172,21 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Archive", "Asymptotic", "Ball", "Bound", "Boundary", "Cables", "Cap", "ChebyshevNet", "Circle",
-    "ConvergenceError", "Curves", "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings",
-    "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid",
-    "FlatRod", "Footprint", "Form", "FreeEnds", "Freeform", "Geodesic", "GivenSection", "Gravity", "GravityForce",
-    "GridLayout", "GridMesh", "HeightField", "HeldEnds", "Hemisphere", "ImplicitEuler", "ImplicitForce",
-    "ImplicitPenalty", "InputError", "Job", "Laths", "LineLoad", "Linker", "Loads", "LocalEnergy", "LockedJoints",
-    "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid",
-    "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection",
-    "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight",
-    "Settlement", "SharedDofs", "Shell", "SlidingEnds", "Snow", "Spring", "SprungEnds", "Stability", "StabilityError",
-    "Strength", "Support", "SupportGroups", "Target", "Temperature", "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind",
-    "__version__", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export",
-    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise", "pop_up", "pop_up_table", "read",
-    "read_sweep", "refine", "save", "search", "settle", "simulate", "solve_rod", "straight_rods", "surface_from",
-    "sweep", "trim",
+    "Agreement", "Arch", "Archive", "Asymptotic", "Ball", "Bound", "Boundary", "Cables", "Cap", "ChebyshevNet",
+    "Circle", "ConvergenceError", "Curves", "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp",
+    "DynamicPopUpSettings", "EdgeBeam", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
+    "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "FreeEnds", "Freeform", "Geodesic",
+    "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "HeldEnds", "Hemisphere",
+    "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Laths", "LineLoad", "Linker", "Loads",
+    "LocalEnergy", "LockedJoints", "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError",
+    "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile",
+    "Rectangle", "RectangularSection", "Results", "Rigid", "Ring", "Rod", "RodLoads", "RodShape", "RodSupports",
+    "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell", "SlidingEnds", "Snow", "Spring",
+    "SprungEnds", "Stability", "StabilityError", "Strength", "Support", "SupportGroups", "Target", "Temperature",
+    "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "__version__", "agreement", "bar", "chebyshev_net", "check",
+    "check_loads", "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back",
+    "mesh_grid", "optimise", "pop_up", "pop_up_table", "read", "read_sweep", "refine", "save", "search", "settle",
+    "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 

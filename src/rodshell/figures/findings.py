@@ -58,6 +58,7 @@ CODES = {
     "stands_under_loads": "the shell carries a combination of loads",
     "strength": "rods use more than their strength before loads act",
     "strength_not_reduced": "rods permanently use a strength that is not reduced for duration and moisture",
+    "strength_of_beam": "a beam along the edge uses more than its strength",
     "strength_of_bracing": "bracing uses more than its strength under a combination of loads",
     "strength_under_loads": "rods use more than their strength under a combination of loads",
     "too_thick": "rods are too thick for their bends",
@@ -76,7 +77,7 @@ GOOD = frozenset({
 })  # fmt: skip
 FAULTS = frozenset({
     "contact", "falls", "falls_after_years", "falls_under_loads", "flat", "imperfect", "slip", "strength",
-    "strength_of_bracing", "strength_under_loads", "too_thick", "unstable",
+    "strength_of_beam", "strength_of_bracing", "strength_under_loads", "too_thick", "unstable",
 })  # fmt: skip
 """Of these a shell cannot be built; another on other supports may be."""
 NOT_KNOWN = frozenset({"none_stands", "not_computed"})

@@ -5,6 +5,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from rodshell.figures.loads import UsedBeam
 from rodshell.figures.records import (
     ByEnds,
     Ends,
@@ -117,6 +118,18 @@ class RodType(Record):
     EI2: Number = key("bending stiffness within the grid", "N m2")
     GJ: Number = key("twist stiffness", "N m2")
     mass_per_length: Number = key("mass per length", "kg/m")
+
+
+class EdgeBeam(Record):
+    """A beam along the edge, free of stress in the shape in which the shell stands when it is fitted."""
+
+    name: Text | None = key("its name: E1, E2, ...")
+    kind: Text | None = key("edge_beam, ring or arch")
+    ends: Rows[Text] = rows("the rod ends on it, in their order; a ring's first one follows its last")
+    length: Number = key("from its first rod end to its last; of a ring all round", "m")
+    mass: Number = key("of the whole beam", "kg")
+    rod: RodType | None = key("section, material and stiffnesses")
+    unloaded: UsedBeam | None = key("what acts in it without loads")
 
 
 class Joint(Record):

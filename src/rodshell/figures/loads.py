@@ -84,6 +84,18 @@ class AfterYears(Record):
     )
 
 
+class UsedBeam(Record):
+    """What acts in a beam along the edge, and what it uses of its strength."""
+
+    name: Text | None = key("its name, as in edge_beams")
+    tension: Number = key("largest tension", "N")
+    compression: Number = key("largest compression", "N")
+    max_stress: Number = key("largest stress of bending, axial force and torsion", "Pa")
+    max_stress_at: Text | None = key("the rod end nearest to it")
+    utilisation: Number = key("of the strength of its material's preset; null: not known")
+    euler: Number = key("largest compression of a span between rod ends over its Euler load")
+
+
 class LoadedShell(Record):
     """The shell under a combination of loads. Factors multiply the whole combination."""
 
@@ -115,6 +127,7 @@ class LoadedShell(Record):
     )
     bracing_unloaded: Rows[Number] = rows("the same before these loads: what a cable is to be stressed to", "N")
     bracing_utilisation: Number = key("utilisation of laths of a third layer or of cables; null: none, or not known")
+    edge_beams: Rows[UsedBeam] = rows("what acts in the beams along the edge")
     joint_moments: Numbers = numbers(
         "moment of each locked joint about its normal, in the order of joint_loads; empty: none is locked", "N m"
     )

@@ -90,8 +90,8 @@ SENTENCES = {
         "composites withstand less shear along the fibres: give checks.shear_strength"
     ),
     "no_strength": "no strength was given, so it is not known whether the rods hold (checks.strength)",
-    "no_strength: bracing": (
-        "the design strength of the bracing is not known, so that whether it breaks under the loads was not judged: "
+    "no_strength: others": (
+        "the design strength of {what} is not known, so that whether it breaks under the loads was not judged: "
         "compare its largest forces, which stand with the loads, with what it can carry"
     ),
     "no_strength: durations": "the design strength for {durations} loads is not known and was not judged",
@@ -193,6 +193,10 @@ SENTENCES = {
     "strength_not_reduced": (
         "the rods permanently use {share} of {whose}: reduce it for duration and moisture and give the reduced value "
         "as checks.strength, or use thinner rods"
+    ),
+    "strength_of_beam": (
+        "with {ends} ends the beam {beam} along the edge uses {share} of its design strength {under}, near the rod end "
+        "{place}"
     ),
     "strength_of_bracing": "with {ends} ends the bracing uses {share} of its design strength under {place}",
     "strength_under_loads": LOADS,

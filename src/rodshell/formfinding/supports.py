@@ -1,6 +1,6 @@
 """Shells with energies of one's own, on supports that let their rods' ends slide."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeGuard
 
@@ -8,10 +8,12 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.formfinding.finite_sections import node_normals
 from rodshell.model import Shell
+from rodshell.model.edge_beam import FittedBeam
 from rodshell.model.shell import Direction
 from rodshell.rods.elements import Elements
-from rodshell.rods.supports import Support
+from rodshell.rods.supports import BeamAlong, Support
 from rodshell.solve.equilibrium import MOST_ITERATIONS, Equilibrium, find_stable
 from rodshell.solve.problem import Supports
 from rodshell.units import shown
@@ -33,11 +35,38 @@ def let_go(
     support = support.named(shell.mesh.grid.support_names)
     slides = slides_of(support, support.free(points), len(points))
     springs = energies_of(support.energies(shell.ends, points), shell.node_count)
-    if not slides and not springs:
+    beams = support.beams(points)
+    if not slides and not springs and not beams:
         return shell, held
     there = replace(shell, slides=slides, springs=springs)
+    if beams:
+        there, held = _fitted(there, held, beams)
     shell, found = at_rest(there, held, counting(f"{support}, let go, iteration", MOST_ITERATIONS))
     return shell, replace(found, report=found.report.after(held.report))
+
+
+def _fitted(shell: Shell, held: Equilibrium, beams: Sequence[BeamAlong]) -> tuple[Shell, Equilibrium]:
+    """A shell with beams along its edge, free of stress in its equilibrium `held`.
+
+    Raises:
+        InputError: rods lie in layers, so that their ends do not lie along one curve; the shell is in patches.
+    """
+    if shell.mesh.layered:
+        raise InputError("a beam along the edge joins rods in one layer: set joint.eccentricity to 0, or leave it out")
+    if shell.grid_of.max() > 0:
+        raise InputError("a beam along the edge is for a shell in one patch: leave out the patches, or the beam")
+    normals = node_normals(shell.mesh, shell.positions(held.state))[shell.mesh.ends.ravel()]
+    done, first = list[FittedBeam](), len(held.state)
+    for along in beams:
+        nodes = shell.ends[along.ends]
+        if not np.isin(shell.ends[along.twins], nodes).all():
+            raise InputError(f"two rod ends of the beam {along.name} are in one place: shift the grid a little")
+        done.append(FittedBeam.fitted(along, nodes=nodes, state=held.state, normals=normals[along.ends], first=first))
+        first += len(done[-1].angles)
+    there = shell.with_beams(done)
+    state, gradient = (np.vstack([each, np.zeros((first - len(each), 3))]) for each in (held.state, held.gradient))
+    problem = replace(held.problem, flat_coordinates=there.flat_coordinates, pattern=None)
+    return there, replace(held, problem=problem, state=state, gradient=gradient)
 
 
 def at_rest(shell: Shell, near: Equilibrium, progress: Callable[[int, float], None]) -> tuple[Shell, Equilibrium]:

@@ -27,6 +27,7 @@ from rodshell.formfinding import PopUp, Stages
 from rodshell.layout import GridMesh
 from rodshell.loads.bracing import stressed
 from rodshell.loads.combinations import Loads
+from rodshell.loads.edge_beams import used_beams, with_creep
 from rodshell.loads.kinds import Forces, Settlement, Temperature
 from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
@@ -114,7 +115,9 @@ class LoadChecks:
             yield said("no_strength: durations", durations=" and ".join(unknown))
         every = [shell for by_ends in self.shells.values() for shell in by_ends.values()]
         if any(shell.bracing_utilisation is None and len(shell.bracing_forces) for shell in every):
-            yield said("no_strength: bracing", place="bracing")
+            yield said("no_strength: others", place="bracing", what="the bracing")
+        if any(beam.utilisation is None for shell in every for beam in shell.edge_beams):
+            yield said("no_strength: others", place="edge beam", what="beams along the edge")
 
 
 def check_shells(
@@ -188,7 +191,8 @@ def _following(progress: Callable[[str], None], what: str, count: int, factor: f
 def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: Stages) -> Structure:
     """The erected shell with its bracing locked, and then its joints; InputErrors are those of the bracing, and that
     the supports leave a mechanism."""
-    structure, bracing = Structure.erected(popped, stages.rod), loads.bracing
+    shell, bracing = with_creep(popped.shell, loads.strength.service_class), loads.bracing
+    structure = Structure.erected(replace(popped, shell=shell), stages.rod)
     if bracing is not None:
         fitted = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
         structure = BRACED[type(fitted)](fitted, structure, stages.target)
@@ -339,6 +343,7 @@ def loaded_shell(
         bracing_forces=structure.bracing_forces(found),
         bracing_before=structure.bracing_forces(unloaded),
         bracing_utilisation=_of_bracing(structure, found, loads, limits, duration),
+        edge_beams=used_beams(shell, found, loads.strength, duration),
         joint_moments=moments,
         joint_moment_at=names[largest_at(np.abs(moments))] if len(moments) else None,
         slipping=tuple(names[k] for k in _slipping(mesh, used)),
@@ -354,7 +359,8 @@ def _creeps_alike(structure: Structure, limits: Limits) -> bool:
     layer, springs = structure.laths, structure.shell.springs
     if layer is not None and layer.rod.material != structure.rod.material:
         return preset_limits(layer.rod, limits.service_class).creep == limits.creep
-    return all(hasattr(spring, "times") for spring in springs)
+    known = all(beam.creep is not None for beam in structure.shell.beams)
+    return known and all(hasattr(spring, "times") for spring in springs)
 
 
 def _slipping(mesh: GridMesh, used: Utilisation) -> Ints:

@@ -94,17 +94,19 @@ def after_years(
 
 
 def crept(structure: Structure, creep: float) -> Structure | None:
-    """The structure whose cables and springs of supports are 1 + `creep` times as stiff, in its equilibrium without
-    loads; None where none that is stable was found."""
+    """The structure whose cables and springs of supports are 1 + `creep` times as stiff, and its beams by as much more
+    as they creep less, in its equilibrium without loads; None where none that is stable was found."""
     shell, cables = structure.shell, structure.cables
-    if cables is None and not shell.springs:
+    if cables is None and not shell.springs and not shell.beams:
         return structure
-    first, last = len(shell.elements) - len(shell.springs), len(shell.elements)
+    last = len(shell.elements)
 
     def stiffer(elements: tuple[Elements, ...], share: float) -> tuple[Elements, ...]:
         times = 1.0 + share * creep
-        others = elements[last:] if cables is None else (cables.times(times),)
-        return (*elements[:first], *(spring.times(times) for spring in shell.springs), *others)  # type: ignore[attr-defined]
+        springs = tuple(spring.times(times) for spring in shell.springs)  # type: ignore[attr-defined]
+        beams = tuple(beam.times(times / (1.0 + share * (beam.creep or 0.0))) for beam in shell.beams)
+        there = replace(shell, springs=springs, beams=beams).with_frames_of(elements[:last])
+        return (*there.elements, *(elements[last:] if cables is None else (cables.times(times),)))
 
     found = in_steps(structure.equilibrium, stiffer)
     return None if found is None else replace(structure, shell=structure.shell_at(found), equilibrium=found)

@@ -1,7 +1,8 @@
 """A meshed grid of rods and joints as a sum of energies, with its clamps and, where needed, its twist angles.
 
 The state's blocks are the nodes, then the ghost nodes of the clamps, then the twist angles of the edges (and of the
-ghost edges, where needed), then, with a penalty coupling, the nodes and the twist angles of the linkers.
+ghost edges, where needed), then, with a penalty coupling, the nodes and the twist angles of the linkers, then the twist
+angles of the beams along its edge.
 
 The coupling decides the nodes [HQK 2.2]. With shared DOFs rods have one node at a joint, and linkers have no unknowns.
 With a penalty each rod and each linker has its own: `like` is the block of the shared form that each copies, and the
@@ -36,6 +37,7 @@ from rodshell.joints.joint import elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.assembly import ANGLE, Freedom
+from rodshell.model.edge_beam import FittedBeam
 from rodshell.model.potential import Potential
 from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist, frames_among
@@ -70,6 +72,7 @@ class Shell:
         edge_inertia: (e,) moment of inertia of each edge about its tangent [kg m2].
         joint_mass: (c,) mass of each crossing's joint [kg].
         springs: energies of the supports, which act on the rods' ends.
+        beams: along its edge.
         slides: orthonormal directions along which rod ends may move, by the number of the end; others are held.
         turns: (g, 2, 2) how each flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
@@ -89,6 +92,7 @@ class Shell:
     edge_inertia: Floats
     joint_mass: Floats
     springs: tuple[Elements, ...] = ()
+    beams: tuple[FittedBeam, ...] = ()
     slides: Mapping[int, Sequence[Direction]] = field(default_factory=dict)
     turns: Floats = field(default_factory=lambda: np.eye(2)[None])
 
@@ -137,7 +141,7 @@ class Shell:
     @property
     def elements(self) -> tuple[Elements, ...]:
         """All energies but the stretch, those of explicit ties included: an equilibrium is the same."""
-        return (*self.within, *self.between, *self.springs)
+        return (*self.within, *self.between, *self.springs, *(part for beam in self.beams for part in beam.elements))
 
     @property
     def energies(self) -> Potential:
@@ -157,7 +161,7 @@ class Shell:
     @property
     def yields(self) -> bool:
         """Whether its supports let the rods' ends move."""
-        return bool(self.slides or self.springs)
+        return bool(self.slides or self.springs or self.beams)
 
     @property
     def first_angle(self) -> int:
@@ -178,7 +182,9 @@ class Shell:
         angles = np.empty((0, 2))
         if self.angles:
             angles = np.vstack([flat[self.mesh.edges].mean(axis=1), ghosts])[: self.angles]
-        return np.concatenate([flat, ghosts, angles]).take(self.like, axis=0)
+        shared = np.concatenate([flat, ghosts, angles])
+        of_beams = [shared[self.like[beam.stretch.blocks]].mean(axis=1) for beam in self.beams]
+        return np.concatenate([shared, *of_beams]).take(self.like, axis=0)
 
     @cached_property
     def mass(self) -> Floats:
@@ -193,8 +199,10 @@ class Shell:
         if self.angles:
             angles = mesh.node_count + len(self.ghosts)
             shared[angles : angles + len(mesh.edges), 0] = self.edge_inertia
-        copies = np.bincount(self.like)
-        return np.asarray(shared[self.like] / copies[self.like][:, None])
+        mass = np.asarray(shared[self.like] / np.bincount(self.like)[self.like][:, None])
+        for beam in self.beams:
+            beam.add_mass(mass)
+        return mass
 
     def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
         """(N, 3) state of the shell.
@@ -227,15 +235,25 @@ class Shell:
     def freedom(self) -> Freedom:
         """All nodes free, ghosts fixed, one free component a twist angle; rods that could spin freely are held."""
         free = Freedom.free(len(self.like)).with_directions(self.ghosts)
-        if not self.angles:
-            return free
         turning = np.flatnonzero(self.like >= self.mesh.node_count + len(self.ghosts))
-        return free.with_directions(turning, ANGLE).with_directions(self.spinning)
+        return free.with_directions(turning, ANGLE).with_directions(self.spinning) if len(turning) else free
 
     def with_elements(self, elements: tuple[Elements, ...]) -> "Shell":
         """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere."""
-        first, last = len(self.within), len(self.within) + len(self.between)
-        return replace(self, within=elements[:first], between=elements[first:last], springs=elements[last:])
+        parts, rest = list[tuple[Elements, ...]](), elements
+        for group in (self.within, self.between, self.springs, *(beam.elements for beam in self.beams)):
+            parts.append(rest[: len(group)])
+            rest = rest[len(group) :]
+        within, between, springs, *of_beams = parts
+        beams = tuple(beam.with_elements(own) for beam, own in zip(self.beams, of_beams, strict=True))
+        return replace(self, within=within, between=between, springs=springs, beams=beams)
+
+    def with_beams(self, beams: Sequence[FittedBeam]) -> "Shell":
+        """The same shell with beams along its edge, whose twist angles follow its blocks in their order."""
+        own = sum(len(beam.angles) for beam in beams)
+        like = np.append(self.like, int(self.like.max()) + 1 + np.arange(own))
+        spinning = np.concatenate([self.spinning, *(beam.loose for beam in beams)]).astype(np.intp)
+        return replace(self, beams=tuple(beams), like=like, spinning=spinning)
 
     @cached_property
     def grid_of(self) -> Ints:
@@ -243,7 +261,8 @@ class Shell:
         of_rods = self.mesh.grid_of_rods
         of_ends, of_edges = np.repeat(of_rods, 2), of_rods[self.mesh.edge_rods]
         of_angles = np.append(of_edges, of_ends)[: self.angles]
-        return np.concatenate([self.mesh.grid_of_nodes, of_ends[: len(self.ghosts)], of_angles])[self.like]
+        of_beams = [np.repeat(of_ends[beam.along.ends[0]], len(beam.angles)) for beam in self.beams]
+        return np.concatenate([self.mesh.grid_of_nodes, of_ends[: len(self.ghosts)], of_angles, *of_beams])[self.like]
 
     def turned(self, turns: Floats) -> "Shell":
         """The same shell of flat grids that are turned in their plane (g, 2, 2), of rows x, y, so that no edge of a

@@ -3,7 +3,7 @@
 This is the only file of the folder that knows the forms: in one piece, in patches, and from a table of rods.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from importlib.metadata import version
 from math import degrees
@@ -26,6 +26,8 @@ from rodshell.formfinding.trim import ends_past_net
 from rodshell.joints import joint_parameters
 from rodshell.kernels import description
 from rodshell.layout import Profile
+from rodshell.loads.edge_beams import used_beams
+from rodshell.loads.settings import Strength
 from rodshell.results.results import Results
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod
@@ -47,6 +49,7 @@ def results_of(stages: Stages) -> Results:
         "joint": figures.Joint.model_validate(plain(joint_parameters(stages.joint))),
         **_grid(stages.footprint, stages.boundary.points, stages.dropped, stages.rod),
         "pop_up": _pop_ups(stages),
+        "edge_beams": tuple(_edge_beams(stages)),
     }
     if stages.from_table:
         return Results(**_head("rods", stages.status, stages.warnings), **known)
@@ -120,6 +123,22 @@ def with_refinement(results: Results, found: "Refined") -> Results:
             refused=found.refused or None,
         ),
     )
+
+
+def _edge_beams(stages: Stages) -> Iterator[figures.EdgeBeam]:
+    for popped in stages.popped.values():
+        names = popped.shell.mesh.grid.support_names
+        unloaded = used_beams(popped.shell, popped.equilibrium, Strength(), None)
+        for beam, used in zip(popped.shell.beams, unloaded, strict=True):
+            yield figures.EdgeBeam(
+                name=beam.along.name,
+                kind=beam.along.kind,
+                ends=tuple(names[end] for end in beam.along.ends),
+                length=beam.length,
+                mass=beam.length * beam.rod.mass_per_length,
+                rod=rod_type(beam.rod),
+                unloaded=used,
+            )
 
 
 def rod_type(rod: Rod) -> figures.RodType:

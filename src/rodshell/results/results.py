@@ -129,6 +129,7 @@ class Results(Record, metaclass=_Refusing):
     footprint: Rows[Flat] = rows("flat place of each rod's start and end in turn", "m")
     boundary: Rows[Point] = rows("place in space of each rod's start and end in turn", "m")
     end_tangents: Rows[Point] = rows("direction in which each of these rod ends points out of the shell")
+    edge_beams: Rows[form.EdgeBeam] = rows("beams along the edge")
     agreement: ByEnds[form.Agreement] = by_ends("gap to the target")
     drape: form.Drape | None = key("the rods laid on the target")
     pop_up: ByEnds[form.PopUp] = by_ends("the shell popped up from flat")

@@ -7,9 +7,10 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.figures.checks import EndsInTheAir
 from rodshell.figures.findings import Said, said
+from rodshell.figures.records import Ends
 from rodshell.results.results import Results
-from rodshell.results.wording import newtons, shown_length
-from rodshell.rods.support_groups import unheld
+from rodshell.results.wording import newtons, shown_length, too_much
+from rodshell.rods.support_groups import SupportGroups, unheld
 
 ABOVE = 0.02  # of the size: higher ends are not on the level of the lowest
 
@@ -45,6 +46,20 @@ def share_of_span(results: Results, deflection: float | None) -> str:
     if not deflection or not len(points):
         return ""
     return f"span/{float(np.ptp(points[:, :2], axis=0).min()) / deflection:.0f}"
+
+
+def beam_faults(results: Results, ends: Ends) -> Iterator[Said]:
+    """Beams along the edge that use more than their strength, without loads and under each combination."""
+    if ends != SupportGroups.name:
+        return
+    unloaded = [("before loads act", beam.unloaded) for beam in results.edge_beams]
+    loaded = [(f"under {name}", beam) for name, _, shell in results.loaded_shells() for beam in shell.edge_beams]
+    for under, beam in (*unloaded, *loaded):
+        if beam is not None and (share := beam.utilisation or 0.0) > 1:
+            yield said(
+                "strength_of_beam", ends, share, 1, place=beam.max_stress_at, beam=beam.name, under=under,
+                share=too_much(share),
+            )  # fmt: skip
 
 
 def _forces(results: Results) -> Iterator[Floats]:

@@ -27,7 +27,7 @@ from rodshell.results.strength_used import (
     holds_while_erected,
     strength_name,
 )
-from rodshell.results.supports import air_findings, width
+from rodshell.results.supports import air_findings, beam_faults, width
 from rodshell.results.wording import (
     FORM_AGAIN,
     millimetres,
@@ -38,6 +38,7 @@ from rodshell.results.wording import (
     rounding_of,
     shown_factor,
     snow_text,
+    too_much,
     whole_percent,
 )
 from rodshell.rods.design_strength import RESERVED
@@ -161,6 +162,7 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[Said]:
     yield from _contact_faults(results, ends)
     yield from _fibre_faults(results, ends)
     yield from _load_faults(results, ends)
+    yield from beam_faults(results, ends)
 
 
 BY_WORDS = {
@@ -197,18 +199,18 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[Said]:
         for by, share in before.items():
             if share > 1:
                 sentence = "slip: unloaded" if by == "slip_unloaded" else "strength: unloaded"
-                rod, what = place.rod if place else None, BY_WORDS[by].format(_too_much(share), by_code(results))
+                rod, what = place.rod if place else None, BY_WORDS[by].format(too_much(share), by_code(results))
                 word = said(sentence, ends, share, 1, place=rod, what=what, where=where * (by == governs))
                 if len(word) > len(unloaded.get(by, "")):  # the same under all, or with its place
                     unloaded[by] = word
         worst = max(uses, key=lambda by: uses[by], default="")
         if uses.get(worst, 0.0) > 1:
             at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
-            what = BY_WORDS.get(worst, BY_WORDS["bending"]).format(_too_much(uses[worst]), by_code(results))
+            what = BY_WORDS.get(worst, BY_WORDS["bending"]).format(too_much(uses[worst]), by_code(results))
             code, where = "slip" if worst == "slip" else "strength_under_loads", where * (worst == governs)
             yield said(code, ends, uses[worst], 1, place=name, what=what, at=at, where=where)
         if (braced := found.bracing_utilisation) is not None and braced > 1:
-            yield said("strength_of_bracing", ends, braced, 1, place=name, share=_too_much(braced))
+            yield said("strength_of_bracing", ends, braced, 1, place=name, share=too_much(braced))
     yield from unloaded.values()
 
 
@@ -223,11 +225,6 @@ def _not_of_loads(results: Results, found: LoadedShell) -> Iterator[str]:
     if staying and lasting:
         alone = (parts.permanent or 0.0) * staying / lasting
         yield from (by for by in ("bending", "shear") if (getattr(parts, by) or 0.0) <= SAME_USE * alone)
-
-
-def _too_much(share: float) -> str:
-    """A share above 1, never shown as 100 %."""
-    return f"{max(101, round(100 * share))} %"
 
 
 def _contact_faults(results: Results, shape: str) -> Iterator[Said]:
@@ -254,7 +251,7 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[Said]:
             where += ": the section that was chosen is too thick; give a thinner one (rod.section)"
         yield said(
             "strength" if by_design_strength(results) else "strength: given", _ends(shape), used, 1, place=bent.rod,
-            shape=_shape(shape, bent), share=_too_much(used), whose=strength_name(results, shape), where=where,
+            shape=_shape(shape, bent), share=too_much(used), whose=strength_name(results, shape), where=where,
         )  # fmt: skip
     if strain is not None and strain > THIN:
         yield said(
@@ -278,7 +275,7 @@ def _erection(results: Results) -> Iterator[Said]:
     faults = [*_fibre_faults(results, "deployment")]
     if used is not None and used > 1 and holds_while_erected(results, used):
         faults.append(said(
-            "strength", None, used, 1, place=bent.rod, shape=_shape("deployment", bent), share=_too_much(used),
+            "strength", None, used, 1, place=bent.rod, shape=_shape("deployment", bent), share=too_much(used),
             whose=strength_name(results, "deployment"), where="",
         ))  # fmt: skip
     if _on_the_way(results):

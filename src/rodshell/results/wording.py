@@ -257,3 +257,8 @@ def _case_value(key: str, value: Any, units: Mapping[str, tuple[float, str]], ro
         number = round(number, rounding.digits) or number
     shown = rounded(number, 5).replace("-", MINUS)
     return f"{shown}{unit}" if unit == "\N{DEGREE SIGN}" else f"{shown} {unit}".strip()
+
+
+def too_much(share: float) -> str:
+    """A share above 1, never shown as 100 %."""
+    return f"{max(101, round(100 * share))} %"

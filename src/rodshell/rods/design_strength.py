@@ -131,6 +131,10 @@ DESIGN: dict[PresetName, DesignFactors] = {
         source="a third of the characteristic strength for permanent and half of it for short loads, as at the "
         "cathedral of Creteil (du Peloux, Tayeb, Baverel and Caron, Structural Engineering International 2/2016)",
     ),
+    "steel": DesignFactors(
+        factors=((1.0,) * 5,), partial=1.0, tension=1.0, compression=1.0, creep=(0.0,),
+        source="EN 1993-1-1:2005, 6.1(1): gamma_M0 = 1.0, elastic",
+    ),
     "spring-steel": DesignFactors(
         factors=((1.0,) * 5,), partial=1.0, tension=1.0, compression=1.0, creep=(0.0,),
         source="the preset's strength is already that of static springs and is not reduced",

@@ -14,7 +14,9 @@ from rodshell.units import shown
 from rodshell.validation import brief
 
 _REPLACEABLE = ("youngs_modulus", "density", "shear", "poisson_ratio")
-PresetName = Literal["larch", "spruce", "oak", "glulam", "bamboo", "gfrp", "plywood", "petg", "spring-steel", "rubber"]
+PresetName = Literal[
+    "larch", "spruce", "oak", "glulam", "bamboo", "gfrp", "plywood", "petg", "steel", "spring-steel", "rubber"
+]
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,13 @@ PRESETS: dict[PresetName, Preset] = {
         "unfilled copolyester, extruded",
         "typical, short-term: reduce for duration and temperature, it creeps",
         "manufacturers' data sheets: flexural modulus 2.0 to 2.2 GPa, tensile yield stress 45 to 55 MPa",
+    ),
+    "steel": Preset(
+        210e9, 81e9, 7850.0,  # EN 1993-1-1, 3.2.6
+        235e6, 135.7e6,  # yield strength up to 40 mm; over the square root of 3
+        "structural steel S235",
+        "yield strength",
+        "EN 1993-1-1:2005 (3.2.6; table 3.1)",
     ),
     "spring-steel": Preset(
         206e9, 81.5e9, 7850.0,  # EN 10270-1

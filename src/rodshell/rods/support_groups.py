@@ -1,6 +1,8 @@
-"""Supports that differ by groups of rod ends: held, free, sliding, or on springs that yield.
+"""Supports that differ by groups of rod ends: held, free, sliding, on springs that yield, or joined by beams.
 
 Rod ends are moved to their places and held there while the shell pops up; then each group is let go as it can move.
+Beams along the edge are fitted before that. A rod end on a beam is held as another group says, and by the beam alone
+where none has it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,9 +13,10 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
-from rodshell.quantities import Direction3, Stiffness3, Value
-from rodshell.rods.supports import Support
-from rodshell.schema import checked
+from rodshell.quantities import Direction3, Share, Stiffness3, Value
+from rodshell.rods.section import Rod
+from rodshell.rods.supports import BeamAlong, Support
+from rodshell.schema import Inline, checked
 from rodshell.units import read_quantity, shown
 from rodshell.validation import brief, described, direction, instance, listed, texts
 
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
 ALL = "all"
 AXES = "xyz"
 NO_FORCE = 1e-6  # of the largest: a rod end with less is free: that is round-off
+COINCIDENT = 1e-6  # of the size: rod ends nearer to each other have no beam between them
+_GROUPS = "rodshell.HeldEnds, FreeEnds, SlidingEnds, SprungEnds, EdgeBeam, Ring or Arch"
 _WANTED = 'give "all", names such as "U03.0, U04.1", or where they are, such as "y > 3.9 m" or "x < 0 m and z < 1 m"'
 
 
@@ -84,7 +89,10 @@ class _Group:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        checked(self, {"at": "the rod ends of a support", "stiffness": "the {} of a support"})
+        checked(
+            self,
+            {"at": "the rod ends of a support", "stiffness": "the {} of a support", "creep": "the {} of an edge beam"},
+        )
 
     def numbers(self, points: Floats, names: Sequence[str]) -> Ints:
         """Numbers of its rod ends, at `points` (2m, 3) and with these names.
@@ -175,7 +183,44 @@ class SprungEnds(_Group):
         return np.eye(3)[np.flatnonzero(self.stiffness)]
 
 
-Group = HeldEnds | FreeEnds | SlidingEnds | SprungEnds
+@dataclass(frozen=True, kw_only=True, repr=False)
+class EdgeBeam(_Group):
+    """Rod ends joined by a beam along the edge from the first of them to the last, each free to turn on it.
+
+    The beam is made to the edge as drawn, where it is free of stress; the first axis of its section points along the
+    normal of the shell.
+
+    Args:
+        rod: its section and material.
+        creep: by how much its deflections grow under permanent loads, 0 of steel; None: as its material's preset says.
+    """
+
+    kind: ClassVar = "edge_beam"
+    closed: ClassVar = False
+    rod: Annotated[Rod, Inline]
+    creep: Annotated[Share | None, "growth of its deflections under permanent loads; default: its preset's"] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        instance("the rod of an edge beam", self.rod, Rod)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Ring(EdgeBeam):
+    """As `EdgeBeam`, closed."""
+
+    kind: ClassVar = "ring"
+    closed: ClassVar = True
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Arch(EdgeBeam):
+    """As `EdgeBeam`, its first and last rod end held where no other group has them."""
+
+    kind: ClassVar = "arch"
+
+
+Group = HeldEnds | FreeEnds | SlidingEnds | SprungEnds | EdgeBeam | Ring | Arch
 
 
 @dataclass(frozen=True)
@@ -197,7 +242,7 @@ class SupportGroups(Support):
             raise InputError("groups of supports hold no directions: give each group its kind")
         groups = tuple(listed("groups of supports", self.groups, "rodshell.FreeEnds(...) and the like"))
         for group in groups:
-            instance("a group of supports", group, Group, "rodshell.HeldEnds, FreeEnds, SlidingEnds or SprungEnds")
+            instance("a group of supports", group, Group, _GROUPS)
         object.__setattr__(self, "groups", groups)
         object.__setattr__(self, "ends_named", texts("the names of rod ends", self.ends_named, "names such as U01.0"))
 
@@ -215,9 +260,46 @@ class SupportGroups(Support):
             InputError: a group has no rod end.
         """
         found: list[Group] = [HeldEnds()] * len(points)
+        beams = self.beams(points)
+        for along in beams:
+            for end in (*along.ends, *along.twins):
+                found[end] = FreeEnds()
+        for end in (end for along in beams if along.kind == Arch.kind for end in along.ends[[0, -1]]):
+            found[end] = HeldEnds()
         for group in self.groups:
-            for end in group.numbers(points, self.ends_named):
-                found[end] = group
+            if not isinstance(group, EdgeBeam):
+                for end in group.numbers(points, self.ends_named):
+                    found[end] = group
+        return found
+
+    def beams(self, points: Floats) -> list[BeamAlong]:
+        """See `Support.beams`.
+
+        Raises:
+            InputError: a group has too few rod ends for a beam, or they do not lie along one curve.
+        """
+        from rodshell.geometry.chains import along_curve  # here, as it needs SciPy
+
+        found = list[BeamAlong]()
+        for group in self.groups:
+            if not isinstance(group, EdgeBeam):
+                continue
+            ends = group.numbers(points, self.ends_named)
+            here = np.round(points[ends] / (COINCIDENT * float(np.ptp(points, axis=0).max())))
+            _, first = np.unique(here + 0.0, axis=0, return_index=True)
+            if len(first) < 3:
+                raise InputError(
+                    f"a beam ({group.kind}) joins three rod ends or more: {shown(group.at)} has {len(first)}"
+                )
+            order = along_curve(points[ends[first]])
+            if order is None:
+                raise InputError(
+                    f"the rod ends of a beam ({group.kind}), {shown(group.at)}, do not lie one after the other along "
+                    "one curve: give each edge a beam of its own"
+                )
+            twins = np.delete(ends, first)
+            name, along = f"E{len(found) + 1}", ends[first][order]
+            found.append(BeamAlong(name, group.kind, along, twins, group.rod, group.closed, group.creep))
         return found
 
     def free(self, points: Floats) -> Mapping[int, Sequence[Sequence[float]]]:

@@ -7,13 +7,14 @@ else goes by its name.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from re import fullmatch
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.rods.section import Rod
 from rodshell.units import shown
 from rodshell.validation import NAME, choice, described, flag
 
@@ -25,6 +26,26 @@ AskedName = Literal[SupportName, "both"]
 BOTH: Literal["both"] = "both"  # short for all supports of the table
 
 _RESERVED = (BOTH, "draped", "deployment", "stress", "mode", "buckling")  # would be ambiguous in names of states
+
+
+class BeamAlong(NamedTuple):
+    """A beam along rod ends.
+
+    Args:
+        kind: what it is called in the case.
+        ends: (b,) numbers of the rod ends on it in their order along it; of those in one place the first.
+        twins: numbers of the others.
+        closed: whether it goes on from the last rod end to the first.
+        creep: by how much its deflections grow under permanent loads; None: not given.
+    """
+
+    name: str
+    kind: str
+    ends: Ints
+    twins: Ints
+    rod: Rod
+    closed: bool
+    creep: float | None = None
 
 
 @dataclass(frozen=True)
@@ -66,6 +87,10 @@ class Support:
             points: (2m, 3) where the ends are before they move [m]: 2 i is the start of rod i, 2 i + 1 its end.
         """
         return {}
+
+    def beams(self, points: Floats) -> Sequence[BeamAlong]:
+        """Beams along rod ends, which are at `points` (2m, 3) before they move [m]."""
+        return ()
 
     def energies(self, ends: Ints, points: Floats) -> "Sequence[Elements]":
         """What acts on the ends, such as the energies of springs.
