@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
     from rodshell.rods.support_groups import (
         Arch,
+        ClampedEnds,
         EdgeBeam,
         FreeEnds,
         HeldEnds,
@@ -153,7 +154,7 @@ _HOMES = {
     "rodshell.rods.local_energy": ("LocalEnergy",),
     "rodshell.rods.supports": ("Support",),
     "rodshell.rods.support_groups": (
-        "Arch", "EdgeBeam", "FreeEnds", "HeldEnds", "Ring", "SlidingEnds", "SprungEnds", "SupportGroups",
+        "Arch", "ClampedEnds", "EdgeBeam", "FreeEnds", "HeldEnds", "Ring", "SlidingEnds", "SprungEnds", "SupportGroups",
     ),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
@@ -173,7 +174,7 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Agreement", "Arch", "Archive", "Asymptotic", "Ball", "Bound", "Boundary", "Cables", "Cap", "ChebyshevNet",
-    "Circle", "ConvergenceError", "Curves", "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp",
+    "Circle", "ClampedEnds", "ConvergenceError", "Curves", "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp",
     "DynamicPopUpSettings", "EdgeBeam", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
     "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "FreeEnds", "Freeform", "Geodesic",
     "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "HeldEnds", "Hemisphere",

@@ -1,4 +1,4 @@
-"""Beams along the edge: rings and arches against closed forms, shells against code of the tests' own, what is refused."""
+"""Beams along the edge: rings and arches against closed forms, shells against other code, what is refused."""
 
 from functools import cache
 
@@ -110,7 +110,7 @@ def test_a_ring_under_loads_all_round_is_pressed_together() -> None:
 
 
 def critical_pressure(points: np.ndarray, closed: bool) -> float:
-    """Of a pressure that stays at right angles to the beam [N/m]: the first at which the plane stiffness is singular."""
+    """The least pressure at right angles to the beam [N/m] at which its stiffness in its plane is singular."""
     n = len(points)
     beam = bare(points, closed=closed)
     following = np.zeros((3 * n, 3 * n))  # dF/dx of F_i = q/2 J (x_before - x_after), which is linear
@@ -226,7 +226,8 @@ def twin_of_arch() -> BeamTwin:
     row = beam.along.ends.tolist()
     twin = BeamTwin(shell("tubes").popped["pinned"], TUBE, BEAM, row, [row[0], row[-1]])
     settled = twin.settled(twin.state, 0.0, most=20)
-    assert settled is not None and settled[1] == 0
+    assert settled is not None
+    assert settled[1] == 0
     twin.state = settled[0]
     return twin
 

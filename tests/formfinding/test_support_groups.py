@@ -191,7 +191,6 @@ def test_a_case_may_compare_them_with_pinned_ends() -> None:
         (lambda: rs.SprungEnds(stiffness=(1.0, 2.0)), "three stiffnesses"),
         (lambda: rs.SlidingEnds(along=(0.0, 0.0, 0.0)), "must not be zero"),
         (lambda: rs.SupportGroups(groups=("free",)), "a group of supports must be"),
-        (lambda: rs.SupportGroups(holds_directions=True), "hold no directions"),
         (
             lambda: structure_of(on(groups(rs.SprungEnds(stiffness=STIFF))).stages, "given"),
             "supports yield, which no refinement knows",
@@ -211,3 +210,48 @@ def test_what_no_group_can_be_is_said(make: object, said: str) -> None:
     with pytest.raises(InputError, match="") as raised:
         make()  # type: ignore[operator]
     assert said in str(raised.value)
+
+
+@cache
+def clamped_form() -> rs.Form:
+    return rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), TUBE, ends="clamped")
+
+
+class ClampedTwin(LoadedTwin):
+    """Its clamps yield: what they turn counts as a longer piece of the rod in them, EI over the stiffness [N m/rad]."""
+
+    def __init__(self, clamped, rod, turning):
+        self.turning = turning
+        super().__init__(clamped, rod)
+        in_clamps = np.isin(self.bends, self.ghosts).any(axis=1)
+        ends = np.where(
+            np.isin(self.bends[in_clamps, 0], self.ghosts), self.bends[in_clamps, 0], self.bends[in_clamps, 2]
+        )
+        self.voronoi[in_clamps] += rod.bend_stiffnesses[0] / np.asarray(turning)[ends - self.nodes]
+
+
+@pytest.mark.parametrize("where", ["all", "y > 6 m"])
+def test_clamps_that_yield_hold_a_shell_as_in_other_code(where: str) -> None:
+    form = on(groups(rs.ClampedEnds(at=where, turning=1e3)))
+    points = form.boundary.points
+    turning = np.where((points[:, 1] > 6) | (where == "all"), 1e3, 1e-9)
+    twin = ClampedTwin(clamped_form().popped["clamped"], TUBE, turning)
+    state, negative = twin.settled(twin.state, 0.0, most=20)
+    assert negative == 0
+    found = form.popped["given"].positions
+    assert found == pytest.approx(state[: found.size].reshape(-1, 3), abs=1e-6 * form.target.size)
+    twin.state = state
+    factor, _ = twin.load_factor(2e-3)
+    carried = form.checks.self_weight["given"].load_factor
+    assert carried == pytest.approx(factor, rel=0.01)
+    pinned = shell("tubes").checks.self_weight["pinned"].load_factor
+    clamped = clamped_form().checks.self_weight["clamped"].load_factor
+    assert 1.02 * pinned < carried < 0.98 * clamped
+    moments = np.linalg.norm(form.checks.reactions["given"].moments, axis=1)
+    assert np.array_equal(moments > 1e-6 * moments.max(), turning > 1)
+
+
+def test_a_group_of_all_rod_ends_that_is_clamped_is_the_clamped_shell() -> None:
+    same = on(groups(rs.ClampedEnds())).popped["given"]
+    assert np.array_equal(same.positions, clamped_form().popped["clamped"].positions)
+    assert not same.shell.yields

@@ -251,7 +251,7 @@ def _long_checks(
 ) -> dict[str, Any]:
     """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
     upright = _deployable(done) if stages > 0 else None
-    clamped = next((ends for ends, shape in done.items() if shape.support.holds_directions), None)
+    clamped = next((ends for ends, shape in done.items() if len(shape.shell.ghosts) and not shape.shell.yields), None)
     deployment, turned, stopped = None, None, ""
     weights, snow, others = dict[Ends, SelfWeight](), dict[Ends, float | None](), dict[Ends, OtherShapes]()
     weighings = ["self-weight", *(["snow"] if plan is not None else [])]

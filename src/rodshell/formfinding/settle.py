@@ -38,7 +38,7 @@ def settle(
     instance("popped", popped, PopUp, "what rodshell.pop_up returned")
     require_progress(progress)
     added = energies_of(energies, popped.footprint.mesh.node_count)
-    slides = slides_of(popped.support, {} if free is None else free, len(popped.shell.ends))
+    slides = slides_of(popped.support, {} if free is None else free, popped.support.turning(popped.boundary.points))
     shell, found = at_rest(
         replace(popped.shell, between=(*popped.shell.between, *added), slides={**popped.shell.slides, **slides}),
         popped.equilibrium,

@@ -33,12 +33,16 @@ def let_go(
         counting: makes a progress of what is done, and of how many iterations it takes at most.
     """
     support = support.named(shell.mesh.grid.support_names)
-    slides = slides_of(support, support.free(points), len(points))
+    turning = support.turning(points)
+    slides = slides_of(support, support.free(points), turning)
     springs = energies_of(support.energies(shell.ends, points), shell.node_count)
     beams = support.beams(points)
-    if not slides and not springs and not beams:
+    clamped = support.holds_directions and not np.isinf(turning).all()
+    if not (slides or springs or beams or clamped):
         return shell, held
     there = replace(shell, slides=slides, springs=springs)
+    if clamped:
+        there = there.with_turning(turning)
     if beams:
         there, held = _fitted(there, held, beams)
     shell, found = at_rest(there, held, counting(f"{support}, let go, iteration", MOST_ITERATIONS))
@@ -114,16 +118,19 @@ def figures_of(support: Support, moved: Floats, forces: Floats) -> dict[str, tup
     return found
 
 
-def slides_of(support: Support, free: object, ends: int) -> dict[int, tuple[Direction, ...]]:
-    """Directions along which some of so many rod ends may move, by the number of the end.
+def slides_of(support: Support, free: object, turning: Floats) -> dict[int, tuple[Direction, ...]]:
+    """Directions along which some rod ends may move, by the number of the end.
+
+    Args:
+        turning: (2m,) as of `Support.turning`.
 
     Raises:
         InputError: there is no such end; its directions are not at right angles; the support holds directions.
     """
     slides = dict[int, tuple[Direction, ...]]()
     for end, directions in mapping("free", free, "directions by the number of the rod end").items():
-        whole("a rod end in free", end, 0, ends - 1)
-        if support.holds_directions:
+        whole("a rod end in free", end, 0, len(turning) - 1)
+        if turning[end]:
             raise InputError(f"a {support} rod end cannot be set free: pop the shell up with pinned ends")
         name = f"a direction of rod end {end}"
         given = np.array([direction(name, each) for each in some(f"free of rod end {end}", directions, "directions")])

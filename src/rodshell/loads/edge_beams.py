@@ -1,6 +1,7 @@
 """What beams along the edge of a shell use of their strength."""
 
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 
@@ -38,6 +39,7 @@ def used_beams(shell: Shell, found: Equilibrium, asked: Strength, duration: Dura
         shares = utilisation(
             alone, state, beam.rod, forces=forces, limits=limits, asked=own, duration=duration, bent=bent
         )
+        buckling = pi**2 * min(beam.rod.bend_stiffnesses) / (asked.effective_length * beam.mesh.edge_lengths) ** 2
         where = largest_at(np.zeros(1) if bent.stress is None else bent.stress)
         used.append(
             UsedBeam(
@@ -47,7 +49,7 @@ def used_beams(shell: Shell, found: Equilibrium, asked: Strength, duration: Dura
                 max_stress=None if bent.stress is None else float(bent.stress.max()),
                 max_stress_at=names[beam.along.ends[where % len(beam.along.ends)]],
                 utilisation=max(shares.largest.values(), default=None),
-                euler=float(shares.euler.max()),
+                euler=float((np.maximum(-forces, 0.0) / buckling).max()),
             )
         )
     return tuple(used)

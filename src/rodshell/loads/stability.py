@@ -97,7 +97,7 @@ def crept(structure: Structure, creep: float) -> Structure | None:
     """The structure whose cables and springs of supports are 1 + `creep` times as stiff, and its beams by as much more
     as they creep less, in its equilibrium without loads; None where none that is stable was found."""
     shell, cables = structure.shell, structure.cables
-    if cables is None and not shell.springs and not shell.beams:
+    if cables is None and not shell.springs and not shell.beams and shell.turning is None:
         return structure
     last = len(shell.elements)
 
@@ -105,7 +105,10 @@ def crept(structure: Structure, creep: float) -> Structure | None:
         times = 1.0 + share * creep
         springs = tuple(spring.times(times) for spring in shell.springs)  # type: ignore[attr-defined]
         beams = tuple(beam.times(times / (1.0 + share * (beam.creep or 0.0))) for beam in shell.beams)
-        there = replace(shell, springs=springs, beams=beams).with_frames_of(elements[:last])
+        there = replace(shell, springs=springs, beams=beams)
+        if shell.turning is not None:
+            there = there.with_turning(times * shell.turning)
+        there = there.with_frames_of(elements[:last])
         return (*there.elements, *(elements[last:] if cables is None else (cables.times(times),)))
 
     found = in_steps(structure.equilibrium, stiffer)

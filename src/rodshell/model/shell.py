@@ -41,7 +41,7 @@ from rodshell.model.edge_beam import FittedBeam
 from rodshell.model.potential import Potential
 from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist, frames_among
-from rodshell.rods.elements import Elements, Stretch, turned, with_frames
+from rodshell.rods.elements import Elements, Stretch, is_bends, turned, with_frames
 from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import CLAMPED, PINNED
@@ -73,6 +73,7 @@ class Shell:
         joint_mass: (c,) mass of each crossing's joint [kg].
         springs: energies of the supports, which act on the rods' ends.
         beams: along its edge.
+        turning: (2m,) stiffness against turning of each clamped end [N m/rad], 0 free to turn; None: all are rigid.
         slides: orthonormal directions along which rod ends may move, by the number of the end; others are held.
         turns: (g, 2, 2) how each flat grid, from which frames are transported, is turned in its plane, of rows x, y.
     """
@@ -93,6 +94,7 @@ class Shell:
     joint_mass: Floats
     springs: tuple[Elements, ...] = ()
     beams: tuple[FittedBeam, ...] = ()
+    turning: Floats | None = None
     slides: Mapping[int, Sequence[Direction]] = field(default_factory=dict)
     turns: Floats = field(default_factory=lambda: np.eye(2)[None])
 
@@ -161,7 +163,7 @@ class Shell:
     @property
     def yields(self) -> bool:
         """Whether its supports let the rods' ends move."""
-        return bool(self.slides or self.springs or self.beams)
+        return bool(self.slides or self.springs or self.beams) or self.turning is not None
 
     @property
     def first_angle(self) -> int:
@@ -275,6 +277,26 @@ class Shell:
         """The same shell with the source frames of the elements of another one on the same mesh, with other
         stiffnesses, so that twist angles mean the same in both."""
         return self.with_elements(tuple(map(with_frames, self.elements, elements)))
+
+    def with_turning(self, turning: Floats) -> "Shell":
+        """The same shell, its clamps being as stiff as that: in series with what of the rods is in them.
+
+        Args:
+            turning: (2m,) stiffness of each [N m/rad]; `inf` is rigid, 0 lets the rod's end turn.
+        """
+        before = np.full(len(turning), np.inf) if self.turning is None else self.turning
+        within = list[Elements]()
+        for element in self.within:
+            if is_bends(element):
+                row, column = np.nonzero((element.blocks >= self.node_count) & (element.blocks < self.first_angle))
+                end, bends = element.blocks[row, column] - self.node_count, element.bend_stiffness.copy()
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    softness = 1.0 / bends[row] + (1.0 / turning[end] - 1.0 / before[end])[:, None]
+                    bends[row] = np.nan_to_num(1.0 / softness)
+                twist = getattr(element, "twist_stiffness", np.zeros(len(bends)))
+                element = element.with_stiffness(np.column_stack([bends[:, 0], bends[:, -1], twist]))
+            within.append(element)
+        return replace(self, within=tuple(within), turning=turning)
 
     def held_ends(self) -> Freedom:
         """As `freedom`, with every rod end held in place, or along all but its directions."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
-from rodshell.quantities import Direction3, Share, Stiffness3, Value
+from rodshell.quantities import Direction3, Share, Stiffness, Stiffness3, Value
 from rodshell.rods.section import Rod
 from rodshell.rods.supports import BeamAlong, Support
 from rodshell.schema import Inline, checked
@@ -27,7 +27,7 @@ ALL = "all"
 AXES = "xyz"
 NO_FORCE = 1e-6  # of the largest: a rod end with less is free: that is round-off
 COINCIDENT = 1e-6  # of the size: rod ends nearer to each other have no beam between them
-_GROUPS = "rodshell.HeldEnds, FreeEnds, SlidingEnds, SprungEnds, EdgeBeam, Ring or Arch"
+_GROUPS = "rodshell.HeldEnds, ClampedEnds, FreeEnds, SlidingEnds, SprungEnds, EdgeBeam, Ring or Arch"
 _WANTED = 'give "all", names such as "U03.0, U04.1", or where they are, such as "y > 3.9 m" or "x < 0 m and z < 1 m"'
 
 
@@ -91,7 +91,12 @@ class _Group:
     def __post_init__(self) -> None:
         checked(
             self,
-            {"at": "the rod ends of a support", "stiffness": "the {} of a support", "creep": "the {} of an edge beam"},
+            {
+                "at": "the rod ends of a support",
+                "stiffness": "the {} of a support",
+                "creep": "the {} of an edge beam",
+                "turning": "the stiffness of a clamp",
+            },
         )
 
     def numbers(self, points: Floats, names: Sequence[str]) -> Ints:
@@ -140,6 +145,18 @@ class HeldEnds(_Group):
 
     def against(self) -> Floats:
         return np.eye(3)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ClampedEnds(HeldEnds):
+    """Rod ends that are held in place and against turning; a rod may spin in its clamp.
+
+    Args:
+        turning: of the clamp, such as that of a column's foot [N m/rad]; None: rigid.
+    """
+
+    kind: ClassVar = "clamped"
+    turning: Annotated[Stiffness | None, "stiffness against turning; default: rigid"] = None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -220,7 +237,7 @@ class Arch(EdgeBeam):
     kind: ClassVar = "arch"
 
 
-Group = HeldEnds | FreeEnds | SlidingEnds | SprungEnds | EdgeBeam | Ring | Arch
+Group = HeldEnds | ClampedEnds | FreeEnds | SlidingEnds | SprungEnds | EdgeBeam | Ring | Arch
 
 
 @dataclass(frozen=True)
@@ -238,12 +255,11 @@ class SupportGroups(Support):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.holds_directions:
-            raise InputError("groups of supports hold no directions: give each group its kind")
         groups = tuple(listed("groups of supports", self.groups, "rodshell.FreeEnds(...) and the like"))
         for group in groups:
             instance("a group of supports", group, Group, _GROUPS)
         object.__setattr__(self, "groups", groups)
+        object.__setattr__(self, "holds_directions", any(isinstance(group, ClampedEnds) for group in groups))
         object.__setattr__(self, "ends_named", texts("the names of rod ends", self.ends_named, "names such as U01.0"))
 
     @property
@@ -271,6 +287,11 @@ class SupportGroups(Support):
                 for end in group.numbers(points, self.ends_named):
                     found[end] = group
         return found
+
+    def turning(self, points: Floats) -> Floats:
+        """See `Support.turning`."""
+        clamps = (group.turning if isinstance(group, ClampedEnds) else 0.0 for group in self.group_of(points))
+        return np.array([np.inf if turning is None else turning for turning in clamps])
 
     def beams(self, points: Floats) -> list[BeamAlong]:
         """See `Support.beams`.

@@ -88,6 +88,10 @@ class Support:
         """
         return {}
 
+    def turning(self, points: Floats) -> Floats:
+        """(2m,) stiffness against turning of each rod end at `points` (2m, 3) [N m/rad]: `inf` holds its direction."""
+        return np.full(len(points), np.inf if self.holds_directions else 0.0)
+
     def beams(self, points: Floats) -> Sequence[BeamAlong]:
         """Beams along rod ends, which are at `points` (2m, 3) before they move [m]."""
         return ()
