@@ -35,9 +35,9 @@ def used_beams(shell: Shell, found: Equilibrium, asked: Strength, duration: Dura
         alone, state = _alone(beam), found.state[beam.blocks]
         forces, limits = beam.forces(found.state), preset_limits(beam.rod, asked.service_class)
         bent = bending_under(alone, state, beam.rod, forces, limits)
-        own = replace(asked, slip=None, hole=0.0)
+        overrides = replace(asked, slip=None, hole=0.0)
         shares = utilisation(
-            alone, state, beam.rod, forces=forces, limits=limits, asked=own, duration=duration, bent=bent
+            alone, state, beam.rod, forces=forces, limits=limits, asked=overrides, duration=duration, bent=bent
         )
         buckling = pi**2 * min(beam.rod.bend_stiffnesses) / (asked.effective_length * beam.mesh.edge_lengths) ** 2
         where = largest_at(np.zeros(1) if bent.stress is None else bent.stress)

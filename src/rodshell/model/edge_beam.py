@@ -28,7 +28,7 @@ class FittedBeam:
 
     Args:
         along: what was asked for.
-        mesh: of the beam alone, straight; of a ring cut open, its first edge following its last once more.
+        mesh: of the beam alone, straight; of a ring cut open, its first edge following its last again.
         blocks: (k,) block of the shell that holds each of the beam's own blocks, nodes before twist angles.
         bend, stretch: its energies, on the blocks of the shell.
         creep: by how much its deflections grow under permanent loads; None: not known.
@@ -68,11 +68,13 @@ class FittedBeam:
         directors = np.zeros((first + edges, 3))
         directors[first:] = (normals[order[:-1]] + normals[order[1:]])[:edges]
         angles = mesh.node_count + np.arange(len(order) - 1)
-        own = np.column_stack([mesh.rod_nodes[:-2], angles[:-1], mesh.rod_nodes[1:-1], angles[1:], mesh.rod_nodes[2:]])
+        stencils = np.column_stack(
+            [mesh.rod_nodes[:-2], angles[:-1], mesh.rod_nodes[1:-1], angles[1:], mesh.rod_nodes[2:]]
+        )
         voronoi = 0.5 * (lengths[:-1] + lengths[1:])
         there = np.vstack([state[:first], np.zeros((edges, 3))])
         bend = BendTwist.starting_at(
-            blocks[own], there, directors,
+            blocks[stencils], there, directors,
             bend_stiffness=np.array(rod.bend_stiffnesses) / voronoi[:, None],
             twist_stiffness=rod.twist_stiffness / voronoi,
         ).relaxed(there)  # fmt: skip

@@ -247,13 +247,13 @@ class Shell:
             parts.append(rest[: len(group)])
             rest = rest[len(group) :]
         within, between, springs, *of_beams = parts
-        beams = tuple(beam.with_elements(own) for beam, own in zip(self.beams, of_beams, strict=True))
+        beams = tuple(beam.with_elements(part) for beam, part in zip(self.beams, of_beams, strict=True))
         return replace(self, within=within, between=between, springs=springs, beams=beams)
 
     def with_beams(self, beams: Sequence[FittedBeam]) -> "Shell":
         """The same shell with beams along its edge, whose twist angles follow its blocks in their order."""
-        own = sum(len(beam.angles) for beam in beams)
-        like = np.append(self.like, int(self.like.max()) + 1 + np.arange(own))
+        count = sum(len(beam.angles) for beam in beams)
+        like = np.append(self.like, int(self.like.max()) + 1 + np.arange(count))
         spinning = np.concatenate([self.spinning, *(beam.loose for beam in beams)]).astype(np.intp)
         return replace(self, beams=tuple(beams), like=like, spinning=spinning)
 

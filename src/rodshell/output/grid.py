@@ -8,7 +8,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import OutputError
-from rodshell.figures.form import Rod
+from rodshell.figures.form import EdgeBeam, Rod
 from rodshell.geometry.planar_motion import PlanarMotion
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
@@ -18,9 +18,25 @@ from rodshell.rods.supports import SUPPORTS
 
 CAPTIONS = {"flat": "Flat, as cut and laid out", DRAPED: "Draped on the target"}
 STAGE = "stage_"
+ON_BEAMS = f"{POPPED}given"  # the shape that has beams along its edge
 FEWEST = 3  # ends of an outline
 AXES = {"u": 0, "v": 1}  # that rods of a family run along, by the format of result.json
 STRAIGHT = 1e-6  # of a rod's length, which it leaves its chord by: it is straight
+
+
+def beams_along_edge(archive: Archive) -> list[tuple[EdgeBeam, Floats]]:
+    """Each beam along the edge, and (b, 3) its rod ends in their order [m], a ring's first one again at its end:
+    where they stand in the shape on it."""
+    results, known = archive.results, archive.states.get(ON_BEAMS)
+    points = np.array(results.boundary, dtype=float)
+    if known is not None and len(rods := meshed_rods(archive)) == len(results.rods):
+        points = known[end_nodes(rods)]
+    numbers = {name: k for k, name in enumerate(results.rod_ends)}
+    found = []
+    for beam in results.edge_beams:
+        ends = [numbers[name] for name in (*beam.ends, *beam.ends[: beam.kind == "ring"])]
+        found.append((beam, points[ends]))
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from rodshell.arrays import largest_at
-from rodshell.figures.loads import AfterYears, LoadedShell, Utilisations
+from rodshell.figures.loads import AfterYears, LoadedShell, UsedBeam, Utilisations
 from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
 from rodshell.output.svg import inline, picture_document
@@ -66,6 +66,11 @@ def loads_page(archive: Archive) -> dict[str, Any] | None:
         "modes": pictures,
         "foundations": _rows(shells, partial(_foundation, results)),
         "joints": _rows([each for each in shells if len(each[2].joint_moments)], _joints),
+        "edge_beams": [
+            {"Combination": name, "Ends": ends, **_edge_beam(beam)}
+            for name, ends, shell in shells
+            for beam in shell.edge_beams
+        ],
         "bracing": _rows([each for each in shells if each[2].bracing], partial(_bracing, results)),
     }
 
@@ -238,6 +243,18 @@ def _joints(shell: LoadedShell) -> Row:
         "at": shell.joint_moment_at or "",
         "Of slip": _known(slip, percent),
         "Slipping": "not known" if slip is None else slipping,
+    }
+
+
+def _edge_beam(beam: UsedBeam) -> Row:
+    return {
+        "Beam": beam.name or "",
+        "Tension": _kilo(beam.tension or 0.0),
+        "Compression": _kilo(beam.compression or 0.0),
+        "Stress": _known(beam.max_stress, stress),
+        "near": beam.max_stress_at or "",
+        "Utilisation": _known(beam.utilisation, percent),
+        "Of Euler's load": _known(beam.euler, percent),
     }
 
 

@@ -174,6 +174,9 @@ def rhino_bytes(archive: Archive) -> bytes:
     if archive.final:
         for name, at in grid.joint_places(archive, archive.states[archive.final]).items():
             model.Objects.AddPoint(r.Point3d(*(1e3 * at).tolist()), about("MARK", name))
+    for beam, points in grid.beams_along_edge(archive):
+        about_it = {"length_mm": mm(1e3 * (beam.length or 0.0)), "mass_kg": f"{beam.mass or 0.0:.1f}"}
+        model.Objects.AddPolyline(polyline(1e3 * points), about("BOUNDARY-FINAL", beam.name or "", about_it))
     for outline in plan.boundary:
         closed = np.vstack([outline, outline[:1]])
         model.Objects.AddPolyline(polyline(closed), about("BOUNDARY-FINAL", "boundary"))
@@ -201,6 +204,9 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
         points, normals, faces = swept(shape.positions[rod.nodes], outline, section_widths(archive, rod))
         shades = None if colours is None else np.repeat(colours[k], len(outline), axis=0)
         file.add(rod.id, points, normals, faces, shades)
+    for beam, points in grid.beams_along_edge(archive) if state == grid.ON_BEAMS else ():
+        around = section_outline(beam.rod.section if beam.rod else None, float(np.ptp(points, axis=0).max()))
+        file.add(beam.name or "", *swept(points, around), None)
     return file.content()
 
 

@@ -22,11 +22,21 @@ from rodshell.figures.form import Bent, Meeting, Stiffness
 from rodshell.figures.records import printable
 from rodshell.geometry.frames import unit
 from rodshell.output.blanks import boards_of
-from rodshell.output.grid import GridJoint, GridRod, end_nodes, joints_of, lies_flat, node_stations, rods_of
+from rodshell.output.grid import (
+    GridJoint,
+    GridRod,
+    beams_along_edge,
+    end_nodes,
+    joints_of,
+    lies_flat,
+    node_stations,
+    rods_of,
+)
 from rodshell.results import Archive, Results
 from rodshell.results.archive import made_once
 from rodshell.results.laths import laths_on
 from rodshell.results.states import POPPED
+from rodshell.results.summary import rod_text
 from rodshell.results.wording import FINEST, Rounding, rounding_of
 from rodshell.rods.supports import finals_first
 
@@ -231,6 +241,20 @@ def seams_table(archive: Archive) -> Table:
     return table
 
 
+def edge_beams_table(archive: Archive) -> Table:
+    """One row a rod end on a beam: how far along it, from rod end to rod end, and where that is."""
+    mm, columns = rounding_of(archive.results).mm, ("beam", "kind", "rod_end", "along_mm", "x_mm", "y_mm", "z_mm", "of")
+    rows = []
+    for beam, points in beams_along_edge(archive):
+        along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+        ends = (*beam.ends, *beam.ends[: len(points) - len(beam.ends)])
+        for end, at, point in zip(ends, along.tolist(), points.tolist(), strict=True):
+            rows.append(
+                [beam.name or "", beam.kind or "", end, *map(mm, (at, *point)), rod_text(beam.rod) if beam.rod else ""]
+            )
+    return _in_columns(columns, rows)
+
+
 def bracing_table(archive: Archive) -> Table:
     """One row a diagonal: its length flat and in the final shape, of cables also free of stress; where loads were
     checked the force that a cable is to be stressed to, its axial force under each combination, tension positive, and
@@ -406,6 +430,9 @@ SCHEDULES = {
     "joints": Schedule("Joints", joints_table, ("rod_?", "flat_?_mm", "final_state", "scissor_deg", "*_N", "*_Nm")),
     "supports": Schedule("Supports", supports_table, ("rod", "end", "force_*", "moment_*"), ("tangent_*",)),
     "bracing": Schedule("Bracing", bracing_table, ("force_*",), known=lambda archive: bool(archive.results.bracing)),
+    "edge_beams": Schedule(
+        "Edge beams", edge_beams_table, ("of",), known=lambda archive: bool(archive.results.edge_beams)
+    ),
     "foundations": Schedule("Foundations", foundations_table, known=lambda archive: bool(archive.results.loads)),
     "stock": Schedule("Stock", stock_table, known=lambda archive: _stock_of(archive) is not None),
     "sections": Schedule(

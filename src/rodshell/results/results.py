@@ -280,6 +280,9 @@ def contradictions(results: Results) -> Iterator[str]:
             if len(forces.each) != len(seam.meetings):
                 where = f"seams[{k}].forces.{support}.each"
                 yield f"{where} has {len(forces.each)} entries for {len(seam.meetings)} meetings"
+    for k, beam in enumerate(results.edge_beams):
+        for end in set(beam.ends) - ends:
+            yield f'edge_beams[{k}].ends: there is no rod end "{end}"'
     counts: dict[str, Sized] = {name: getattr(results, name) for name in ("footprint", "boundary", "end_tangents")}
     for support, held in results.reactions.items():
         counts |= {f"reactions.{support}.forces": held.forces, f"reactions.{support}.moments": held.moments}

@@ -57,6 +57,7 @@ def summary_text(results: Results) -> str:
     lines += _pop_up(results, length)
     lines += _bending(results, length)
     lines += _weight_and_reactions(results, length)
+    lines += _edge_beams(results, length)
     lines += _loads(results, length)
     lines += _deployment(results)
     lines += [f"  dropped   {rod.id}: {rod.reason}" for rod in results.dropped[:MOST_DROPPED]]
@@ -276,6 +277,21 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
         yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N unloaded; sums of {sums}"
         if said := [f"{name} {figure(*each, rounding_of(results))}" for name, each in held.figures.items()]:
             yield f"  support   {ends:<8}{'; '.join(said)}"
+
+
+def _edge_beams(results: Results, length: Length) -> Iterator[str]:
+    """Of each beam along the edge what it is, and what it uses of its strength at most."""
+    loaded = [beam for _, _, shell in results.loaded_shells() for beam in shell.edge_beams]
+    for beam in results.edge_beams:
+        used = [each for each in (beam.unloaded, *loaded) if each is not None and each.name == beam.name]
+        shares = [each.utilisation for each in used if each.utilisation is not None]
+        push, pull = (
+            max((getattr(each, name) or 0.0 for each in used), default=0.0) for name in ("compression", "tension")
+        )
+        line = f"  beam      {beam.name}: {beam.kind} along {len(beam.ends)} rod ends, {length(beam.length)}"
+        line += f", {rounded(beam.mass or 0.0)} kg; {rod_text(beam.rod) if beam.rod else 'section not known'}"
+        line += f"; {rounded(push)} N in compression and {rounded(pull)} N in tension at most"
+        yield line + (f", {percent(max(shares))} of its design strength" if shares else "")
 
 
 def _loads(results: Results, length: Length) -> Iterator[str]:

@@ -35,7 +35,7 @@ class BeamAlong(NamedTuple):
         kind: what it is called in the case.
         ends: (b,) numbers of the rod ends on it in their order along it; of those in one place the first.
         twins: numbers of the others.
-        closed: whether it goes on from the last rod end to the first.
+        closed: whether its last rod end is joined to its first.
         creep: by how much its deflections grow under permanent loads; None: not given.
     """
 

@@ -15,7 +15,7 @@ from rodshell.geometry.bounds import bounds
 from rodshell.geometry.boxes import each_meets
 from rodshell.output.drawing import BACK, INK, LAYERS, LETTER, PALE, SMALL, SOFT, Drawing, Pen, Pencil, Text, corners
 from rodshell.output.drawings.flat import side_ticks
-from rodshell.output.grid import end_nodes, joint_places, meshed_rods, outlines_of
+from rodshell.output.grid import beams_along_edge, end_nodes, joint_places, meshed_rods, outlines_of
 from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
@@ -199,9 +199,15 @@ def supports_drawing(archive: Archive, text: float) -> Drawing:
             pencil.line(callout.line, "DIM")
     pencil.leave_out(left_out, int(alone.sum()), "names of rod ends (table Supports has their places)")
     _meetings(pencil, archive, text, room)
+    legend, beams = [*_SUPPORTS_LEGEND], beams_along_edge(archive)
+    for _, points in beams:
+        pencil.line(1e3 * points[:, :2], "BOUNDARY-FINAL", pen=Pen(LAYERS["BOUNDARY-FINAL"].colour, 0.4 * text))
+    if beams:
+        named = ", ".join(str(beam.name) for beam, _ in beams)
+        legend.append(f"Thick: beams along the edge, {named} (table Edge beams).")
     axes(pencil, text)
     low, _ = pencil.done("", "", text).box()
-    for k, line in enumerate(_SUPPORTS_LEGEND, start=1):
+    for k, line in enumerate(legend, start=1):
         written = line.format(seams="" if alone.all() else ", and seams")
         pencil.write(written, low - (0.0, 1.5 * k * text), text, "DIM")
     return pencil.done("supports", f"Support plan{_stopped(archive)}", text)
