@@ -18,7 +18,7 @@ from rodshell.rods.design_strength import DESIGN
 from rodshell.rods.materials import PRESETS
 from tests.acceptance.rows import Row, print_table
 from tests.acceptance.signed_areas import curved_rows, developable_rows, sum_rows
-from tests.acceptance.signed_shells import chance_rows, creep_rows, support_rows
+from tests.acceptance.signed_shells import beam_rows, chance_rows, creep_rows, support_rows
 
 EXACT = 1e-3
 
@@ -140,6 +140,7 @@ SECOND: dict[str, tuple[float, ...]] = {
     "larch": (12.0, 0.75, 30, 19, 24, 4.0, 8.0),
     "spruce": (11.0, 0.69, 24, 14.5, 21, 4.0, 7.4),
     "oak": (11.0, 0.69, 30, 18, 24, 3.9, 9.2),
+    "steel": (210.0, 81.0, 235, 235, 235, 235 / np.sqrt(3), np.nan),  # EN 10025-2, up to 16 mm
     "glulam": (11.5, 0.65, 24, 19.2, 24, 3.5, 9.6),
     # E, and bending, tension and shear strength as the maker Fiberline prints the minima of E23 (EN 13706-3)
     "gfrp": (23.0, np.nan, 240, 240, np.nan, 25, np.nan),
@@ -161,7 +162,10 @@ def preset_rows() -> Iterator[Row]:
         yield Row(name, "figures off a second source", float(np.nanmax(np.abs(ours / second - 1))), EXACT)
 
 
-ROWS = (section_rows, preset_rows, support_rows, creep_rows, chance_rows, developable_rows, sum_rows, curved_rows)
+ROWS = (
+    section_rows, preset_rows, support_rows, beam_rows, creep_rows, chance_rows, developable_rows, sum_rows,
+    curved_rows,
+)  # fmt: skip
 
 
 def main() -> int:

@@ -11,6 +11,17 @@ import rodshell as rs
 from rodshell.layout.cells import diagonals
 from rodshell.solve.modes import frequencies
 from tests.acceptance.rows import Row
+from tests.formfinding.test_edge_beams import (
+    OPEN,
+    R,
+    arc,
+    bare,
+    critical_pressure,
+    first_frequencies,
+    ring,
+    twin_of_arch,
+)
+from tests.formfinding.test_edge_beams import on as on_beams
 from tests.formfinding.test_support_groups import SPAN, SprungTwin, bows, groups, on, thrust
 from tests.loads.braced_twin import BracedTwin
 from tests.loads.shells import TUBE, one, shell
@@ -55,6 +66,28 @@ def support_rows() -> Iterator[Row]:
     square = eigh(stiff, np.diag(np.repeat(mass, 3)[twin.free]), eigvals_only=True, subset_by_index=[0, 0])[0]
     found = frequencies(popped.equilibrium, lumped, 1).frequencies[0]
     yield Row("cap on springs", "first frequency, off other code", _off(found, np.sqrt(square) / (2 * np.pi)), 0.01)
+
+
+def beam_rows() -> Iterator[Row]:
+    """Rings and arches against closed forms; a shell on an arch against code of the tests' own."""
+    beam, half = bare(ring(96), closed=True).rod, np.pi / 3
+    yield Row(
+        "ring, pressure", "buckling off 3 EI/R^3",
+        _off(critical_pressure(ring(96), closed=True), 3 * beam.bend_stiffness / R**3), CLOSED,
+    )  # fmt: skip
+    yield Row(
+        "arch on two hinges", "buckling off (pi^2/alpha^2 - 1) EI/R^3",
+        _off(critical_pressure(arc(61, half), closed=False), ((np.pi / half) ** 2 - 1) * beam.bend_stiffness / R**3),
+        CLOSED,
+    )  # fmt: skip
+    twin, form = twin_of_arch(), on_beams(rs.Arch(at=OPEN, rod=beam))
+    popped = form.popped["given"]
+    apart = np.abs(popped.positions.ravel() - twin.state[: popped.positions.size]).max() / form.target.size
+    yield Row("cap on an arch", "shape off other code, over the size", float(apart), 1e-6)
+    limit, _ = twin.load_factor(2e-3)
+    carried = form.checks.self_weight["given"].load_factor
+    yield Row("cap on an arch", "limit under its weight, off other code", _off(carried, limit), TWIN)
+    yield Row("cap on an arch", "first frequency, off other code", _off(*first_frequencies()), 0.01)
 
 
 def creep_rows() -> Iterator[Row]:

@@ -35,15 +35,19 @@ def with_settlement() -> rs.Loads:
     )  # fmt: skip
 
 
+STEEL_ARCH = rs.Arch(at="y > 6 m", rod=rs.Rod(rs.Tube(0.04, 0.004), rs.Material.preset("steel")))
+
+
 @pytest.mark.slow
 def test_supports_that_yield_do_not_creep() -> None:
-    """Springs, and an energy of one's own: the shell of softer rods on them is the crept one."""
-    soft_springs = rs.SupportGroups(groups=(rs.SprungEnds(stiffness=20e3),))
-    for support in (soft_springs, Posts("posts")):
+    """Springs, clamps, beams, and an energy of one's own: the shell of softer rods on them is the crept one."""
+    ends = (rs.SprungEnds(stiffness=20e3),), (rs.ClampedEnds(at="y < 0 m", turning=1e3),), (STEEL_ARCH,)
+    for support in (*(rs.SupportGroups(groups=groups) for groups in ends), Posts("posts")):
         form, other = (
             rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), rod, ends=support) for rod in (TUBE, soft())
         )  # fmt: skip
         loads = one(CLADDING, stability=rs.Stability(imperfection=0, modes=1), strength=KNOWN)
+        loads = replace(loads, combinations={"all": {"it": 0.5}})
         found = rs.check_loads(form, loads).shells["all"][support.name]
         twin = rs.check_loads(other, loads).shells["all"][support.name]
         assert found.after_years is not None
@@ -51,6 +55,20 @@ def test_supports_that_yield_do_not_creep() -> None:
         before = rs.check_loads(form, replace(loads, combinations={"all": {"it": 1e-9}})).shells["all"][support.name]
         moved = np.linalg.norm(twin.positions - before.positions, axis=1).max()
         assert found.after_years.max_deflection == pytest.approx(moved, rel=1e-4)
+
+
+def test_a_beam_that_creeps_as_the_rods_do_leaves_the_path_as_it_is() -> None:
+    """Its factors are those as erected, over 1 + creep; one of an unknown material is not followed."""
+    loads = one(CLADDING, stability=rs.Stability(imperfection=0, modes=1), strength=KNOWN)
+    for arch in (replace(STEEL_ARCH, creep=CREEP), replace(STEEL_ARCH, rod=TUBE)):
+        form = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), TUBE, ends=rs.SupportGroups(groups=(arch,)))
+        found = rs.check_loads(form, loads).shells["all"]["given"]
+        if arch.creep is None:
+            assert found.after_years is None
+        else:
+            assert found.limit_factor is not None
+            assert found.after_years is not None
+            assert found.after_years.limit_factor == pytest.approx(found.limit_factor / (1 + CREEP), rel=CLOSE)
 
 
 def test_nothing_is_known_after_years_on_a_support_whose_energy_cannot_be_scaled() -> None:
