@@ -119,6 +119,11 @@ def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXAC
     return f"{value:.{min(max(digits - whole, 0), rounding.digits)}f} mm"
 
 
+def drawn_length(results: Results, metres: float | None) -> str:
+    """A length [m] as fine as on the drawings."""
+    return millimetres(metres, rounding=rounding_of(results))
+
+
 def nice_step(span: float, count: int) -> float:
     """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less."""
     if span <= 0:
