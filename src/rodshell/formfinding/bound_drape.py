@@ -14,7 +14,7 @@ from math import degrees
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, NodePositions
 from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
@@ -237,13 +237,14 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
     ]
 
 
-def _net_deviation(target: Target, mesh: GridMesh, ends: Floats, whole: Ints, spans: Ints, positions: Floats) -> Floats:
+def _net_deviation(
+    target: Target, mesh: GridMesh, ends: Floats, whole: Ints, spans: Ints, positions: NodePositions
+) -> Floats:
     """(k, 2) how far past both ends of each rod that is built this state crosses the target's end, along the rod [m].
 
     Args:
         ends, whole: (k, 2), (k,) of rods as cut by the net [m], and the rod of the mesh that each belongs to.
         spans: (k, 2) see `spans_along`.
-        positions: (n, 3) of the mesh's nodes [m].
     """
     nodes, ends, whole = spans.ravel(), ends.ravel(), np.repeat(whole, 2)
     first, last = mesh.rod_start[whole], mesh.rod_stop[whole] - 1

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints, State
+from rodshell.arrays import Floats, Ints, NodePositions, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle, unit
 from rodshell.joints import (
@@ -196,11 +196,10 @@ class Shell:
         copies = np.bincount(self.like)
         return np.asarray(shared[self.like] / copies[self.like][:, None])
 
-    def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
+    def state(self, positions: NodePositions, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
         """(N, 3) state of the shell.
 
         Args:
-            positions: (n, 3) of the mesh's nodes [m].
             tangents: (2m, 3) outward unit tangents at the rod ends, which clamped ends need.
             normals: (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
                 None: the directors are those of the flat grid, moved by the smallest rotation.
