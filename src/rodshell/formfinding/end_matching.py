@@ -22,7 +22,7 @@ from rodshell.nets.net_refinement import interpolated
 from rodshell.targets import Target
 
 Point = tuple[float, float]
-OnSeam = Callable[[Floats], Bools]  # whether points (k, 3) of the end lie on a seam whose rods are given
+_OnSeam = Callable[[Floats], Bools]  # whether points (k, 3) of the end lie on a seam whose rods are given
 
 ROUNDS = 4  # of corrections; three are enough
 SETTLED = 1e-7  # of the size: largest move of a rod in the last round
@@ -51,7 +51,7 @@ class EndGoals:
     points: Floats
     tangents: Floats
     rows: Sequence[Ints]
-    on_seam: OnSeam
+    on_seam: _OnSeam
 
 
 @dataclass(frozen=True)

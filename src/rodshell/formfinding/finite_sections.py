@@ -92,7 +92,7 @@ def middle_surface(mesh: GridMesh, layered: GridMesh, positions: Floats) -> Floa
     return total / np.bincount(mesh.rod_nodes, minlength=mesh.node_count)[:, None]
 
 
-def rod_thickness(rod: Rod) -> float:
+def _rod_thickness(rod: Rod) -> float:
     """Size of a rod's section along the shell's normal [m]; 0 where the shape of its section is not known."""
     return 0.0 if isinstance(rod.section, GivenSection) else 2 * rod.section.half_widths[0]
 
@@ -113,7 +113,7 @@ def thickness_warnings(
         touching: (n,) which of them lie on the target itself, not on its continuation.
         spacing: of the rods [m].
     """
-    thick, (a, b) = rod_thickness(rod), mesh.edges.T
+    thick, (a, b) = _rod_thickness(rod), mesh.edges.T
     turn, chord = normal[b] - normal[a], positions[b] - positions[a]
     bent = thick * (touching[a] & touching[b]) * dot(turn, chord) / dot(chord, chord)
     if not (np.abs(bent).max(initial=0.0) > THICK or thick > CLOSE * spacing):

@@ -47,7 +47,7 @@ from rodshell.validation import flag, instance
 
 OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
 Direction = tuple[float, float, float]
-Item = TypeVar("Item")
+_Item = TypeVar("_Item")
 COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
 
 
@@ -473,7 +473,7 @@ class _Builder:
         return min(float(value.C1 or 0.0) for value in values), min(float(value.C2 or 0.0) for value in values)
 
 
-def _per_item(value: Item | Sequence[Item], count: int, items: str) -> tuple[Item, ...]:
+def _per_item(value: _Item | Sequence[_Item], count: int, items: str) -> tuple[_Item, ...]:
     """A tuple of `count` values, from one for all or one for each."""
     if not isinstance(value, Sequence):
         return (value,) * count

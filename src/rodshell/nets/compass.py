@@ -91,7 +91,7 @@ def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERA
     else:
         found = list[Floats]()
         for height, pair in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
-            layer = Layer(target, height)
+            layer = NetLayer(target, height)
             begin = np.repeat(layer.of(anchor[None]), 2, axis=0)
             on_layer = geodesics(layer, begin, tangents[pair], steps[pair], tolerance=tolerance)
             found += [layer.below(arm) for arm in on_layer]
@@ -113,7 +113,7 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
 
 
 @dataclass(frozen=True)
-class Layer:
+class NetLayer:
     """The surface parallel to a target, with what a march needs of it.
 
     Args:
@@ -145,7 +145,7 @@ class Layer:
 
 
 def geodesics(
-    target: Target | Layer, start: Floats, direction: Floats, steps: list[Floats], *, tolerance: float = TOLERANCE
+    target: Target | NetLayer, start: Floats, direction: Floats, steps: list[Floats], *, tolerance: float = TOLERANCE
 ) -> list[Floats]:
     """Discrete geodesics, several at once, by given chord lengths; second order.
 
@@ -251,7 +251,7 @@ def _compass(
     a, b, p = known
     layered, none = heights != ON_SURFACE, np.empty((0, 3, 3))
     if layered:  # A and B on the layers of the rods that lead from them to P
-        a, b = Layer(target, heights[1]).of(a), Layer(target, heights[0]).of(b)
+        a, b = NetLayer(target, heights[1]).of(a), NetLayer(target, heights[0]).of(b)
     change, sine = np.empty(len(p)), np.empty(len(p))
     for _ in range(NEWTON_STEPS):
         value, gradient, hessian = target.implicit(p) if layered else (*target.level(p), none)

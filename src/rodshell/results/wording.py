@@ -144,6 +144,11 @@ def percent(share: float | None) -> str:
     return UNKNOWN if share is None or not isfinite(share) else percent_text(share)
 
 
+def too_much(share: float) -> str:
+    """A share above 1, never shown as 100 %."""
+    return f"{max(101, round(100 * share))} %"
+
+
 def share_of_weight(found: SelfWeight) -> str:
     """How much of its own weight a shell carries."""
     factor = found.load_factor

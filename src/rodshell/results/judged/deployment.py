@@ -8,9 +8,9 @@ from rodshell.figures.sentences import ANOTHER_WAY
 from rodshell.results.judged.contact import contact_faults, met_on_the_way
 from rodshell.results.judged.own_weight import reserve
 from rodshell.results.judged.shape import CONVERGED, shape_words, status_of
-from rodshell.results.judged.stress import bent_of, exceeded, fibre_faults, holds_while_erected, strength_name
+from rodshell.results.judged.stress import bent_of, fibre_faults, holds_while_erected, strength_name
 from rodshell.results.results import Results
-from rodshell.results.wording import percent
+from rodshell.results.wording import percent, too_much
 from rodshell.rods.supports import PINNED, clamped_among
 
 
@@ -31,7 +31,7 @@ def erection_faults(results: Results) -> Iterator[Said]:
     faults = [*fibre_faults(results, "deployment")]
     if used is not None and used > 1 and holds_while_erected(results, used):
         faults.append(said(
-            "strength", None, used, 1, place=bent.rod, shape=shape_words("deployment", bent), share=exceeded(used),
+            "strength", None, used, 1, place=bent.rod, shape=shape_words("deployment", bent), share=too_much(used),
             whose=strength_name(results, "deployment"), where="",
         ))  # fmt: skip
     if met_on_the_way(results):

@@ -11,9 +11,9 @@ from rodshell.figures.findings import Said, said
 from rodshell.figures.loads import AfterYears, LoadedShell
 from rodshell.figures.records import Ends
 from rodshell.figures.sentences import USES
-from rodshell.results.judged.stress import bent_of, by_code, exceeded
+from rodshell.results.judged.stress import bent_of, by_code
 from rodshell.results.results import Results
-from rodshell.results.wording import drawn_length, percent, rounded, rounded_down
+from rodshell.results.wording import drawn_length, percent, rounded, rounded_down, too_much
 
 NOT_FOLLOWED, UNSTABLE = "not followed", "unstable unloaded"
 SAME_USE = 1.02  # of what the erected shell uses: more is the loads' doing
@@ -42,18 +42,18 @@ def load_faults(results: Results, ends: Ends) -> Iterator[Said]:
         for by, share in before.items():
             if share > 1:
                 sentence = "slip: unloaded" if by == "slip_unloaded" else "strength: unloaded"
-                rod, what = place.rod if place else None, USES[by].format(exceeded(share), by_code(results))
+                rod, what = place.rod if place else None, USES[by].format(too_much(share), by_code(results))
                 word = said(sentence, ends, share, 1, place=rod, what=what, where=where * (by == governs))
                 if len(word) > len(unloaded.get(by, "")):  # the same under all, or with its place
                     unloaded[by] = word
         worst = max(uses, key=lambda by: uses[by], default="")
         if uses.get(worst, 0.0) > 1:
             at = "" if found.at_factor == 1 else f" already at {rounded_down(found.at_factor or 0.0)} times these loads"
-            what = USES.get(worst, USES["bending"]).format(exceeded(uses[worst]), by_code(results))
+            what = USES.get(worst, USES["bending"]).format(too_much(uses[worst]), by_code(results))
             code, where = "slip" if worst == "slip" else "strength_under_loads", where * (worst == governs)
             yield said(code, ends, uses[worst], 1, place=name, what=what, at=at, where=where)
         if (braced := found.bracing_utilisation) is not None and braced > 1:
-            yield said("strength_of_bracing", ends, braced, 1, place=name, share=exceeded(braced))
+            yield said("strength_of_bracing", ends, braced, 1, place=name, share=too_much(braced))
     yield from unloaded.values()
 
 

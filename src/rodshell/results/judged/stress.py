@@ -9,7 +9,7 @@ from rodshell.results.judged.shape import shape_words, support_of
 from rodshell.results.judged.supports import width
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import thinner_than_sold
-from rodshell.results.wording import drawn_length, percent
+from rodshell.results.wording import drawn_length, percent, too_much
 from rodshell.rods.design_strength import RESERVED
 
 LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
@@ -60,11 +60,6 @@ def utilisation(results: Results) -> float | None:
     return max((bent.utilisation for bent in shapes if bent.utilisation is not None), default=None)
 
 
-def exceeded(share: float) -> str:
-    """A share above 1, never shown as 100 %."""
-    return f"{max(101, round(100 * share))} %"
-
-
 def fibre_faults(results: Results, shape: str) -> Iterator[Said]:
     """Stress above the strength, strain beyond thin rods."""
     bent = bent_of(results, shape)
@@ -76,7 +71,7 @@ def fibre_faults(results: Results, shape: str) -> Iterator[Said]:
             where += ": the section that was chosen is too thick; give a thinner one (rod.section)"
         yield said(
             "strength" if by_design_strength(results) else "strength: given", support_of(shape), used, 1,
-            place=bent.rod, shape=shape_words(shape, bent), share=exceeded(used),
+            place=bent.rod, shape=shape_words(shape, bent), share=too_much(used),
             whose=strength_name(results, shape), where=where,
         )  # fmt: skip
     if strain is not None and strain > THIN:
