@@ -9,6 +9,7 @@ P + h n(P), h being the height of the rod's layer and n the target's normal, and
 The net's points P are on the target, between the layers.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -51,6 +52,15 @@ class Net:
     def origin(self) -> tuple[int, int]:
         """Indices of the anchor, (u, v) = (0, 0)."""
         return int(np.abs(self.u).argmin()), int(np.abs(self.v).argmin())
+
+    def bends(self, among: Bools) -> Iterator[tuple[Floats, Floats]]:
+        """Of each family the nodes (k, 3) [m] and its lines' curvatures there (k, 3) [1/m], by second differences, at
+        those among (nu, nv) whose neighbours are known."""
+        for x, s, marked in ((self.points, self.u, among), (self.points.transpose(1, 0, 2), self.v, among.T)):
+            slope = np.diff(x, axis=0) / np.diff(s)[:, None, None]
+            bend = np.diff(slope, axis=0) / (0.5 * (s[2:] - s[:-2]))[:, None, None]
+            known = marked[1:-1] & np.isfinite(bend[:, :, 0])
+            yield x[1:-1][known], bend[known]
 
 
 class Axes(NamedTuple):

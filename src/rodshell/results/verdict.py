@@ -12,7 +12,6 @@ from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, sai
 from rodshell.figures.records import Ends
 from rodshell.figures.sentences import SENTENCES
 from rodshell.results.judged.bracing import cable_points, is_braced
-from rodshell.results.judged.contact import contact_faults, met_on_the_way
 from rodshell.results.judged.deployment import deployment_points, erection_faults, laid_out
 from rodshell.results.judged.loads import creep_unknown, least_carried, load_faults, load_points, lowered
 from rodshell.results.judged.own_weight import falling, none_stands, reserve, weight_findings
@@ -21,6 +20,8 @@ from rodshell.results.judged.shape import (
     CONVERGED,
     FAR_OFF,
     OFF,
+    contact_faults,
+    met_on_the_way,
     near_shapes,
     nearest,
     off_target,

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from rodshell.figures.findings import Said, said
 from rodshell.figures.records import Ends
 from rodshell.figures.sentences import ANOTHER_WAY
-from rodshell.results.judged.contact import contact_faults, met_on_the_way
 from rodshell.results.judged.own_weight import reserve
-from rodshell.results.judged.shape import CONVERGED, shape_words, status_of
+from rodshell.results.judged.shape import CONVERGED, contact_faults, met_on_the_way, shape_words, status_of
 from rodshell.results.judged.stress import bent_of, fibre_faults, holds_while_erected, strength_name
 from rodshell.results.results import Results
 from rodshell.results.wording import percent, too_much

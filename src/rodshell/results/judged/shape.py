@@ -1,4 +1,4 @@
-"""Whether there is a shell, and of which shape: found, stable, near the target, alone."""
+"""Whether there is a shell, and of which shape: found, stable, near the target, alone, with rods that do not touch."""
 
 from collections.abc import Iterator
 
@@ -88,3 +88,24 @@ def near_shapes(results: Results, usable: list[Ends]) -> Iterator[Said]:
         if ends in usable and near:
             distance, energy = min(near, key=lambda pair: pair[0])
             yield said("other_shape", ends, distance, NEAR, distance=percent(distance), energy=rounded(energy))
+
+
+def contact_faults(results: Results, shape: str) -> Iterator[Said]:
+    touching = results.contact.of(shape) if results.contact else None
+    if not touching or not touching.pairs:
+        return
+    first, second = touching.rods or ("a rod", "another")
+    rods = f"{first} and {second} overlap" if first != second else f"{first} runs into itself"
+    worst = f"{touching.pairs} pairs of rods touch or cross, worst: " if touching.pairs > 1 else "rods touch: "
+    where = f" near ({place(touching.where, rounding_of(results))})" if touching.where else ""
+    yield said(
+        "contact", support_of(shape), touching.clearance, 0, "m", place=first,
+        shape=shape_words(shape, touching), worst=worst, rods=rods,
+        depth=drawn_length(results, -(touching.clearance or 0.0)), where=where,
+    )  # fmt: skip
+
+
+def met_on_the_way(results: Results) -> bool:
+    """Whether the rods are nearest to each other while the grid is erected, not in the flat grid."""
+    met = results.contact.deployment if results.contact else None
+    return met is not None and (met.share or 0.0) > 0
