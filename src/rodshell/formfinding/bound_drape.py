@@ -24,7 +24,7 @@ from rodshell.kernels import njit
 from rodshell.layout import GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import sides
 from rodshell.layout.mesh import spans_along
-from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.nets import chebyshev_net
 from rodshell.nets.apron import with_apron
 from rodshell.progress import Progress, silent
 from rodshell.rods.elements import Stretch
@@ -258,12 +258,3 @@ def _net_deviation(
     bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
     ahead = (f[0] - x[0] * slope + x[0] * x[1] * bend) / ((x[0] + x[1]) * bend - slope)
     return np.asarray(ahead.reshape(-1, 2) * [-1.0, 1.0])
-
-
-def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
-    """Key figures of a net for the result file: its error [m], and its smallest angle and where that is [m]."""
-    return {
-        "error_estimate": net.error_estimate,
-        "min_angle_deg": degrees(net.min_angle),
-        "min_angle_at": list(net.min_angle_at),
-    }

@@ -7,9 +7,8 @@ from rodshell.figures.checks import OTHER_SHAPES, Bending, SelfWeight
 from rodshell.figures.form import Bent, RodType
 from rodshell.figures.loads import DesignStrength
 from rodshell.figures.records import printable
-from rodshell.results.judged.bracing import is_braced
 from rodshell.results.judged.deployment import unknown_below
-from rodshell.results.judged.loads import UNLOADED
+from rodshell.results.judged.loads import UNLOADED, is_braced
 from rodshell.results.judged.shape import CONVERGED
 from rodshell.results.judged.stress import strength_name
 from rodshell.results.judged.supports import share_of_span

@@ -11,9 +11,16 @@ from math import inf, isinf
 from rodshell.figures.findings import RANKS, Finding, Level, Said, level_of, said
 from rodshell.figures.records import Ends
 from rodshell.figures.sentences import SENTENCES
-from rodshell.results.judged.bracing import cable_points, is_braced
 from rodshell.results.judged.deployment import deployment_points, erection_faults, laid_out
-from rodshell.results.judged.loads import creep_unknown, least_carried, load_faults, load_points, lowered
+from rodshell.results.judged.loads import (
+    cable_points,
+    creep_unknown,
+    is_braced,
+    least_carried,
+    load_faults,
+    load_points,
+    lowered,
+)
 from rodshell.results.judged.own_weight import falling, none_stands, reserve, weight_findings
 from rodshell.results.judged.shape import (
     BUCKLED,

@@ -12,7 +12,7 @@ from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.form import RodType
 from rodshell.figures.records import Ends
-from rodshell.results.judged.bracing import is_braced
+from rodshell.results.judged.loads import is_braced
 from rodshell.results.judged.stress import THIN, bent_of, holds_while_erected, strength_name
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import half_sides, sizes_sold
